@@ -1,34 +1,20 @@
 """From a `casadi.Function` to compiled C, cached by content, and to loops over samples."""
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from codegen.face import face
 
 if TYPE_CHECKING:
-    from codegen.compiler import (
-        CompilationError,
-        build_library,
-        cache_folder,
-        find_compiler,
-        load_library,
-    )
-    from codegen.scan import Scan, Stepper
+    from codegen.compiler import CompilationError as CompilationError
+    from codegen.compiler import build_library as build_library
+    from codegen.compiler import cache_folder as cache_folder
+    from codegen.compiler import find_compiler as find_compiler
+    from codegen.compiler import load_library as load_library
+    from codegen.scan import Scan as Scan
+    from codegen.scan import Stepper as Stepper
 
-__all__ = [
-    "CompilationError",
-    "Scan",
-    "Stepper",
-    "build_library",
-    "cache_folder",
-    "find_compiler",
-    "load_library",
-]
-_HOMES = {"Scan": "scan", "Stepper": "scan"}  # all others: compiler
+_COMPILER = ("CompilationError", "build_library", "cache_folder", "find_compiler", "load_library")
+_HOMES = {name: f"codegen.compiler:{name}" for name in _COMPILER}
+_HOMES |= {name: f"codegen.scan:{name}" for name in ("Scan", "Stepper")}
 
-
-def __getattr__(name: str) -> Any:
-    """Return a name of the package, fetched at its first use: `codegen.errors` needs none."""
-    if name not in __all__:
-        raise AttributeError(f"module 'codegen' has no attribute {name!r}")
-    home = importlib.import_module(f"codegen.{_HOMES.get(name, 'compiler')}")
-    globals()[name] = value = getattr(home, name)
-    return value
+__getattr__, __dir__ = face(__name__, _HOMES)  # `codegen.errors` needs none of them

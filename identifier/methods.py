@@ -6,10 +6,10 @@ by entry points of the group `tireid.methods`: a name, and a factory. Built-in n
 """
 
 from collections.abc import Callable, Mapping
-from functools import cache, partial
-from importlib.metadata import EntryPoint, entry_points
+from functools import partial
 from typing import Any
 
+from codegen.plugins import installed
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.model import AxleModel
 from identifier.baselines import LaggedEkf, LinearBaseline, magic_formula_ekf
@@ -72,12 +72,6 @@ GROUP = "tireid.methods"
 _RIVALS = ("linear_kf", "joint_ekf", "washout", "mhe")
 
 
-@cache
-def _installed() -> dict[str, EntryPoint]:
-    """Return what other distributions add, by name."""
-    return {one.name: one for one in entry_points(group=GROUP) if one.name not in METHODS}
-
-
 def draws_weights(name: str) -> bool:
     """Return whether a method begins with random weights, so that a seed changes its results.
 
@@ -104,7 +98,7 @@ def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
     if name in METHODS:
         return METHODS[name](vehicle, seed)
     require_method(name)
-    point = _installed()[name]
+    point = installed(GROUP)[name]
     try:
         method = point.load()(vehicle, seed)
     except Exception as error:  # of another's code
@@ -153,7 +147,7 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01, *, v_y: boo
 
 def methods() -> tuple[str, ...]:
     """Return the names of all methods, the default first, those of other distributions last."""
-    return (*METHODS, *_installed())
+    return (*METHODS, *(name for name in installed(GROUP) if name not in METHODS))
 
 
 def certify(method: Method | str, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:

@@ -122,11 +122,11 @@ def unmade(monkeypatch, undrawn):
     """As `undrawn`, and `tireid identify` makes no axes either, which take as long as learning."""
     from matplotlib.figure import Figure
 
-    from tireid.commands import identify_results
+    from tireid import identified
 
-    for name in dir(identify_results):
+    for name in dir(identified):
         if name.endswith("_figure") and name != "save_figure":
-            monkeypatch.setattr(identify_results, name, lambda *_, **__: Figure())
+            monkeypatch.setattr(identified, name, lambda *_, **__: Figure())
 
 
 @pytest.fixture

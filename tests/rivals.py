@@ -10,6 +10,6 @@ INSTALLED = set(NAMES) <= set(methods())
 needs_rivals = pytest.mark.skipif(not INSTALLED, reason=REASON)
 
 
-def rival(name: str, *values: object) -> object:
+def rival(name: object, *values: object) -> object:
     """A case of a parametrized test that is left out where the rivals are not installed."""
     return pytest.param(name, *values, marks=needs_rivals)

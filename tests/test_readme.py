@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tireid as ti
-from tireid.commands.paper import printed_values, row_labels
+from tireid.commands.paper import _printed_values, _row_labels
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -34,7 +34,7 @@ def check_tables(text: str) -> None:
     tables = printed_tables(text)
     assert tables.keys() == EXPECTED.keys()
     for maneuver, rows in tables.items():
-        ours, paper, labels = EXPECTED[maneuver], printed_values(maneuver), row_labels(maneuver)
+        ours, paper, labels = EXPECTED[maneuver], _printed_values(maneuver), _row_labels(maneuver)
         assert list(rows) == list(labels.values())
         for name, label in labels.items():
             numbers = []

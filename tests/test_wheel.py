@@ -35,7 +35,7 @@ reveal_type(ti.__version__)
 """
 REVEALED = (
     "numpy.ndarray",
-    "identifier.run.History",
+    "tireid.run.Run",
     "numpy.ndarray",
     "identifier.reproducibility.AxleRmse | None",
     "Literal['not certified']",

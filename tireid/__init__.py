@@ -8,129 +8,71 @@
 What is not used is not imported: each name is fetched where it is asked for.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tireid.home import find_own_packages
 
 if TYPE_CHECKING:
-    from codegen.errors import TireidError
-    from identifier.axle import AxleIdentifier
-    from identifier.doctor import Diagnosis, diagnose
-    from identifier.method import Method
-    from identifier.methods import certify, make_method, methods
-    from identifier.paper.design import PaperIdentifier
-    from identifier.prediction import Prediction
-    from identifier.tire_model import TireModel
-    from identifier.verdict import Verdict
-    from models.recordings import LogMap, Recording, Repair, Wheels, read_recording, read_repaired
-    from models.vehicle import Vehicle, sedan
-    from mpc import path as paths
-    from tireid import errors
-    from tireid.driving.learn import sample_recording
-    from tireid.driving.runs import drive
-    from tireid.emitting import emit
-    from tireid.exporting import export
-    from tireid.figures.forces import inputs_figure as plot
-    from tireid.learning import identify, replay
-    from tireid.planning import plan
-    from tireid.run import Run
+    from codegen.errors import TireidError as TireidError
+    from identifier.axle import AxleIdentifier as AxleIdentifier
+    from identifier.doctor import Diagnosis as Diagnosis
+    from identifier.doctor import diagnose as diagnose
+    from identifier.method import Method as Method
+    from identifier.methods import certify as certify
+    from identifier.methods import make_method as make_method
+    from identifier.methods import methods as methods
+    from identifier.paper.design import PaperIdentifier as PaperIdentifier
+    from identifier.prediction import Prediction as Prediction
+    from identifier.tire_model import TireModel as TireModel
+    from identifier.verdict import Verdict as Verdict
+    from models.recordings import LogMap as LogMap
+    from models.recordings import Recording as Recording
+    from models.recordings import Repair as Repair
+    from models.recordings import Wheels as Wheels
+    from models.recordings import read_recording as read_recording
+    from models.recordings import read_repaired as read_repaired
+    from models.vehicle import Vehicle as Vehicle
+    from models.vehicle import sedan as sedan
+    from mpc import path as _path
+    from tireid import errors as errors
+    from tireid.driving.learn import sample_recording as sample_recording
+    from tireid.driving.runs import drive as drive
+    from tireid.emitting import emit as emit
+    from tireid.exporting import export as export
+    from tireid.figures.forces import inputs_figure as _plot
+    from tireid.learning import identify as identify
+    from tireid.learning import replay as replay
+    from tireid.planning import plan as plan
+    from tireid.run import Run as Run
 
+    paths, plot = _path, _plot
     __version__: str
 
 find_own_packages()
 
-_HOMES = {
-    "AxleIdentifier": ("identifier.axle", "AxleIdentifier"),
-    "Diagnosis": ("identifier.doctor", "Diagnosis"),
-    "LogMap": ("models.recordings", "LogMap"),
-    "Method": ("identifier.method", "Method"),
-    "PaperIdentifier": ("identifier.paper.design", "PaperIdentifier"),
-    "Prediction": ("identifier.prediction", "Prediction"),
-    "Recording": ("models.recordings", "Recording"),
-    "Run": ("tireid.run", "Run"),
-    "Repair": ("models.recordings", "Repair"),
-    "TireModel": ("identifier.tire_model", "TireModel"),
-    "TireidError": ("codegen.errors", "TireidError"),
-    "Vehicle": ("models.vehicle", "Vehicle"),
-    "Verdict": ("identifier.verdict", "Verdict"),
-    "Wheels": ("models.recordings", "Wheels"),
-    "certify": ("identifier.methods", "certify"),
-    "diagnose": ("identifier.doctor", "diagnose"),
-    "errors": ("tireid.errors", ""),
-    "drive": ("tireid.driving.runs", "drive"),
-    "emit": ("tireid.emitting", "emit"),
-    "export": ("tireid.exporting", "export"),
-    "identify": ("tireid.learning", "identify"),
-    "make_method": ("identifier.methods", "make_method"),
-    "methods": ("identifier.methods", "methods"),
-    "paths": ("mpc.path", ""),
-    "plan": ("tireid.planning", "plan"),
-    "plot": ("tireid.figures.forces", "inputs_figure"),
-    "read_recording": ("models.recordings", "read_recording"),
-    "read_repaired": ("models.recordings", "read_repaired"),
-    "replay": ("tireid.learning", "replay"),
-    "sample_recording": ("tireid.driving.learn", "sample_recording"),
-    "sedan": ("models.vehicle", "sedan"),
+from codegen.face import face  # noqa: E402 - the package that was just found
+
+_NAMES = {  # by the module that they lie in
+    "codegen.errors": "TireidError",
+    "identifier.axle": "AxleIdentifier",
+    "identifier.doctor": "Diagnosis diagnose",
+    "identifier.method": "Method",
+    "identifier.methods": "certify make_method methods",
+    "identifier.paper.design": "PaperIdentifier",
+    "identifier.prediction": "Prediction",
+    "identifier.tire_model": "TireModel",
+    "identifier.verdict": "Verdict",
+    "models.recordings": "LogMap Recording Repair Wheels read_recording read_repaired",
+    "models.vehicle": "Vehicle sedan",
+    "tireid.driving.learn": "sample_recording",
+    "tireid.driving.runs": "drive",
+    "tireid.emitting": "emit",
+    "tireid.exporting": "export",
+    "tireid.learning": "identify replay",
+    "tireid.planning": "plan",
+    "tireid.run": "Run",
 }
-__all__ = [
-    "AxleIdentifier",
-    "Diagnosis",
-    "LogMap",
-    "Method",
-    "PaperIdentifier",
-    "Prediction",
-    "Recording",
-    "Repair",
-    "Run",
-    "TireModel",
-    "TireidError",
-    "Vehicle",
-    "Verdict",
-    "Wheels",
-    "__version__",
-    "certify",
-    "diagnose",
-    "drive",
-    "emit",
-    "errors",
-    "export",
-    "identify",
-    "make_method",
-    "methods",
-    "paths",
-    "plan",
-    "plot",
-    "read_recording",
-    "read_repaired",
-    "replay",
-    "sample_recording",
-    "sedan",
-]
-
-
-def __getattr__(name: str) -> Any:
-    """Return a name of the interface, fetched at its first use."""
-    if name == "__version__":
-        value: Any = _version()
-    elif name in _HOMES:
-        module, attribute = _HOMES[name]
-        home = importlib.import_module(module)
-        value = getattr(home, attribute) if attribute else home
-    else:
-        raise AttributeError(f"module 'tireid' has no attribute {name!r}")
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("tireid")
-    except PackageNotFoundError:  # run from a checkout that is not installed
-        return "unknown"
+_HOMES = {name: f"{module}:{name}" for module, names in _NAMES.items() for name in names.split()}
+_HOMES |= {"errors": "tireid.errors", "paths": "mpc.path"}
+_HOMES |= {"plot": "tireid.figures.forces:inputs_figure", "__version__": "tireid.version:VERSION"}
+__getattr__, __dir__ = face(__name__, _HOMES)

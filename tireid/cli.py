@@ -20,19 +20,18 @@ from tireid.commands import (
     INTERRUPTED,
     NOT_TOLD,
     add_command,
-    installed,
+    added,
     summary,
 )
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
-LONGEST_LINE = 900  # characters of a message, command and option not counted
+_LONGEST_LINE = 900  # characters of a message, command and option not counted
 
 
 class _Parser(argparse.ArgumentParser):
     """A parser whose errors are one line, like all errors of tireid."""
 
     def error(self, message: str) -> NoReturn:
-        """Print one line and exit with code 2."""
         complain(f"{self.prog}: error: {one_line(message)} (see {self.prog} --help)")
         sys.exit(BAD_INPUT)
 
@@ -42,12 +41,13 @@ def build_parser(words: Sequence[str]) -> _Parser:
     parser = _Parser(
         prog="tireid",
         description="Turns a driving log into the car's tire curves, with error bars and a "
-        "verdict.",
+        "verdict. Begin with tireid demo, or with tireid sample and tireid identify. A command is "
+        "explained by tireid COMMAND --help, words by docs/first_steps.md and docs/glossary.md.",
         epilog=limits_text(),
     )
     parser.add_argument("--version", action="store_true", help="show the version and exit")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    commands = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
     named = next((word for word in words if not word.startswith("-")), None)
     for name, text in COMMANDS.items():
         if name == named:
@@ -55,7 +55,7 @@ def build_parser(words: Sequence[str]) -> _Parser:
         else:
             commands.add_parser(name, help=text)
     if named not in COMMANDS:
-        for name in installed():
+        for name in added():
             if name == named:
                 add_command(name, commands)
             else:
@@ -125,7 +125,7 @@ def one_line(error: Exception | str) -> str:
     text = " ".join(words.split()) or type(error).__name__
     if isinstance(error, MemoryError):
         text = f"not enough memory: {text}"
-    return text if len(text) <= LONGEST_LINE else f"{text[:LONGEST_LINE]}..."
+    return text if len(text) <= _LONGEST_LINE else f"{text[:_LONGEST_LINE]}..."
 
 
 def entry() -> NoReturn:

@@ -1,4 +1,4 @@
-"""A diagnosis as commands tell it: a table, lines, a section of a report, and the repair's file."""
+"""A diagnosis as commands print it: table, lines, section of a report, and the repair's file."""
 
 import argparse
 import math
@@ -20,7 +20,7 @@ from tireid import report as page
 from tireid.output import text_table
 from tireid.reports.common import READ, REPORT, drawing, origin
 
-HEADER = ("found", "size", "confidence", "repair")
+_HEADER = ("found", "size", "confidence", "repair")
 NAMES = {  # of findings by their code, where the code is not the word
     "acceleration_sensor_x": "accelerometer ahead of the c.g.",
     "center_of_gravity": "center of gravity stated too far back",
@@ -44,7 +44,7 @@ NAMES = {  # of findings by their code, where the code is not the word
     "zero": "reads exactly 0 again and again",
 }
 
-GROSS = ("unit", "sign", "sideslip", "steering_ratio")  # with which no answer is right
+_GROSS = ("unit", "sign", "sideslip", "steering_ratio")  # with which no answer is right
 _OF_ALL_FORCES = ("factor", "v_x")  # nor with this: it scales all forces, which no verdict sees
 
 
@@ -60,11 +60,10 @@ def add_repair(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def _finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
-    """Return what was found as rows: what, size, confidence, repair."""
     return [
         [
             " ".join(word for word in (one.channel, NAMES.get(one.code, one.code)) if word),
-            size_text(one),
+            _size_text(one),
             one.percent + (", sure" if one.sure else ""),
             "none" if one.repair is None else repair_text(one.repair),
         ]
@@ -72,7 +71,7 @@ def _finding_rows(diagnosis: Diagnosis) -> list[list[str]]:
     ]
 
 
-def size_text(finding: Finding) -> str:
+def _size_text(finding: Finding) -> str:
     """Return the size of a finding to the digits that its deviation leaves, with its unit."""
     if math.isnan(finding.size):
         return ""
@@ -89,7 +88,7 @@ def diagnosis_text(diagnosis: Diagnosis, *, unobservable: bool = True) -> str:
     count = len(diagnosis.findings)
     if count:
         head = f"doctor: {count} finding{'s' * (count > 1)}"
-        table = text_table([list(HEADER), *_finding_rows(diagnosis)], "<<<<")
+        table = text_table([list(_HEADER), *_finding_rows(diagnosis)], "<<<<")
         return "\n".join([head, table, *diagnosis.lines(unobservable=unobservable)])
     return "\n".join(["doctor: nothing found", *diagnosis.lines(unobservable=unobservable)])
 
@@ -102,14 +101,12 @@ def _tone_of(diagnosis: Diagnosis) -> page.Tone:
 
 
 def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
-    """Return what was found as warnings of a report."""
     return [page.printed(f"the log: {one.text}") for one in diagnosis.findings]
 
 
 def diagnosis_section(
     diagnosis: Diagnosis, more: Sequence[page.Block] = (), heading: str = "Doctor"
 ) -> page.Section:
-    """Return the section of a report that holds a diagnosis."""
     rows = _finding_rows(diagnosis)
     blocks: list[page.Block] = [
         page.Paragraph(
@@ -118,7 +115,7 @@ def diagnosis_section(
         )
     ]
     if rows:
-        blocks.append(page.Table(caption="What was found.", header=list(HEADER), rows=rows))
+        blocks.append(page.Table(caption="What was found.", header=list(_HEADER), rows=rows))
         blocks += [page.Paragraph(text=page.printed(one.text)) for one in diagnosis.findings]
     else:
         blocks.append(page.Paragraph(text="Nothing was found."))
@@ -158,7 +155,7 @@ def with_doctor(verdict: Verdict, diagnosis: Diagnosis, repair: Repair) -> Verdi
             "doctor",
             None,
             f"doctor: {one.text}",
-            one.code in GROSS or (one.code, one.channel) == _OF_ALL_FORCES,
+            one.code in _GROSS or (one.code, one.channel) == _OF_ALL_FORCES,
         )
         for one in left
     ]

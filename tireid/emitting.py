@@ -52,7 +52,7 @@ def emit(
     Raises
     ------
     ValueError
-        Where nothing is asked for, or the model cannot tell what is.
+        Where nothing is asked for, or the model does not know it.
     OutputError, OSError
         Where a file is there and not to be replaced, two have one name, or one cannot be written.
     """

@@ -3,34 +3,17 @@
 Arguments that are wrong in themselves raise plain `TypeError` or `ValueError`.
 """
 
-from codegen.errors import TireidError
-from identifier.frozen import FrozenModelError
-from identifier.method import CannotFreezeError
-from identifier.own_network import UnusableNetworkError
-from identifier.plan import PlanError
-from identifier.reproducibility import NeverDrivesError
-from identifier.run import DivergedError
-from identifier.verdict import BoundViolatedError
-from models.plant import PlantError
-from models.recordings import RecordingError
-from models.vehicle import VehicleError
-from mpc.path.line import PathError
-from tireid.exporting import SelfTestError
-from tireid.output import OutputError
-
-__all__ = [
-    "BoundViolatedError",
-    "CannotFreezeError",
-    "DivergedError",
-    "FrozenModelError",
-    "NeverDrivesError",
-    "OutputError",
-    "PathError",
-    "PlanError",
-    "PlantError",
-    "RecordingError",
-    "SelfTestError",
-    "TireidError",
-    "UnusableNetworkError",
-    "VehicleError",
-]
+from codegen.errors import TireidError as TireidError
+from identifier.frozen import FrozenModelError as FrozenModelError
+from identifier.method import CannotFreezeError as CannotFreezeError
+from identifier.own_network import UnusableNetworkError as UnusableNetworkError
+from identifier.plan import PlanError as PlanError
+from identifier.reproducibility import NeverDrivesError as NeverDrivesError
+from identifier.run import DivergedError as DivergedError
+from identifier.verdict import BoundViolatedError as BoundViolatedError
+from models.plant import PlantError as PlantError
+from models.recordings import RecordingError as RecordingError
+from models.vehicle import VehicleError as VehicleError
+from mpc.path.line import PathError as PathError
+from tireid.exporting import SelfTestError as SelfTestError
+from tireid.output import OutputError as OutputError

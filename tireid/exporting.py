@@ -26,17 +26,17 @@ from tireid.output import output_folder
 from tireid.progress import Progress
 from tireid.run import Run
 
-IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
-_COSTS, _TRACKING, UNITS, NETWORK = "costs on Arm processors", "the tracker", "FMUs", "ONNX"
+_IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
+_COSTS, _TRACKING, _UNITS, _NETWORK = "costs on Arm processors", "the tracker", "FMUs", "ONNX"
 UNCALIBRATED = (
     "the band assumes the declared sensor errors: begin with the model of a drive to calibrate it"
 )
-PARTS = (  # of an export: about how long each takes, and the option that asks for it
+_PARTS = (  # of an export: about how long each takes, and the option that asks for it
     ("the identifier", 1.0, ""),
-    (NETWORK, 1.0, "onnx"),
+    (_NETWORK, 1.0, "onnx"),
     (_COSTS, 17.0, ""),
     (_TRACKING, 17.0, "mpc"),
-    (UNITS, 8.0, "fmu"),
+    (_UNITS, 8.0, "fmu"),
 )
 
 
@@ -123,7 +123,7 @@ def export(
     else:
         method, car = source, vehicle or sedan()
     parts = [word for word, on in (("mpc", mpc), ("fmu", fmu), ("onnx", onnx)) if on]
-    lasts = {title: seconds for title, seconds, wanted in PARTS if wanted in ("", *parts)}
+    lasts = {title: seconds for title, seconds, wanted in _PARTS if wanted in ("", *parts)}
     with (
         Progress("export", lasts, long=True) as progress,
         output_folder(target, force=overwrite) as scratch,
@@ -132,19 +132,19 @@ def export(
             method, car, start, name=name, single=single, with_a_y=with_a_y, with_band=band
         )
         if onnx:  # what cannot be made is refused before costs are measured
-            progress.begin(NETWORK)
+            progress.begin(_NETWORK)
             _write_onnx(scratch, method, car, package, start, band=band)
         if mpc:
             frozen_start(package)  # likewise
         costs = measure(package, progress.begin(_COSTS))
-        place = scratch / IDENTIFIER if mpc else scratch
+        place = scratch / _IDENTIFIER if mpc else scratch
         write_files(place, package, figures_text(costs), costs)
         notes = []
         if mpc:
             progress.begin(_TRACKING)
             notes = write_tracker(scratch, package, single=single, caution=caution)
         if fmu:
-            progress.begin(UNITS)
+            progress.begin(_UNITS)
             from identifier.export.fmu import export_fmu
 
             for version in (2, 3):
@@ -213,7 +213,7 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
     ]
 
 
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-Iinclude", "-Isrc")
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno", "-Iinclude", "-Isrc")
 
 
 class SelfTestError(TireidError, RuntimeError):
@@ -237,7 +237,7 @@ def self_test(folder: Path, name: str, *, single: bool) -> Verdict | None:
     with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
         program = Path(scratch) / "self_test"
         own = [f"-D{name.upper()}_SINGLE={int(single)}", *sources, f"tests/test_{name}.c"]
-        build = [*compiler, *FLAGS, *own, "-o", str(program), "-lm"]
+        build = [*compiler, *_FLAGS, *own, "-o", str(program), "-lm"]
         for command in (build, [str(program)]):
             answer = subprocess.run(
                 command, cwd=folder, capture_output=True, text=True, check=False

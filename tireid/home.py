@@ -10,8 +10,8 @@ import sys
 from importlib.machinery import ModuleSpec, PathFinder
 from types import ModuleType
 
-HOME = __file__.rsplit(os.sep, 2)[0]
-PACKAGES = ("codegen", "models", "identifier", "mpc")
+_HOME = __file__.rsplit(os.sep, 2)[0]
+_PACKAGES = ("codegen", "models", "identifier", "mpc")
 
 
 class _OwnPackages:
@@ -19,15 +19,14 @@ class _OwnPackages:
 
     @staticmethod
     def find_spec(name: str, *_: object) -> ModuleSpec | None:
-        """Return where a package lies."""
-        return PathFinder.find_spec(name, [HOME]) if name in PACKAGES else None
+        return PathFinder.find_spec(name, [_HOME]) if name in _PACKAGES else None
 
 
 def find_own_packages() -> None:
     """Look for the packages in the folder that holds tireid, before all other folders."""
-    for name in PACKAGES:
+    for name in _PACKAGES:
         place = _place(sys.modules.get(name))
-        if place and os.path.realpath(place) != os.path.realpath(f"{HOME}/{name}"):
+        if place and os.path.realpath(place) != os.path.realpath(f"{_HOME}/{name}"):
             raise ImportError(
                 f"{place} hides the package {name!r} of tireid, as it was imported first: rename it"
             )

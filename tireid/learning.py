@@ -26,8 +26,8 @@ log = logging.getLogger("tireid.doctor")
 # How to make what a door wants, for who hands it something else.
 _RECORDING = "as of read_recording"
 _VEHICLE = "as of Vehicle.from_toml or sedan"
-METHOD = 'as of make_method("axle", vehicle), or a name of methods()'
-TIRE = "as of Run.tire or TireModel.load"
+_METHOD = 'as of make_method("axle", vehicle), or a name of methods()'
+_TIRE = "as of Run.tire or TireModel.load"
 
 
 def identify(
@@ -73,7 +73,7 @@ def identify(
     if isinstance(method, str):
         method = make_method(method, vehicle)
     if method is not None:
-        require_kind(Method, METHOD, method=method)
+        require_kind(Method, _METHOD, method=method)
     if method is None:
         method = FitMethod.for_vehicle(vehicle, dt=recording.dt)
     design = method
@@ -112,18 +112,18 @@ def replay(recording: Recording, tire: TireModel, *, since: float | None = None)
         Where an argument is of another kind.
     """
     require_kind(Recording, _RECORDING, recording=recording)
-    require_kind(TireModel, TIRE, tire=tire)
+    require_kind(TireModel, _TIRE, tire=tire)
     return predict(tire, with_v_y(recording, tire), since=since)
 
 
 def with_v_y(recording: Recording, tire: TireModel) -> Recording:
-    """Return a drive with its v_y, or with that which the tires or a filter tell.
+    """Return a drive with its v_y, or with that which the tires or a filter estimate.
 
     For tires of a fit a v_y that is rare or noisy is brought on time, as the fit reads it.
 
     Parameters
     ----------
-    tire : where it tells no v_y, the inertial identifier does, beginning with it where it can.
+    tire : where it estimates no v_y, the inertial identifier does, beginning with it where it can.
 
     Raises
     ------

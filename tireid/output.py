@@ -29,7 +29,7 @@ from tireid.exchange import ClaimedError, claim, exchange
 from tireid.progress import say
 
 MARKER = ".tireid"  # in every folder that we write: what we put there
-FORMAT = "tireid output 1"
+_FORMAT = "tireid output 1"
 _SPARE_NAMES = 1000  # results-2, results-3, ...
 
 
@@ -41,7 +41,7 @@ class NotEmptyError(OutputError, FileExistsError):
     """The output folder holds what an earlier run wrote, and is not to be replaced."""
 
 
-class Written(NamedTuple):
+class _Written(NamedTuple):
     """What a marker lists: size and SHA-256 of files, and folders, by path."""
 
     files: Mapping[str, tuple[int, str]]
@@ -49,7 +49,6 @@ class Written(NamedTuple):
 
 
 def require_free(path: Path, *, force: bool) -> None:
-    """Refuse to replace a file that is there."""
     if path.exists() and not force:
         raise OutputError(f"{path} exists: choose another, or add --force to replace it")
 
@@ -145,7 +144,7 @@ def _write_marker(folder: Path) -> None:
             folders.append(name)
         else:
             files[name] = [path.stat().st_size, _hash(path)]
-    content = {"format": FORMAT, "files": files, "folders": folders}
+    content = {"format": _FORMAT, "files": files, "folders": folders}
     write_file(folder / MARKER, json.dumps(content, indent=1) + "\n")
 
 
@@ -154,26 +153,26 @@ def _hash(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _read_marker(folder: Path) -> Written | None:
+def _read_marker(folder: Path) -> _Written | None:
     """Return what a folder is said to hold, None where it has no marker that can be read."""
     marker = folder / MARKER
     if marker.is_symlink() or not marker.is_file():
         return None
     try:
         content = read_json(marker, OutputError)
-        if content["format"] != FORMAT:
+        if content["format"] != _FORMAT:
             return None
         files = {
             str(name): (int(size), str(hash)) for name, (size, hash) in content["files"].items()
         }
-        return Written(files, frozenset(map(str, content["folders"])))
+        return _Written(files, frozenset(map(str, content["folders"])))
     except (OSError, ValueError, KeyError, TypeError, AttributeError, ArithmeticError):
         return None
 
 
 def foreign(folder: Path) -> str | None:
     """Return the first thing below a folder that is not as a run of tireid wrote it, or None."""
-    written = _read_marker(folder) or Written({}, frozenset())
+    written = _read_marker(folder) or _Written({}, frozenset())
 
     def first(inside: Path) -> str | None:
         with os.scandir(inside) as found:
@@ -308,7 +307,7 @@ def axle_columns(pattern: str, values: Array) -> dict[str, Array]:
     return {pattern.format(axle): values[:, i] for i, axle in enumerate("fr")}
 
 
-ROWS = 4096  # that are put into words at once
+_ROWS = 4096  # that are put into words at once
 
 
 def write_long_csv(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
@@ -319,8 +318,8 @@ def write_long_csv(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
                 file.write(",".join(columns) + "\n")
             row = ",".join("%.15g" if name == "t_s" else "%.9g" for name in columns) + "\n"
             table = np.column_stack(list(columns.values()))  # t_s may be a Unix time
-            for first in range(0, len(table), ROWS):
-                some = table[first : first + ROWS]
+            for first in range(0, len(table), _ROWS):
+                some = table[first : first + _ROWS]
                 file.write((row * len(some)) % tuple(some.ravel().tolist()))
 
 
@@ -354,7 +353,6 @@ def require_curves(kind: str) -> None:
 
 
 def _parquet() -> tuple[Any, Any]:
-    """Return pyarrow, and what of it writes Parquet."""
     try:
         return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
     except ImportError:

@@ -1,4 +1,4 @@
-"""What a command tells: its results on standard output, its progress on standard error.
+"""What a command prints: its results on standard output, its progress on standard error.
 
 Both go through `codegen.escape.terminal`, so that no name that comes from a file commands the
 terminal; and a stream that nobody reads any more, or that cannot be written, is no reason to stop
@@ -8,6 +8,7 @@ working.
 import logging
 import math
 import os
+import shutil
 import sys
 import time
 from collections.abc import Callable, Mapping
@@ -64,7 +65,7 @@ def flush_out() -> None:
 
 
 def unwritten() -> bool:
-    """Tell whether results were lost because standard output could not be written."""
+    """Return whether results were lost because standard output could not be written."""
     return _lost
 
 
@@ -122,7 +123,7 @@ class Stopwatch:
 # How far work has come. On a terminal one line that changes and goes away, elsewhere a line now and
 # then; in a program that only uses the library nothing at all.
 
-QUIET, PLAIN, LIVE = 2.0, 5.0, 0.2  # s: before the first word, between lines, between changes
+_QUIET, _PLAIN, _LIVE = 2.0, 5.0, 0.2  # s: before the first word, between lines, between changes
 _TELLING = 0.02  # share from which the time left is given
 _listening = False
 _live = False  # whether such a line stands on the terminal
@@ -141,7 +142,7 @@ def _on_terminal() -> bool:
 
 
 class Progress:
-    """Tells how far something has come and how much time is left; short work says nothing.
+    """Prints how far something has come and how much time is left; short work says nothing.
 
     Use it as a context: the changing line goes away at its end.
 
@@ -156,7 +157,7 @@ class Progress:
         self._what, self._parts, self._long = what, dict(parts or {"": 1.0}), long
         self._whole = sum(self._parts.values())
         self._begun = time.perf_counter()
-        self._told = self._begun + QUIET - (LIVE if _on_terminal() else PLAIN)
+        self._told = self._begun + _QUIET - (_LIVE if _on_terminal() else _PLAIN)
         self._before, self._weight, self._name = 0.0, 0.0, ""
         self._done = 0
         self.begin(next(iter(self._parts)))
@@ -192,13 +193,13 @@ class Progress:
         return lambda share: self(first + (last - first) * share)
 
     def __call__(self, share: float, text: str = "") -> None:
-        """Tell it where it is time.
+        """Print it where it is time.
 
         share : done of the part, 0 to 1.
         """
         now = time.perf_counter()
         live = _on_terminal()
-        if not _listening or now - self._told < (LIVE if live else PLAIN):
+        if not _listening or now - self._told < (_LIVE if live else _PLAIN):
             return
         self._told = now
         done = min(self._before + self._weight * share, 1.0)
@@ -216,24 +217,12 @@ def _time_text(seconds: float) -> str:
     return f"{seconds:.0f} s" if seconds < 100.0 else f"{seconds / 60.0:.0f} min"
 
 
-def _columns() -> int:
-    """Return how wide the terminal is."""
-    given = os.environ.get("COLUMNS", "")
-    if given.isdecimal() and int(given) > 0:
-        return int(given)
-    try:
-        found = os.get_terminal_size(sys.stderr.fileno()).columns
-    except (OSError, ValueError):
-        found = 0
-    return found or 80
-
-
 def _show(line: str) -> None:
     """Put a line in the place of the changing one; one that is too long is cut."""
     global _live
     from codegen.escape import visible
 
-    width = _columns() - 1
+    width = shutil.get_terminal_size().columns - 1
     wiped = _wiped()
     _live = True
     _print(f"{wiped}{_escaped(visible(f'  {line}'))[:width]}")

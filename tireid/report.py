@@ -22,7 +22,7 @@ _SIGNATURES = {  # of files, by their kind
     b"RIFF": "webp",
     b"<?xml": "svg+xml",
 }
-STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
+_STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
 
 # What something is worth. Of a headline: good (green), doubt (amber), bad (red). Of a number:
 # unknown (grey), of a refused answer refused (grey) or, where its own axle is, struck through.
@@ -40,7 +40,7 @@ class Marked(NamedTuple):
 Cell = str | float | Marked | None
 
 # What texts say in ASCII, as it is printed in a book.
-LETTERS = {
+_LETTERS = {
     "xi_hat": "ξ̂",
     "xi_tilde": "ξ̃",
     "xi": "ξ",
@@ -55,8 +55,8 @@ _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 def printed(text: str) -> str:
     """Return a text of our own with Greek letters and raised exponents in place of ASCII."""
-    words = re.compile(rf"\b({'|'.join(LETTERS)})(?=\d?\b)")
-    greek = words.sub(lambda found: LETTERS[found[1]], text)
+    words = re.compile(rf"\b({'|'.join(_LETTERS)})(?=\d?\b)")
+    greek = words.sub(lambda found: _LETTERS[found[1]], text)
     raised = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(_RAISED), greek)
     return raised.replace("`", "").replace("->", "→").replace("+-", "±")
 
@@ -161,7 +161,7 @@ class Report:
     warnings: Sequence[str | Marked] | None = None
 
 
-FINE = "No warnings."
+_FINE = "No warnings."
 
 
 def report_html(report: Report) -> str:
@@ -194,7 +194,7 @@ def report_html(report: Report) -> str:
         '<meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
         f"<title>{html(title)}</title>",
-        f"<style>\n{STYLE}</style>",
+        f"<style>\n{_STYLE}</style>",
         "</head>",
         "<body>",
         f"<h1>{html(title)}</h1>",
@@ -207,7 +207,6 @@ def report_html(report: Report) -> str:
 
 
 def write_report(path: Path, report: Report) -> None:
-    """Write a report; the file is complete or as it was before."""
     write_atomically(path, report_html(report))
 
 
@@ -244,7 +243,7 @@ def _warnings(warnings: Sequence[str | Marked] | None) -> list[str]:
     if warnings is None:
         return []
     if not warnings:
-        return [f'<p class="fine">{FINE}</p>']
+        return [f'<p class="fine">{_FINE}</p>']
     marked = [one if isinstance(one, Marked) else Marked(one) for one in warnings]
     refused = any(one.tone == "bad" for one in marked)
     lines = [f"<li{_class(one.tone)}>{_inline(one.text)}</li>" for one in marked]
@@ -296,7 +295,7 @@ def _of(cell: Cell) -> Marked:
 
 
 def _is_number(cell: Cell) -> bool:
-    """Tell whether a cell is a number or a text that begins with one: "0.43 (0.41 to 0.45)"."""
+    """Return whether a cell is a number or a text that begins with one: "0.43 (0.41 to 0.45)"."""
     cell = cell.text if isinstance(cell, Marked) else cell
     if not isinstance(cell, str):
         return cell is not None

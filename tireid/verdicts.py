@@ -1,4 +1,4 @@
-"""A verdict as commands tell it: lines, a table of what was learnt, the exit code, a section."""
+"""A verdict as commands print it: lines, a table of what was learnt, the exit code, a section."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -55,26 +55,17 @@ def _cells(number: Number | None) -> tuple[str, str]:
     return ("", "") if number is None else (number.words, number.state)
 
 
-def asked_text(asked: Mapping[str, Verdict]) -> str:
-    """Return the verdicts on a model over drives that it was not learnt on, as lines of text."""
-    return _each(asked, "replayed on")
+def verdicts_text(verdicts: Mapping[str, Verdict], what: str) -> str:
+    """Return verdicts on several drives, by the name of each, as lines of text.
 
-
-def _each(verdicts: Mapping[str, Verdict], what: str) -> str:
+    what : was done on each of them.
+    """
     lines = []
     for name, verdict in verdicts.items():
         given = "; ".join(line for line in (verdict.headline, verdict.missed_line) if line)
         lines.append(f"{what} {visible(name)}: {given}")
         lines += [f"  {finding.line}" for finding in verdict.findings]
     return "\n".join(lines)
-
-
-def verdicts_text(verdicts: Mapping[str, Verdict]) -> str:
-    """Return what is found on several recordings, as lines of text.
-
-    verdicts : on the default method, by the name of the recording that it learnt on.
-    """
-    return _each(verdicts, "default identified on")
 
 
 def verdict_headline(verdict: Verdict, others: Sequence[str | Marked] = ()) -> Headline:
@@ -137,7 +128,7 @@ def verdicts_headline(
 
 
 def known_headline(model: TireModel) -> list[Headline]:
-    """Return up to which slip a model knows the tires, as a number of a report, if it can tell."""
+    """Return the largest identified slip of a model, as a number of a report, where it has one."""
     if model.known_slip is None:
         return []
     front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))

@@ -11,22 +11,26 @@ imported when such a file comes. Its face:
 What cannot be read is refused by a `RecordingError` of one line: file, place, rule, remedy.
 """
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from codegen.face import face
 
 if TYPE_CHECKING:
-    from models.logs.door import open_log
-    from models.logs.log import Channel, Listed, LogFile, RecordingError
-    from models.logs.names import Proposal, propose
+    from models.logs.door import open_log as open_log
+    from models.logs.log import Channel as Channel
+    from models.logs.log import Listed as Listed
+    from models.logs.log import LogFile as LogFile
+    from models.logs.log import RecordingError as RecordingError
+    from models.logs.names import Proposal as Proposal
+    from models.logs.names import propose as propose
 
-__all__ = ["Channel", "Listed", "LogFile", "Proposal", "RecordingError", "open_log", "propose"]
-_HOMES = {"open_log": "door", "propose": "names", "Proposal": "names"}  # all others: log
-
-
-def __getattr__(name: str) -> Any:
-    """Return a name of the face, fetched at its first use."""
-    if name not in __all__:
-        raise AttributeError(f"module 'models.logs' has no attribute {name!r}")
-    home = importlib.import_module(f"models.logs.{_HOMES.get(name, 'log')}")
-    globals()[name] = value = getattr(home, name)
-    return value
+_HOMES = {
+    name: f"models.logs.{module}:{name}"
+    for module, names in {
+        "door": ("open_log",),
+        "log": ("Channel", "Listed", "LogFile", "RecordingError"),
+        "names": ("Proposal", "propose"),
+    }.items()
+    for name in names
+}
+__getattr__, __dir__ = face(__name__, _HOMES)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tireid as ti
+from codegen.plugins import installed as installed_names
 from identifier import methods
 from identifier.baselines import LinearBaseline
 from tireid.cli import build_parser
@@ -40,9 +41,9 @@ def installed(tmp_path, monkeypatch):
     (folder / "entry_points.txt").write_text(POINTS)
     (tmp_path / "its_methods.py").write_text(CODE)
     monkeypatch.syspath_prepend(str(tmp_path))
-    methods._installed.cache_clear()
+    installed_names.cache_clear()
     yield
-    methods._installed.cache_clear()
+    installed_names.cache_clear()
     sys.modules.pop("its_methods", None)
 
 

@@ -107,6 +107,9 @@ def test_a_design_is_found_written_and_keeps_the_wanted_margin(capsys, tmp_path)
         (["--tune", "d.toml", "--method", "linear"], "linear has none"),
         (["--tune", "d.toml", "--design", "d.toml"], "give no --design FILE"),
         (["--paper", "--method", "axle"], "give only one of --method, --paper"),
+        (["--log", "drive.csv"], "must be a log.toml"),
+        (["--columns", "r=yaw"], "--columns is for a drive: give one by --along LOG"),
+        (["--dbc", "car.dbc"], "--dbc is for a drive"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(capsys, monkeypatch, tmp_path, words, said):
@@ -252,20 +255,6 @@ def test_the_default_of_keep_is_not_the_leakage_that_forgets(capsys, tmp_path):
     design = design_for(sedan(), natural_driving(sedan()))
     kept = with_keeping(design, design.operation(sedan()), DEFAULT_KEEPING)
     assert read_design(path) == kept
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--log", "drive.csv"], "must be a log.toml"),
-        (["--columns", "r=yaw"], "--columns is for a drive: give one by --along LOG"),
-        (["--dbc", "car.dbc"], "--dbc is for a drive"),
-    ],
-)
-def test_words_about_a_drive_want_a_drive(capsys, words, said):
-    code, told = checked(capsys, *words)
-    assert code == 2
-    assert said in told.err
 
 
 def test_the_same_file_gives_the_same_verdict_and_options_are_said(tmp_path, capsys):

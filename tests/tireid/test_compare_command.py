@@ -17,7 +17,7 @@ from tests.pages import faults_of, outline
 from tests.rivals import INSTALLED, needs_rivals
 from tests.tireid.conftest import refusal
 from tireid.cli import main
-from tireid.commands.compare_results import ERROR_COLUMNS
+from tireid.commands.compare_results import _ERROR_COLUMNS
 from tireid.figures.compare import short_names
 from tireid.output import write_json
 
@@ -162,7 +162,7 @@ def test_times_are_over_that_of_the_integral_law(numbers):
 def test_the_tables_as_csv_hold_the_numbers_of_the_json(numbers, result):
     with (result / "compare.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == ERROR_COLUMNS
+    assert tuple(rows[0]) == _ERROR_COLUMNS
     online, frozen = 2 * len(METHODS_TRIED), 4 * (len(METHODS_TRIED) - len(SIGNAL))
     assert len(rows) == online + frozen
     for row in rows:
@@ -218,12 +218,9 @@ def test_wrong_words_are_one_clear_line_and_leave_nothing(
     logs_named = [one for one in extra if one.endswith(".csv")]
     named = [first, *logs_named, *rest, *(one for one in extra if one not in logs_named)]
     assert said in refusal(capsys, [*named, "--out", out])
+    needed = "--vehicle FILE is needed with a LOG"
+    assert needed in refusal(capsys, ["compare", logs / "slalom.csv", "--out", out])
     assert not out.exists()
-
-
-def test_a_log_needs_its_vehicle(logs, tmp_path, capsys):
-    assert main(["compare", str(logs / "slalom.csv"), "--out", str(tmp_path / "out")]) == 2
-    assert "--vehicle FILE is needed with a LOG" in capsys.readouterr().err
 
 
 def test_without_a_log_the_plant_drives(tmp_path, laid_out):

@@ -13,6 +13,8 @@ from tireid.animation.known import known_over_time
 from tireid.commands import demo_parts as demo_drive
 from tireid.commands.demo_parts import NOT_DRIVEN, drive_section, drive_story, drive_text
 from tireid.commands.demo_story import run_story
+from tireid.driving import results as drive_results
+from tireid.driving.results import Drives
 from tireid.report import Picture
 
 
@@ -43,7 +45,7 @@ def test_learnt_tires_steer_as_the_true_ones_and_learning_stays_on_the_road(stor
     assert rms["drive"]["frozen"] < 1.2 * rms["drive"]["oracle"]
     assert rms["drive"]["frozen"] < 0.3 * rms["drive"]["linear"]
     assert rms["drive_slippery"]["learning"] < 0.3 * rms["drive_slippery"]["linear"]
-    leading = [one.runs[0] for one in driven.values()]
+    leading = [one.drives.runs[0] for one in driven.values()]
     assert [run.label for run in leading] == ["frozen", "learning"]
     assert all(run.scores.completed for run in leading)
     printed = drive_text(driven)
@@ -56,12 +58,12 @@ def test_learnt_tires_steer_as_the_true_ones_and_learning_stays_on_the_road(stor
     ]
     assert len(films) == 1
     assert all((tmp_path / folder / "drive.webp").is_file() for folder in driven)
-    run = driven["drive_slippery"].runs[0]
+    run = driven["drive_slippery"].drives.runs[0]
     known = known_over_time(run.known, run.model, 12.7)
     slid = np.argmin(np.abs(known.alpha - 0.07))
     before, after = (known.steering[np.argmin(np.abs(known.t - t)), slid, 0] for t in (8.0, 15.0))
     assert 0.0 < after < 0.75 * before, "the friction dropped to half at 8.7 s"
-    assert all(run.known == () for one in driven.values() for run in one.runs[1:])
+    assert all(run.known == () for one in driven.values() for run in one.drives.runs[1:])
 
 
 def test_without_a_compiler_the_report_says_so(story, tmp_path, monkeypatch):
@@ -74,20 +76,16 @@ def test_without_a_compiler_the_report_says_so(story, tmp_path, monkeypatch):
 
 def test_with_a_compiler_the_learnt_car_drives_both_roads(tmp_path, monkeypatch):
     """The drives themselves are left out: which they are, on which tires, into which folder."""
-    asked = []
-
-    def written(folder, _, runs, *__):
-        asked.append((folder.relative_to(tmp_path).as_posix(), runs))
-
+    written = []
     monkeypatch.setattr(demo_drive, "find_compiler", lambda: "cc")
-    monkeypatch.setattr(demo_drive, "run_drive", lambda label, _, tires: (label, tires))
-    monkeypatch.setattr(demo_drive, "inputs_of", lambda *_: {})
-    monkeypatch.setattr(demo_drive, "write_drives", written)
+    monkeypatch.setattr(drive_results, "run_drive", lambda label, _, tires: (label, tires))
+    monkeypatch.setattr(Drives, "write", lambda _, folder, film: written.append(folder.name))
     frozen = "frozen"
     told = SimpleNamespace(car=sedan(), axle=SimpleNamespace(model=frozen))
     driven = drive_story(told, tmp_path)
-    assert asked == [
-        ("drive", [(label, frozen) for label in ("frozen", "linear", "oracle")]),
-        ("drive_slippery", [(label, frozen) for label in ("learning", "frozen", "linear")]),
+    assert written == list(driven) == ["drive", "drive_slippery"]
+    assert [one.drives.runs for one in driven.values()] == [
+        [(label, frozen) for label in ("frozen", "linear", "oracle")],
+        [(label, frozen) for label in ("learning", "frozen", "linear")],
     ]
-    assert [one.conditions.setup.drops for one in driven.values()] == [(), ((110.0, 0.5),)]
+    assert [one.drives.conditions.setup.drops for one in driven.values()] == [(), ((110.0, 0.5),)]

@@ -5,7 +5,7 @@ import shutil
 import pytest
 
 from codegen import find_compiler
-from tireid import exporting as self_test
+from tireid import exporting
 from tireid.commands import demo_parts as demo_package
 from tireid.commands.demo_parts import NOT_BUILT, package_section, ship, shipped_text
 from tireid.commands.demo_story import run_story
@@ -21,7 +21,7 @@ def story():
 def quick():
     """Costs on Arm have tests of their own."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(demo_package, "measure", lambda *_: [])
+        patch.setattr(exporting, "measure", lambda *_: [])
         yield
 
 
@@ -41,7 +41,7 @@ def test_it_compiles_passes_and_computes_what_python_computes(whole):
     assert double.verdict.verdict == single.verdict.verdict == "passed"
     assert double.difference < 1e-5 < single.difference < 1.0
     assert double.refused == single.refused == 0
-    assert shipped.package.about["hash"] in double.verdict.version
+    assert shipped.exported.package.about["hash"] in double.verdict.version
     assert (folder / "README.md").is_file()
     assert "self-test passed" in shipped_text(shipped)
     assert "passed" in str(package_section(shipped))
@@ -53,8 +53,8 @@ def test_without_a_compiler_the_report_says_so(story, tmp_path, monkeypatch):
     assert (tmp_path / "package" / "src" / "tireid.c").is_file()
     assert NOT_BUILT in shipped_text(shipped)
     assert NOT_BUILT in str(package_section(shipped))
-    monkeypatch.setattr(self_test, "find_compiler", lambda: None)
-    assert self_test.self_test(tmp_path / "package", "tireid", single=False) is None
+    monkeypatch.setattr(exporting, "find_compiler", lambda: None)
+    assert exporting.self_test(tmp_path / "package", "tireid", single=False) is None
 
 
 def test_a_spoiled_package_fails_its_self_test(whole, tmp_path):
@@ -65,7 +65,7 @@ def test_a_spoiled_package_fails_its_self_test(whole, tmp_path):
     first = rows.index("{", rows.index("{") + 1)
     vectors.write_text(f"{head}vector_force{rows[: first + 1]} 1e3 + {rows[first + 1 :]}")
     with pytest.raises(SelfTestError, match="forces are those of the vectors"):
-        self_test.self_test(folder, "tireid", single=False)
+        exporting.self_test(folder, "tireid", single=False)
     (folder / "src" / "tireid.c").write_text("int")
     with pytest.raises(SelfTestError, match="error"):
-        self_test.self_test(folder, "tireid", single=False)
+        exporting.self_test(folder, "tireid", single=False)

@@ -11,7 +11,7 @@ from identifier.verdict import Verdict
 from models.recordings import LogMap, Repair, read_recording, write_recording
 from tests.pages import faults_of
 from tireid.cli import main
-from tireid.diagnoses import size_text, with_doctor, write_repair
+from tireid.diagnoses import _size_text, with_doctor, write_repair
 
 RATIO = 14.6
 
@@ -137,10 +137,10 @@ def test_what_is_found_in_a_log_that_its_map_repairs_is_taken_out_after_that(tmp
 
 def test_sizes_have_the_digits_that_their_deviations_leave():
     delay = Finding(code="delay", channel="r", size=0.09123, deviation=0.0021, unit="s")
-    assert size_text(delay) == "91.2 ± 2.1 ms"
+    assert _size_text(delay) == "91.2 ± 2.1 ms"
     angle = Finding(code="offset", channel="delta_f", size=np.radians(1.0), unit="rad")
-    assert size_text(angle) == "1.00 deg"
-    assert size_text(Finding(code="straight")) == ""
+    assert _size_text(angle) == "1.00 deg"
+    assert _size_text(Finding(code="straight")) == ""
 
 
 def test_a_verdict_never_passes_over_what_the_doctor_is_sure_of():

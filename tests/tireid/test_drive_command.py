@@ -19,9 +19,9 @@ from tests.pages import faults_of, outline
 from tests.tireid.conftest import refusal
 from tireid.animation import film
 from tireid.cli import main
-from tireid.commands.drive_results import steady_curve
 from tireid.driving import learn as drive_learn
 from tireid.driving import runs as drive_runs
+from tireid.driving.results import steady_curve
 from tireid.learning import identify
 
 SIDE = 3.0 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 9)))
@@ -225,16 +225,8 @@ def test_tires_of_another_car_lead_somewhere(bend, tmp_path, capsys, undrawn):
     tire = ti.identify(log, car).freeze()
     heavy = replace(tire, vehicle=replace(car, mass=1.1 * car.mass, name="heavy"))
     heavy.save(tmp_path / "heavy.json")
-    words = [
-        "drive",
-        "--path",
-        bend,
-        "--weights",
-        tmp_path / "heavy.json",
-        "--out",
-        tmp_path / "out",
-    ]
-    said = refusal(capsys, words)
+    words = ["drive", "--path", bend, "--weights", tmp_path / "heavy.json"]
+    said = refusal(capsys, [*words, "--out", tmp_path / "out"])
     masses = f"(mass {1.1 * car.mass:.6g} there, {car.mass:.6g} here)"
     assert (
         f"was identified on the car 'heavy', driven is 'sedan' {masses}: give that car by" in said

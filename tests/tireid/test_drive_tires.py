@@ -10,7 +10,7 @@ from identifier.paper.network import Network, NetworkModel, Weights
 from models.vehicle import sedan
 from mpc.path import Path
 from mpc.tires import prediction_tire
-from tireid.commands.drive_results import known_curves, steady_curve
+from tireid.driving.results import _known_curves, steady_curve
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.figures.drive import AT_THE_END
@@ -39,7 +39,7 @@ def test_the_linear_tire_is_a_line_of_its_stiffness():
 
 
 def test_the_true_tire_is_shown_on_the_first_and_on_the_last_friction(setup):
-    curves = {curve.label: curve for curve in known_curves([], setup, None)}
+    curves = {curve.label: curve for curve in _known_curves([], setup, None)}
     assert list(curves) == [LINEAR, ORACLE, ORACLE + AT_THE_END]
     most, last = (curves[name].force.max(axis=0) for name in (ORACLE, ORACLE + AT_THE_END))
     np.testing.assert_allclose(last / most, 0.4 / 0.9, rtol=0.1)
@@ -50,7 +50,7 @@ def test_what_a_tracker_was_told_later_is_shown_as_the_end(setup):
     soft = prediction_tire(replace(CAR, cornering_stiffness_front=4e4))
     same = SimpleNamespace(label=FROZEN, model=soft, final=soft)
     changed = SimpleNamespace(label=LEARNING, model=prediction_tire(CAR), final=soft)
-    labels = [curve.label for curve in known_curves([same, changed], setup, None)]
+    labels = [curve.label for curve in _known_curves([same, changed], setup, None)]
     assert FROZEN in labels and FROZEN + AT_THE_END not in labels
     assert LEARNING + AT_THE_END in labels and LEARNING not in labels
 

@@ -96,7 +96,7 @@ def test_what_was_learnt_without_a_lateral_velocity_goes_on_without_it(
     words = ["--weights", weights, "--fmu"]
     assert main(["export", "--out", str(out), *words]) == 0
     told = capsys.readouterr().err
-    assert "reads v_x, r, delta_f, delta_r, a_y; it tells v_y" in told
+    assert "reads v_x, r, delta_f, delta_r, a_y; v_y is an output" in told
     package = CompiledPackage.from_folder(out)
     np.testing.assert_array_equal(package.weights["W"], model.W)
     run, expected = package.run(drive), identify(drive, CAR, method, start=model)

@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 import tireid as ti
-from identifier import methods
+from codegen.plugins import installed as installed_names
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.tires import LinearTire
-from tireid import commands
 from tireid.cli import build_parser, main
 
 CAR = ti.sedan()
@@ -71,11 +70,9 @@ def installed(tmp_path, monkeypatch):
     for name, text in {"tire": TIRE, "method": METHOD, "command": COMMAND}.items():
         (tmp_path / f"their_{name}.py").write_text(text)
     monkeypatch.syspath_prepend(str(tmp_path))
-    methods._installed.cache_clear()
-    commands.installed.cache_clear()
+    installed_names.cache_clear()
     yield
-    methods._installed.cache_clear()
-    commands.installed.cache_clear()
+    installed_names.cache_clear()
     for name in ("tire", "method", "command"):
         sys.modules.pop(f"their_{name}", None)
 

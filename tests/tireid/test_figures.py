@@ -12,7 +12,6 @@ from matplotlib import font_manager
 from matplotlib.axis import Axis
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
-from matplotlib.patches import FancyBboxPatch
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
 
@@ -32,16 +31,14 @@ from tireid.figures.forces import (
     side_by_side_figure,
 )
 from tireid.figures.paper import comparison_figure, error_figure, weights_figure
-from tireid.figures.scheme import BLOCKS, scheme_figure
 from tireid.figures.style import (
     BLACK,
+    _with_own_fonts,
     figure_png,
     figure_svg,
     force_range,
     force_unit_of,
-    impulse_unit,
-    save_figure,
-    with_own_fonts,
+    save_figures,
 )
 from tireid.figures.tires import learnt_axles_figure, slip_figure
 
@@ -186,7 +183,7 @@ def test_same_data_give_the_same_bytes_and_leave_matplotlib_alone(tmp_path: Path
     before = dict(matplotlib.rcParams)
     first, second = figure_png(FIGURES["error"]()), figure_png(FIGURES["error"]())
     assert first == second
-    save_figure(FIGURES["error"](), tmp_path / "error.png")
+    save_figures(tmp_path, {"error": FIGURES["error"]()})
     assert (tmp_path / "error.png").read_bytes() == first
     assert dict(matplotlib.rcParams) == before
 
@@ -249,28 +246,6 @@ def test_the_paper_s_measure_stands_below_the_error_to_the_truth() -> None:
     assert not clipped(figure)
 
 
-def test_the_scheme_holds_every_equation_inside_its_frames() -> None:
-    figure = scheme_figure()
-    assert not clipped(figure)
-    (axes,) = figure.axes
-    frames = [
-        patch.get_window_extent() for patch in axes.patches if isinstance(patch, FancyBboxPatch)
-    ]
-    inside = [text for text in axes.texts if text.get_text() in {b.text for b in BLOCKS.values()}]
-    assert len(frames) == len(inside) == len(BLOCKS)
-    for frame, text in zip(frames, inside, strict=True):
-        written = text.get_window_extent()
-        assert frame.x0 < written.x0 < written.x1 < frame.x1, text.get_text()
-        assert frame.y0 < written.y0 < written.y1 < frame.y1, text.get_text()
-    said = " ".join(text.get_text() for text in inside)
-    for equation in ("(6)", "(7)", "(8)", "(10)", "(11)-(13)"):
-        assert equation in said
-    labels = [text for text in axes.texts if text not in inside and text.get_text()]
-    for label in labels:
-        for frame in frames:
-            assert not label.get_window_extent().overlaps(frame), label.get_text()
-
-
 def test_without_truth_errors_are_called_errors_to_the_online_force() -> None:
     figure = FIGURES["forces without truth"]()
     assert figure.axes[0].get_title("right") == ""
@@ -281,11 +256,6 @@ def test_without_truth_errors_are_called_errors_to_the_online_force() -> None:
 def test_forces_of_a_model_car_are_in_newtons() -> None:
     assert FIGURES["forces of a model car"]().axes[0].get_ylabel() == "lateral force [N]"
     assert force_unit_of(np.array([np.nan, -2000.0])).name == "kN"
-    assert (impulse_unit(1.0), impulse_unit(1000.0), impulse_unit(10.0)) == (
-        "N s",
-        "kN s",
-        "10 N s",
-    )
 
 
 def unlike_axles() -> AxleModel:
@@ -424,16 +394,11 @@ def test_a_comparison_leaves_out_what_diverged_and_shows_the_paper_hollow() -> N
     hollow = [line for line in figure.axes[0].lines if line.get_markerfacecolor() == "white"]
     assert [list(np.asarray(line.get_ydata())) for line in hollow] == [[0.3386]]
     assert [text.get_text() for text in figure.axes[0].get_xticklabels()] == ["online", "32"]
+    assert len(comparison_figure(RESULTS).axes[0].containers) == 3
+    unstable = comparison_figure({**RESULTS, "instantaneous": {}}, PAPER)
+    assert len(unstable.axes[0].containers) == 2
     with pytest.raises(ValueError, match="at least one law"):
         comparison_figure({})
-
-
-def test_a_law_without_any_stable_seed_has_no_mark_in_a_comparison() -> None:
-    def marked(figure: Figure) -> int:
-        return len(figure.axes[0].containers)
-
-    assert marked(comparison_figure(RESULTS)) == 3
-    assert marked(comparison_figure({**RESULTS, "instantaneous": {}}, PAPER)) == 2
 
 
 def test_replays_of_another_recording_are_refused() -> None:
@@ -576,9 +541,9 @@ def test_fonts_of_matplotlib_are_found_where_the_list_of_the_machine_lacks_them(
     for name in ("DejaVu Sans Display", "STIXGeneral", "cmr10"):
         with pytest.raises(ValueError, match=name):
             fonts.findfont(name, fallback_to_default=False)
-    with_own_fonts()
+    _with_own_fonts()
     for name in ("DejaVu Sans Display", "STIXGeneral", "cmr10"):
         assert Path(fonts.findfont(name, fallback_to_default=False)).is_file()
     listed = len(fonts.ttflist)
-    with_own_fonts()
+    _with_own_fonts()
     assert len(fonts.ttflist) == listed

@@ -14,27 +14,27 @@ from identifier.frozen import vehicle_numbers
 from identifier.motion.parameters import INDEX
 from models.vehicle import sedan
 from tireid.fleet.merge import (
-    APART,
-    CHANGES,
-    PASSES,
-    TIRES,
+    _APART,
+    _CHANGES,
+    _PASSES,
+    _TIRES,
     MergeError,
+    _key_of,
     errors_of,
     fleet_prior,
-    key_of,
     merge,
     sizes,
     usable,
 )
-from tireid.fleet.store import OBSERVABLE, LogRow, Store, information_columns
-from tireid.fleet.watch import Alarm, Watching, change_from, watch
+from tireid.fleet.store import _OBSERVABLE, LogRow, Store, information_columns
+from tireid.fleet.watch import Alarm, Watching, _change_from, watch
 
 pyarrow = pytest.importorskip("pyarrow", reason="needs pyarrow and fsspec")
 pytest.importorskip("fsspec", reason="needs pyarrow and fsspec")
 parquet = pytest.importorskip("pyarrow.parquet")
 
 CAR = replace(sedan(), chassis=None)
-Q = len(OBSERVABLE)
+Q = len(_OBSERVABLE)
 SCALES = np.append(np.full(20, 0.05), np.full(Q - 20, 0.02))  # of u that a residual of 1 is worth
 
 
@@ -42,10 +42,10 @@ def told_of(p, rng, *, seconds=60.0, noise=0.0):
     """Information of random residuals, linear in u, of parameters (p,)."""
     u, _ = coordinates(p)
     J = rng.normal(size=(200, Q)) / SCALES / 4.0
-    y = J @ u[OBSERVABLE] + noise * rng.normal(size=200)
+    y = J @ u[_OBSERVABLE] + noise * rng.normal(size=200)
     matrix, vector = np.zeros((SIZE, SIZE)), np.zeros(SIZE)
-    matrix[np.ix_(OBSERVABLE, OBSERVABLE)] = 0.5 * (J.T @ J + (J.T @ J).T)
-    vector[OBSERVABLE] = J.T @ y
+    matrix[np.ix_(_OBSERVABLE, _OBSERVABLE)] = 0.5 * (J.T @ J + (J.T @ J).T)
+    vector[_OBSERVABLE] = J.T @ y
     return Information(matrix=matrix, vector=vector, seconds=seconds)
 
 
@@ -119,7 +119,7 @@ def test_a_merged_model_is_the_optimum_of_prior_and_logs():
     assert (one.name, one.logs, one.elsewhere) == (f"{CAR.name} 2026-01 ann", 3, 0)
     assert merged(rows, [])[0].name == "all"
     beliefs, model = Priors.of(CAR), one.model
-    sd = APART * beliefs.sd[[INDEX[name] for name in CHANGES]]
+    sd = _APART * beliefs.sd[[INDEX[name] for name in _CHANGES]]
 
     def cost(p):
         """Over each log's own errors of sensors, the least."""
@@ -142,7 +142,7 @@ def test_a_merged_model_is_the_optimum_of_prior_and_logs():
                 assert cost(p) > least - 1e-3
     assert model["ln_stiffness_f"] == pytest.approx(tires(1.1)[INDEX["ln_stiffness_f"]], abs=0.1)
     k = INDEX["v_y_bias"]
-    assert model.covariance[k, k] > sd[CHANGES.index("v_y_bias")] ** 2  # of the next log
+    assert model.covariance[k, k] > sd[_CHANGES.index("v_y_bias")] ** 2  # of the next log
     assert model.driven.tolist() == [0.02, 0.1] and model.speeds.tolist() == [8.0, 20.0]
     assert model.a_x.tolist() == [-1.0, 0.2] and one.information.seconds == 360.0
 
@@ -167,8 +167,8 @@ def test_rows_are_grouped_by_what_they_say_and_a_log_counts_once():
     assert [len(merged(rows, [name])) for name in ("log", "week", "month", "tires", "setting")] == [
         40, 7, 2, 1, 1,
     ]  # fmt: skip
-    assert key_of(rows[4], ["week", "date"]) == (("week", "2026-W02"), ("date", "2026-01-05"))
-    assert key_of(row_of(0, [], date="2024-12-30T10:00"), ["week"]) == (("week", "2025-W01"),)
+    assert _key_of(rows[4], ["week", "date"]) == (("week", "2026-W02"), ("date", "2026-01-05"))
+    assert _key_of(row_of(0, [], date="2024-12-30T10:00"), ["week"]) == (("week", "2025-W01"),)
     again = replace(rows[3], setting="otherwise")
     with pytest.raises(MergeError, match=r"^003 has rows of two settings, told and otherwise"):
         merged([*rows, again], [])
@@ -204,14 +204,14 @@ def test_a_fleets_prior_is_where_expectation_and_maximization_rest():
     size = sizes(cars[0])
     lengths = [INDEX["compliance_f"], INDEX["compliance_r"]]
     wheelbase = cars[0].wheelbase
-    assert size.tolist() == [wheelbase if k in lengths else 1.0 for k in TIRES]
-    stiff = TIRES.index(INDEX["ln_stiffness_f"])
+    assert size.tolist() == [wheelbase if k in lengths else 1.0 for k in _TIRES]
+    stiff = _TIRES.index(INDEX["ln_stiffness_f"])
     told = [one.model["ln_stiffness_f"] for one in groups]
     assert prior.mean[stiff] == pytest.approx(np.mean(told), abs=0.1)
-    m0 = np.mean([Priors.of(car).mean[TIRES] / sizes(car) for car in cars], axis=0)
+    m0 = np.mean([Priors.of(car).mean[_TIRES] / sizes(car) for car in cars], axis=0)
     S0 = np.mean(
         [
-            Priors.of(car).covariance[np.ix_(TIRES, TIRES)] / np.outer(sizes(car), sizes(car))
+            Priors.of(car).covariance[np.ix_(_TIRES, _TIRES)] / np.outer(sizes(car), sizes(car))
             for car in cars
         ],
         axis=0,
@@ -220,15 +220,15 @@ def test_a_fleets_prior_is_where_expectation_and_maximization_rest():
     for one, car in zip(groups, cars, strict=True):  # what is marginal, by the inverse of a whole
         usual, moves = Priors.of(car), np.flatnonzero(Priors.of(car).moves)
         _, slope, H = one.information.around(one.model.p)
-        sensors = [k for k in moves if k not in TIRES]
+        sensors = [k for k in moves if k not in _TIRES]
         H[np.ix_(sensors, sensors)] += usual.information[np.ix_(sensors, sensors)]
         covariance = np.linalg.inv(H[np.ix_(moves, moves)])
-        some = [list(moves).index(k) for k in TIRES]
+        some = [list(moves).index(k) for k in _TIRES]
         matrix = np.linalg.inv(covariance[np.ix_(some, some)])
-        vector = matrix @ one.model.p[TIRES] - slope[TIRES]
+        vector = matrix @ one.model.p[_TIRES] - slope[_TIRES]
         known.append((matrix * np.outer(sizes(car), sizes(car)), vector * sizes(car)))
     m, T = m0, S0
-    for _ in range(PASSES):
+    for _ in range(_PASSES):
         P = [np.linalg.inv(np.linalg.inv(T) + matrix) for matrix, _ in known]
         means = [one @ (np.linalg.solve(T, m) + v) for one, (_, v) in zip(P, known, strict=True)]
         M = np.linalg.inv(5.0 * np.linalg.inv(T) + np.linalg.inv(S0))
@@ -239,8 +239,8 @@ def test_a_fleets_prior_is_where_expectation_and_maximization_rest():
     assert np.abs((prior.mean - m) / sd).max() < 1e-3
     assert np.abs((prior.spread - T - M) / np.outer(sd, sd)).max() < 1e-3
     model = prior.model(cars[0])
-    assert model.p[TIRES] == pytest.approx(m * size, abs=1e-3)
-    both = np.ix_(TIRES, TIRES)
+    assert model.p[_TIRES] == pytest.approx(m * size, abs=1e-3)
+    both = np.ix_(_TIRES, _TIRES)
     assert model.covariance[both] == pytest.approx(prior.spread * np.outer(size, size))
     off = INDEX["v_y_bias"]
     assert model.covariance[off, off] == Priors.of(cars[0]).covariance[off, off]
@@ -276,7 +276,7 @@ def test_the_watch_sums_log_likelihood_ratios_of_page(driven):
         for one in told[:20]:
             base += one.loosened(*errors_of(beliefs))
         p, _ = settled(beliefs.after(base), beliefs.mean)
-        changes = [change_from(one, p, beliefs) for one in told]
+        changes = [_change_from(one, p, beliefs) for one in told]
         z, S = (np.array(each) for each in zip(*changes, strict=True))
         usual = np.median(z[:20], axis=0)
         scatter = (1.4826 * np.median(np.abs(z[:20] - usual), axis=0)) ** 2

@@ -194,45 +194,20 @@ def write_deep(target):
         (folder / "part" / "empty").mkdir()
 
 
-def add_file(out):
-    (out / "part" / "deep" / "notes.txt").write_text("precious")
+CHANGES = {
+    "a file": lambda out: (out / "part" / "deep" / "notes.txt").write_text("precious"),
+    "a file in an empty folder": lambda out: (out / "part" / "empty" / "x.txt").write_text("mine"),
+    "a folder": lambda out: (out / "part" / "mine").mkdir(),
+    "a link": lambda out: (out / "part" / "link").symlink_to(out.parent),
+    "a pipe": lambda out: os.mkfifo(out / "part" / "pipe"),
+    "a longer file": lambda out: (out / "part" / "deep" / "result.txt").write_text("result and"),
+    "other bytes": lambda out: (out / "part" / "deep" / "result.txt").write_text("RESULT"),
+    "a spoilt marker": lambda out: (out / MARKER).write_text("[" * 100_000),
+}
+each_change = pytest.mark.parametrize("spoil", CHANGES.values(), ids=CHANGES)
 
 
-def add_to_an_empty_folder(out):
-    (out / "part" / "empty" / "notes.txt").write_text("precious")
-
-
-def add_folder(out):
-    (out / "part" / "mine").mkdir()
-
-
-def add_link(out):
-    (out / "part" / "link").symlink_to(out.parent)
-
-
-def add_pipe(out):
-    os.mkfifo(out / "part" / "pipe")
-
-
-def lengthen(out):
-    (out / "part" / "deep" / "result.txt").write_text("result and more")
-
-
-def change(out):
-    (out / "part" / "deep" / "result.txt").write_text("RESULT")  # of the same size
-
-
-def spoil_marker(out):
-    (out / MARKER).write_text("[" * 100_000)
-
-
-CHANGES = (
-    *(add_file, add_to_an_empty_folder, add_folder, add_link, add_pipe),
-    *(lengthen, change, spoil_marker),
-)
-
-
-@pytest.mark.parametrize("spoil", CHANGES)
+@each_change
 def test_whatever_a_user_did_below_our_folder_survives_force(tmp_path, spoil):
     out = tmp_path / "out"
     write_deep(out)
@@ -243,7 +218,7 @@ def test_whatever_a_user_did_below_our_folder_survives_force(tmp_path, spoil):
     assert content(tmp_path) == before
 
 
-@pytest.mark.parametrize("spoil", CHANGES)
+@each_change
 def test_what_a_user_does_while_a_run_works_survives_force(tmp_path, spoil):
     out = tmp_path / "out"
     write_deep(out)
@@ -257,7 +232,7 @@ def test_what_a_user_does_while_a_run_works_survives_force(tmp_path, spoil):
     assert foreign(tmp_path / "out-2") is None
 
 
-@pytest.mark.parametrize("spoil", CHANGES)
+@each_change
 def test_what_a_user_does_at_the_last_moment_survives_force(tmp_path, monkeypatch, swaps, spoil):
     out = tmp_path / "out"
     write_deep(out)
@@ -481,7 +456,7 @@ def test_what_cannot_be_written_is_named_by_every_writer(tmp_path):
     from codegen.writing import write_file
     from models.files import write_atomically
     from tireid.cli import one_line
-    from tireid.figures.style import save_figure
+    from tireid.figures.style import save_figures
     from tireid.output import output_folder, write_csv, write_json, write_table
 
     columns = {"t_s": np.random.default_rng(0).random(9999)}
@@ -496,11 +471,11 @@ def test_what_cannot_be_written_is_named_by_every_writer(tmp_path):
         "rows.csv": lambda path: write_csv(path, columns),
         "rows.parquet": lambda path: write_table(path, [columns]),
         "model.json": lambda path: write_atomically(path, text),
-        "figure.png": lambda path: save_figure(Figure(), path),
+        "figure.png": lambda path: save_figures(path.parent, {path.stem: Figure()}),
         "page.html": lambda path: write_file(path, text),
         "results": folder,
     }
-    save_figure(Figure(), here / "warm.png")
+    save_figures(here, {"warm": Figure()})
     resource.setrlimit(resource.RLIMIT_FSIZE, (100, resource.RLIM_INFINITY))
     for name, write in writers.items():
         try:

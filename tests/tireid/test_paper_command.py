@@ -29,7 +29,7 @@ from models.vehicle import sedan
 from tests.conftest import PNG
 from tests.pages import faults_of, outline
 from tireid.cli import main
-from tireid.commands.paper import PAPER, table_text, write_study
+from tireid.commands.paper import _PAPER, table_text, write_study
 from tireid.figures.forces import force_figure
 
 EXPECTED = Path(__file__).parent / "expected_tables.json"
@@ -186,7 +186,7 @@ def test_the_committed_tables_are_those_we_compute(study):
 
 def test_the_papers_values_are_those_of_its_tables():
     """+52 % and -0.06 %: the relations that the text of the paper can be checked by."""
-    step, slalom = PAPER["step_steer"], PAPER["slalom"]
+    step, slalom = _PAPER["step_steer"], _PAPER["slalom"]
     assert step["integral"]["online"] / step["instantaneous"]["online"] == pytest.approx(
         1.516, 1e-3
     )
@@ -217,7 +217,7 @@ def test_paper_command_writes_tables_and_figures(tmp_path, capsys, laid_out):
 
 def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(tireid.commands.demo, "SEEDS", 2)
-    monkeypatch.setattr("tireid.commands.demo_parts.measure", lambda *_: [])  # has tests of its own
+    monkeypatch.setattr("tireid.exporting.measure", lambda *_: [])  # has tests of its own
     monkeypatch.setattr("tireid.commands.demo_parts.drive_story", lambda *_: {})  # so has this
     monkeypatch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)  # a page has SVG
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0

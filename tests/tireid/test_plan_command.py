@@ -9,7 +9,7 @@ import tireid as ti
 from identifier.plan import search
 from mpc.path import Path
 from tireid.cli import main
-from tireid.commands.plan import parse_area, parse_speed
+from tireid.commands.plan import _parse_area, _parse_speed
 
 
 @pytest.fixture(autouse=True)
@@ -105,6 +105,6 @@ def test_a_model_that_does_not_know_how_sure_it_is_is_refused(tmp_path, capsys, 
 
 
 def test_areas_and_speeds_are_read_with_their_units():
-    assert parse_area("60x20.5m") == (60.0, 20.5)
-    assert parse_area(" 40 X 40 ") == (40.0, 40.0)
-    assert parse_speed("54km/h") == pytest.approx(15.0) == parse_speed("15m/s")
+    assert _parse_area("60x20.5m") == (60.0, 20.5)
+    assert _parse_area(" 40 X 40 ") == (40.0, 40.0)
+    assert _parse_speed("54km/h") == pytest.approx(15.0) == _parse_speed("15m/s")

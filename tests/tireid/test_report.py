@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from tests.pages import faults_of, outline
 from tireid.figures.style import figure_png, figure_svg
 from tireid.report import (
-    FINE,
-    STYLE,
+    _FINE,
+    _STYLE,
     Headline,
     Marked,
     Paragraph,
@@ -142,17 +142,9 @@ def test_what_something_is_worth_is_seen() -> None:
 
 
 def test_no_figure_is_wider_than_a_small_screen() -> None:
-    small = STYLE[STYLE.index("@media screen") : STYLE.index("@media print")]
+    small = _STYLE[_STYLE.index("@media screen") : _STYLE.index("@media print")]
     assert "img" not in small
-    assert "figure img { display: block; width: 100%; height: auto; }" in STYLE
-
-
-def test_a_film_is_embedded_as_what_it_is() -> None:
-    film = Picture(image=b"GIF89a and more", caption="c")
-    page = page_of("t", [Section(heading="h", blocks=[film])])
-    (image,) = (attributes["src"] for tag, attributes in outline(page).tags if tag == "img")
-    assert str(image).startswith("data:image/gif;base64,")
-    assert b64decode(str(image).split(",")[1]) == film.image
+    assert "figure img { display: block; width: 100%; height: auto; }" in _STYLE
 
 
 def test_report_replaces_the_old_one_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -209,10 +201,10 @@ def test_headline_numbers_and_warnings_come_before_everything_else() -> None:
     text = outline(report_html(report)).text
     places = [text.index(one) for one in ("2.4 %", "a & b", "What & why")]
     assert places == sorted(places)
-    assert "missed <frozen>" in text and FINE not in text
+    assert "missed <frozen>" in text and _FINE not in text
     calm = Report(title="T", sections=SECTIONS, warnings=[])
-    assert FINE in outline(report_html(calm)).text
-    assert FINE not in page_of("T", SECTIONS), "where nobody looked, nobody says that all is well"
+    assert _FINE in outline(report_html(calm)).text
+    assert _FINE not in page_of("T", SECTIONS), "where nobody looked, nobody says that all is well"
 
 
 def test_a_folded_section_shows_its_heading_only() -> None:
@@ -245,12 +237,13 @@ def test_text_of_ours_is_printed_as_in_a_book(ascii_text: str, expected: str) ->
     assert printed(ascii_text) == expected
 
 
-def test_a_drawing_is_embedded_as_svg_with_the_same_bytes_each_time() -> None:
+def test_a_film_and_a_drawing_are_embedded_as_what_they_are() -> None:
     drawings = [figure_svg(Figure(figsize=(1.0, 1.0))) for _ in range(2)]
-    assert drawings[0] == drawings[1]
-    picture = Picture(image=drawings[0], caption="c", read="how")
-    parser = outline(page_of("t", [Section(heading="h", blocks=[picture])]))
-    (image,) = (attributes["src"] for tag, attributes in parser.tags if tag == "img")
-    assert str(image).startswith("data:image/svg+xml;base64,")
-    assert b64decode(str(image).split(",")[1]) == drawings[0]
-    assert "how" in parser.text
+    assert drawings[0] == drawings[1], "the same bytes each time"
+    for content, kind in ((drawings[0], "svg+xml"), (b"GIF89a and more", "gif")):
+        picture = Picture(image=content, caption="c", read="how")
+        parser = outline(page_of("t", [Section(heading="h", blocks=[picture])]))
+        (image,) = (attributes["src"] for tag, attributes in parser.tags if tag == "img")
+        assert str(image).startswith(f"data:image/{kind};base64,")
+        assert b64decode(str(image).split(",")[1]) == content
+        assert "how" in parser.text

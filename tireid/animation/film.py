@@ -76,7 +76,6 @@ class _WebpWriter(PillowWriter):
     _frames: list[Any]
 
     def finish(self) -> None:
-        """Write the file."""
         first, *others = self._frames
         words: dict[str, Any] = {"quality": _QUALITY, "minimize_size": True, "loop": 0}
         time = round(1000.0 / RATE)

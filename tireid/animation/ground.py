@@ -16,7 +16,7 @@ from tireid.figures.style import PURPLE
 
 _WINDING = np.radians(75.0)  # a path that turns farther than this is shown turned to the right
 _LOOK_BACK, _LOOK_AHEAD = 8.0, 22.0  # stretch whose mean heading is the direction of view [m]
-LEVEL = 9.0  # a straight path whose sides are this close [m] is not followed sidewards
+_LEVEL = 9.0  # a straight path whose sides are this close [m] is not followed sidewards
 
 
 class _View(NamedTuple):
@@ -52,7 +52,7 @@ class Camera:
         self._angle = float(np.mean(path.psi))
         still = _View(np.array([path.X[0], path.Y[0]]), self._angle)
         sides = still.see(np.column_stack([path.X, path.Y]))[:, 1]
-        self._middle = 0.5 * float(sides.min() + sides.max()) if np.ptp(sides) < LEVEL else None
+        self._middle = 0.5 * float(sides.min() + sides.max()) if np.ptp(sides) < _LEVEL else None
 
     def at(self, s: float) -> _View:
         """Return the view of a car.
@@ -74,17 +74,17 @@ class Camera:
 
 
 # What covers what: the ground below, then ghosts, the car, its plan and its forces.
-_BELOW, _GHOST, CAR, _ABOVE = 0.5, 2.0, 3.0, 4.0
+_BELOW, _GHOST, _CAR, _ABOVE = 0.5, 2.0, 3.0, 4.0
 
-PLAN = "#333333"
-DROP: Mapping[str, Any] = {"color": "#AA4499", "linewidth": 1.6, "linestyle": (0, (3, 1.5))}
+_PLAN = "#333333"
+_DROP: Mapping[str, Any] = {"color": "#AA4499", "linewidth": 1.6, "linestyle": (0, (3, 1.5))}
 _HALF_ROAD = 4.0  # [m]
-GRID = 5.0  # [m]
-SHOWN = 60.0  # of the path, to both sides of the car [m]
+_GRID = 5.0  # [m]
+_SHOWN = 60.0  # of the path, to both sides of the car [m]
 _FORCE_LENGTH = 4.0  # of the arrow that is as long as the static load of the axle [m]
-ARROW = np.array([(0.0, 0.1), (0.0, -0.1), (1.0, -0.1), (1.0, -0.42), (1.7, 0.0), (1.0, 0.42),
+_ARROW = np.array([(0.0, 0.1), (0.0, -0.1), (1.0, -0.1), (1.0, -0.42), (1.7, 0.0), (1.0, 0.42),
                   (1.0, 0.1)])  # fmt: skip
-SMALLEST = 0.15  # an arrow that would be shorter is left out [m]
+_SMALLEST = 0.15  # an arrow that would be shorter is left out [m]
 
 
 class Ground:
@@ -107,12 +107,12 @@ class Ground:
         axes.add_collection(self._grid)
         (self._line,) = axes.plot([], [], zorder=_BELOW, **PATH)
         (self._cones,) = axes.plot([], [], zorder=1.0, **{**CONES, "markersize": 4.5})
-        across = [(_across(path, s), {**DROP, "label": friction_label(mu)}) for s, mu in drops]
+        across = [(_across(path, s), {**_DROP, "label": friction_label(mu)}) for s, mu in drops]
         self._drops = [(ends, axes.plot([], [], **look)[0]) for ends, look in across]
         self._tracks, self._bodies, self._wheels = [], [], []
         for number, label in enumerate(drives):
             color = tire_look(label)["color"]
-            order = CAR if number == 0 else _GHOST - 0.1 * number
+            order = _CAR if number == 0 else _GHOST - 0.1 * number
             self._tracks += axes.plot([], [], color=color, linewidth=1.4, alpha=0.8, zorder=order)
             faces = [(color, 0.5), (color, 0.95)] if number == 0 else [(color, 0.12)]
             edge: Mapping[str, Any] = {"edgecolors": color, "linewidths": 1.2}
@@ -123,24 +123,22 @@ class Ground:
                 axes.add_collection(collection)
             self._bodies.append(body)
             self._wheels.append(wheels)
-        look: Mapping[str, Any] = {"color": PLAN, "linewidth": 1.3, "marker": "o", "ms": 2.2}
+        look: Mapping[str, Any] = {"color": _PLAN, "linewidth": 1.3, "marker": "o", "ms": 2.2}
         (self._plan,) = axes.plot([], [], zorder=_ABOVE, **look)
         self._forces = PolyCollection([], facecolors=PURPLE, edgecolors="none", zorder=_ABOVE + 1)
         axes.add_collection(self._forces)
         self._names = ["path", "plan", *drives]
 
     def legend(self) -> tuple[list[Artist], list[str]]:
-        """Return what a legend shows, and what it says of it."""
         more = [self._cones] * bool(len(self._path.cones)) + [line for _, line in self._drops]
         names = [*self._names, *(str(line.get_label()) for line in more)]
         marks = [self._line, self._plan, *self._tracks, *more, self._forces]
         return marks, [*names, "forces"]
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is."""
         drive, (k, t, view) = self._drives[0], now
         self._grid.set_segments(self._grid_lines(view))
-        around = drive.s[k] + np.linspace(-SHOWN, SHOWN, 121)
+        around = drive.s[k] + np.linspace(-_SHOWN, _SHOWN, 121)
         if not self._path.closed:
             around = np.clip(around, 0.0, self._path.length)
         X, Y, _ = self._path.pose(around)
@@ -175,11 +173,11 @@ class Ground:
         arrows = []
         for axle, x in enumerate((car.l_f, -car.l_r)):
             length = _FORCE_LENGTH * drive.axle_force[k, axle] / car.axle_loads[axle]
-            if abs(length) < SMALLEST:
+            if abs(length) < _SMALLEST:
                 continue
-            head = ARROW.copy()
+            head = _ARROW.copy()
             shaft = max(abs(length) - 0.7, 0.01)
-            head[:, 0] = np.where(ARROW[:, 0] < 0.5, 0.0, shaft + ARROW[:, 0] - 1.0)
+            head[:, 0] = np.where(_ARROW[:, 0] < 0.5, 0.0, shaft + _ARROW[:, 0] - 1.0)
             head[:, 0] *= np.sign(length)
             arrows.append(view.see(place + x * ahead + head[:, :1] * left + head[:, 1:] * ahead))
         return arrows
@@ -190,7 +188,7 @@ class Ground:
         lines = []
         for axis in (0, 1):
             low, high = view.center[axis] - reach, view.center[axis] + reach
-            for at in np.arange(np.ceil(low / GRID), np.floor(high / GRID) + 1.0) * GRID:
+            for at in np.arange(np.ceil(low / _GRID), np.floor(high / _GRID) + 1.0) * _GRID:
                 ends = np.empty((2, 2))
                 ends[:, axis] = at
                 ends[:, 1 - axis] = view.center[1 - axis] + np.array([-1.5, 1.5]) * reach

@@ -1,6 +1,6 @@
 """Curves of tires over slip: of one, and of what was known at every moment of a drive."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import casadi as ca
@@ -12,31 +12,20 @@ from mpc.tires.tire import Point
 from tireid.driving.known import Known
 from tireid.figures.tires import TireCurve
 
-LARGEST = 0.35  # slip up to which curves are drawn [rad]
-POINTS = 281
+_SLIP = np.linspace(-0.35, 0.35, 281)  # at which curves are drawn [rad]
 
 
-class Curves:
-    """Steady axle forces over slip of all tires that have one structure, at one speed.
+def _steady_forces(model: PredictionTire, v_x: float) -> Callable[[Array], Array]:
+    """Return what gives front and rear force over `_SLIP` [N], (k, 2), of weights (n_weights,).
 
-    v_x : speed [m/s], which a network may look at.
+    All tires of the model's structure are asked by it.   v_x : speed [m/s].
     """
-
-    def __init__(self, model: PredictionTire, v_x: float) -> None:
-        a, weights = ca.SX.sym("alpha"), ca.SX.sym("weights", model.weights.size)
-        car = Car(*(float(value) for value in model.car))
-        at = Point(-v_x * ca.tan(a), ca.SX(0.0), ca.SX(0.0), ca.SX(v_x), car, weights)
-        force = model.structure.force((a, a), at)
-        self._force = ca.Function("curve", [a, weights], [ca.vertcat(*force)])
-        self.alpha = np.linspace(-LARGEST, LARGEST, POINTS)
-
-    def force(self, weights: Array) -> Array:
-        """Return the forces of front and rear axle over `alpha` [N], (k, 2).
-
-        weights : of the tire, (n_weights,).
-        """
-        force: Array = np.array(self._force(self.alpha[None], weights)).T
-        return force
+    a, weights = ca.SX.sym("alpha"), ca.SX.sym("weights", model.weights.size)
+    car = Car(*(float(value) for value in model.car))
+    at = Point(-v_x * ca.tan(a), ca.SX(0.0), ca.SX(0.0), ca.SX(v_x), car, weights)
+    force = ca.vertcat(*model.structure.force((a, a), at))
+    function = ca.Function("curve", [a, weights], [force])
+    return lambda values: np.array(function(_SLIP[None], values)).T
 
 
 def steady_curve(label: str, model: PredictionTire, v_x: float) -> TireCurve:
@@ -44,8 +33,8 @@ def steady_curve(label: str, model: PredictionTire, v_x: float) -> TireCurve:
 
     v_x : speed [m/s], which a network may look at.
     """
-    curves = Curves(model, v_x)
-    return TireCurve(label=label, alpha=curves.alpha, force=curves.force(model.weights))
+    force = _steady_forces(model, v_x)(model.weights)
+    return TireCurve(label=label, alpha=_SLIP, force=force)
 
 
 class KnownCurves(NamedTuple):
@@ -72,11 +61,11 @@ def known_over_time(
     """
     if not known:
         return None
-    curves = Curves(model, v_x)
+    force = _steady_forces(model, v_x)
     return KnownCurves(
         np.array([one.t for one in known]),
-        curves.alpha,
-        np.array([curves.force(one.steering) for one in known]),
-        np.array([curves.force(one.learnt) for one in known]),
+        _SLIP,
+        np.array([force(one.steering) for one in known]),
+        np.array([force(one.learnt) for one in known]),
         np.array([one.slip for one in known]),
     )

@@ -34,11 +34,11 @@ from tireid.figures.style import (
 )
 from tireid.figures.tires import TireCurve, axle_slip
 
-TAIL = 80  # samples
-SMALL = 7.0  # points of the text
-MANY = 9  # entries of a legend that one row does not hold
-STEERING: Mapping[str, Any] = {"color": BLUE, "linewidth": 1.5, "label": "steered by, now"}
-LEARNT: Mapping[str, Any] = {"color": SKY, "linewidth": 2.6, "label": "identified so far"}
+_TAIL = 80  # samples
+_SMALL = 7.0  # points of the text
+_MANY = 9  # entries of a legend that one row does not hold
+_STEERING: Mapping[str, Any] = {"color": BLUE, "linewidth": 1.5, "label": "steered by, now"}
+_LEARNT: Mapping[str, Any] = {"color": SKY, "linewidth": 2.6, "label": "identified so far"}
 
 
 class _ForcePanel:
@@ -77,7 +77,7 @@ class _ForcePanel:
         self._moving: list[Any] = []
         self._shades: list[Rectangle] = []
         if known is not None:
-            self._moving = [axes.plot([], [], **look)[0] for look in (LEARNT, STEERING)]
+            self._moving = [axes.plot([], [], **look)[0] for look in (_LEARNT, _STEERING)]
             shade: dict[str, Any] = {"facecolor": "#EFE9DD", "edgecolor": "none", "zorder": 0}
             shade["transform"] = axes.get_xaxis_transform()
             self._shades = [Rectangle((0.0, 0.0), 0.0, 1.0, **shade) for _ in range(2)]
@@ -85,7 +85,7 @@ class _ForcePanel:
                 axes.add_patch(patch)
         axes.set(xlim=(-self._reach, self._reach), ylim=self._limits)
         if axle == 0:
-            axes.set_ylabel(f"force [{self._unit.name}]", fontsize=SMALL, labelpad=1.0)
+            axes.set_ylabel(f"force [{self._unit.name}]", fontsize=_SMALL, labelpad=1.0)
         else:
             axes.tick_params(labelleft=False)
         _small(axes, AXLES[axle], "slip [deg]")
@@ -93,14 +93,12 @@ class _ForcePanel:
         (self._now,) = axes.plot([], [], marker="o", markersize=5.0, color=PURPLE, linestyle="")
 
     def legend(self) -> tuple[list[Artist], list[str]]:
-        """Return what a legend shows of curves that no other panel names, and what it says."""
         marks = [*self._moving, *list(self._true.values())[:1]]
         names = [str(line.get_label()) for line in self._moving] + ["true tire"] * bool(self._true)
         return marks, names
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is, and curves to what was known then."""
-        part = slice(max(0, now.k - TAIL), now.k + 1)
+        part = slice(max(0, now.k - _TAIL), now.k + 1)
         self._tail.set_data(self._alpha[part], self._force[part])
         self._now.set_data(self._alpha[now.k : now.k + 1], self._force[now.k : now.k + 1])
         dropped = float(self._drive.s[now.k]) >= self._drop
@@ -156,7 +154,6 @@ class _DeviationPanel:
         _small(axes, "Deviation from the path [m]", "arc length [m]")
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is."""
         for drive, line in zip(self._drives, self._lines, strict=True):
             part = drive.t <= now.t
             line.set_data(drive.s[part], drive.e_y[part])
@@ -179,22 +176,21 @@ class _Overview:
         self._dots = [axes.plot([], [], "o", ms=4.0, color=color)[0] for color in colors]
 
     def show(self, now: Instant) -> None:
-        """Move everything to where it is."""
         for drive, dot in zip(self._drives, self._dots, strict=True):
             k = sample_at(drive, now.t)
             dot.set_data([drive.X[k]], [drive.Y[k]])
 
 
 def _small(axes: Axes, title: str, label: str) -> None:
-    axes.set_title(title, fontsize=SMALL + 0.5)
-    axes.set_xlabel(label, fontsize=SMALL, labelpad=1.0)
-    axes.tick_params(labelsize=SMALL - 0.5, pad=1.5)
+    axes.set_title(title, fontsize=_SMALL + 0.5)
+    axes.set_xlabel(label, fontsize=_SMALL, labelpad=1.0)
+    axes.tick_params(labelsize=_SMALL - 0.5, pad=1.5)
     axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
 
 
-SIZE = (6.4, 4.0)  # [in]
-BEHIND, _AHEAD = 12.0, 36.0  # what is shown along the path [m]
+_SIZE = (6.4, 4.0)  # [in]
+_BEHIND, _AHEAD = 12.0, 36.0  # what is shown along the path [m]
 
 
 class Scene:
@@ -220,13 +216,13 @@ class Scene:
         path, self._drive, self._pace = first.path, first, pace
         self._camera = Camera(path)
         with style.context(["default", LOOK]):
-            self.figure = Figure(figsize=SIZE)
+            self.figure = Figure(figsize=_SIZE)
             FigureCanvasAgg(self.figure)
-            width, height = SIZE
+            width, height = _SIZE
             box = (0.0, 0.43, 1.0, 0.5)
             ground = self.figure.add_axes(box, xticks=[], yticks=[], frame_on=False)
-            half = 0.5 * (BEHIND + _AHEAD) * box[3] * height / width
-            ground.set(xlim=(-BEHIND, _AHEAD), ylim=(-half, half), facecolor="#F6F6F2")
+            half = 0.5 * (_BEHIND + _AHEAD) * box[3] * height / width
+            ground.set(xlim=(-_BEHIND, _AHEAD), ylim=(-half, half), facecolor="#F6F6F2")
             self._parts: list[Any] = [Ground(ground, drives, drops)]
             add = self.figure.add_axes
             if path.closed:
@@ -243,14 +239,13 @@ class Scene:
             look: Mapping[str, Any] = {
                 **{"fontsize": 7.0, "handlelength": 1.5, "handletextpad": 0.5},
                 **{"columnspacing": 1.1, "loc": "center", "bbox_to_anchor": (0.5, 0.388)},
-                "ncols": entries if entries < MANY else (entries + 1) // 2,
+                "ncols": entries if entries < _MANY else (entries + 1) // 2,
             }
             self.figure.legend([*marks, *more], [*names, *said], **look)
             mono: Mapping[str, Any] = {"family": "DejaVu Sans Mono", "fontsize": 7.5}
             self._says = self.figure.text(0.988, 0.955, "", ha="right", **mono)
 
     def show(self, t: float) -> None:
-        """Move the picture to an instant [s]."""
         drive = self._drive
         k = sample_at(drive, t)
         now = Instant(k, float(drive.t[k]), self._camera.at(float(drive.s[k])))

@@ -7,15 +7,15 @@ begins with one line of help. Fleets come in that way, too.
 """
 
 import ast
-import importlib
 from collections.abc import Mapping
-from functools import cache
+from importlib import import_module
 from importlib.abc import InspectLoader
 from importlib.machinery import ModuleSpec
-from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any, cast
+
+from codegen.plugins import installed
 
 COMMANDS: Mapping[str, str] = MappingProxyType(
     {
@@ -26,13 +26,13 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "doctor": "faults of a log or of its car's file, and a log.toml that repairs them",
         "plan": "the most informative steering within an area",
         "identify": "tire curves from a log, with error bars and a verdict",
-        "predict": "axle forces of a drive by a stored model, and their error",
+        "predict": "axle forces of another drive by stored tire curves, and their error",
         "compare": "all methods on the same logs, side by side",
-        "check": "certificate of a design: margins, bounds, advice; or a design from a bandwidth",
+        "check": "what is proven of an identifier: limits, margins, bounds; or its gains, designed",
         "export": "C for a microcontroller, FMU and ONNX for simulators",
         "emit": "a stored tire as other tools read it: .tir, g-g-v, slipx, understeer gradient",
         "drive": "steer a car along a path at the limit of grip, on the identified tires",
-        "paper": "Tables I and II of the paper and ours, over many seeds",
+        "paper": "Tables I and II of the paper (Hong and Choi) beside ours, over many seeds",
     }
 )
 
@@ -47,15 +47,13 @@ NOT_TOLD = 74  # EX_IOERR of sysexits.h: all was done, but standard output could
 INTERRUPTED = 130
 
 
-@cache
-def installed() -> Mapping[str, EntryPoint]:
-    """Return the commands that distributions add, by name."""
-    return {one.name: one for one in entry_points(group=GROUP) if one.name not in COMMANDS}
+def added() -> list[str]:
+    return [name for name in installed(GROUP) if name not in COMMANDS]
 
 
 def summary(name: str) -> str:
     """Return a line on an installed command, of its module's docstring; the module is not run."""
-    module = installed()[name].module
+    module = installed(GROUP)[name].module
     try:
         source = cast(InspectLoader, cast(ModuleSpec, find_spec(module)).loader).get_source(module)
         text = ast.get_docstring(ast.parse(source or "")) or ""
@@ -73,9 +71,9 @@ def add_command(name: str, commands: Any) -> None:
         Where a distribution's command cannot be imported.
     """
     if name in COMMANDS:
-        importlib.import_module(f"tireid.commands.{name}").add_parser(commands)
+        import_module(f"tireid.commands.{name}").add_parser(commands)
         return
-    point = installed()[name]
+    point = installed(GROUP)[name]
     try:
         add_parser = point.load().add_parser
     except Exception as error:  # of another's code

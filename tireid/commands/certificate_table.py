@@ -13,7 +13,7 @@ from identifier.stability import Certificate, Property
 from models.vehicle import Vehicle
 from tireid.output import text_table
 
-ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radius
+_ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radius
 HEADER = ("property", "value", "limit", "margin", "")
 
 
@@ -47,7 +47,6 @@ def certificate_text(certificate: Certificate, force_unit: float) -> str:
 
 
 def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: Driving) -> str:
-    """Return what is certified of a method without gains: its properties and its boxes."""
     default = ", the default in a car" if name == LIVE else ""
     rows = [
         [f"  {title}", " to ".join(number(one) for one in np.atleast_1d(value))]
@@ -73,7 +72,6 @@ def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: 
 
 
 def advised(certificate: Certificate) -> list[Property]:
-    """Return the properties that do not pass and say what to do."""
     return [e for e in certificate.properties if e.advice and e.status != "pass"]
 
 
@@ -111,7 +109,7 @@ def resumed_line(certificate: Certificate, design: PaperIdentifier, first: Weigh
     beyond = [
         f"{name} is {number(size)} {unit}".rstrip() + f", proven up to {number(bound)}"
         for name, values, bound, unit in layers
-        if not (size := float(np.linalg.norm(values))) <= bound * (1.0 + ROUNDING)
+        if not (size := float(np.linalg.norm(values))) <= bound * (1.0 + _ROUNDING)
     ]
     if not beyond:
         return ""

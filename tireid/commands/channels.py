@@ -25,10 +25,10 @@ from tireid.commands.options import add_force, add_log_map, given_map, require_t
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
-_MOST_NUMBERS = 5e7  # that are read to tell ranges; of a larger log only those of likely channels
+_MOST_NUMBERS = 5e7  # that are read for ranges; of a larger log only those of likely channels
 _CUT_BY_MAP = "rejected without --cut-holes or a map with that key, as of --write"
 _NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
-LONGEST_NAME = 48  # letters of a channel in the table
+_LONGEST_NAME = 48  # letters of a channel in the table
 
 
 def add_parser(commands: Any) -> None:
@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
         tell(f"{choice.column_of('a_y')} is there: without vy, identify estimates it")
     said, of_wheels, rolls = _wheels(log, signals, log_map, chosen)
     if rolls or missing:
-        tell(missing_text(options.log, missing, proposal, signals))
+        tell(_missing_text(options.log, missing, proposal, signals))
     if said:
         tell(said)
     if options.write is not None:
@@ -131,7 +131,6 @@ def _head(log: LogFile, run: str | None) -> list[str]:
 def _seen(
     log: LogFile, listed: Sequence[Listed], signals: Mapping[str, Signal], run: str | None
 ) -> dict[str, Channel]:
-    """Return the channels whose ranges are given, by name."""
     names = [one.name for one in listed]
     if sum(one.samples for one in listed) > _MOST_NUMBERS:
         likely = {channel for signal in signals.values() for channel in signal.channel}
@@ -146,7 +145,6 @@ def _channels_text(
     proposal: Proposal,
     known: frozenset[str] = frozenset(),
 ) -> str:
-    """Return the table of a log: channel, unit, rate, samples, range, and what it is taken for."""
     rows = [["channel", "unit", "Hz", "samples", "from", "to", "is"]]
     for one in listed:
         channel = seen.get(one.name)
@@ -157,7 +155,7 @@ def _channels_text(
             samples = int(np.count_nonzero(~np.isnan(channel.values)))
             low, high = (f"{end:.4g}" for end in (finite.min(), finite.max())) if finite.size else (
                 "empty", "")  # fmt: skip
-        name = visible(one.name if len(one.name) <= LONGEST_NAME else f"{one.name[:44]}...")
+        name = visible(one.name if len(one.name) <= _LONGEST_NAME else f"{one.name[:44]}...")
         rate = "?" if math.isnan(one.rate) else f"{one.rate:.4g}"
         meant = _meaning(one, signals, proposal, known)
         rows.append([name, visible(one.unit), rate, str(samples), low, high, meant])
@@ -167,7 +165,7 @@ def _channels_text(
 def _meaning(
     listed: Listed, signals: Mapping[str, Signal], proposal: Proposal, known: frozenset[str]
 ) -> str:
-    """Return what a channel is taken for, or may be, in which unit where the file tells none."""
+    """Return what a channel is taken for, or may be, in which unit where the file gives none."""
     channel = listed.name
     for name, signal in signals.items():
         if channel in signal.channel:
@@ -193,7 +191,6 @@ def _meaning(
 
 
 def _holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> str:
-    """Return which signals have cells without a value; nothing where none has."""
     said = []
     for name, signal in signals.items():
         for channel in (seen[one] for one in signal.channel if one in seen):
@@ -207,10 +204,9 @@ def _holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> s
     return "\n".join(said)
 
 
-def missing_text(
+def _missing_text(
     log: str, missing: Sequence[str], proposal: Proposal, signals: Mapping[str, Signal]
 ) -> str:
-    """Return what is missing, and the words that would tell it."""
     if not missing:
         there = given_by(signals)
         needed = [name for name in NEEDED if name in there]

@@ -12,6 +12,7 @@ from typing import Any
 from codegen.writing import write_file
 from identifier.driving import BANDWIDTH, Driving, natural_driving
 from identifier.frozen import vehicle_numbers
+from identifier.method import Method
 from identifier.methods import LIVE, REFERENCE, certify
 from identifier.paper.design import (
     PHASE_MARGIN,
@@ -44,7 +45,7 @@ from tireid.figures.style import paper_design, save_figures
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import say, tell
 
-BOUNDS = {
+_BOUNDS = {
     "error_bound": "proven bound, leakage",
     "projection_bound": "proven bound, projection",
     "trivial_bound": "no network",
@@ -55,7 +56,6 @@ BOUNDS = {
 def draw_check(
     folder: Path, history: History, operation: Operation, certificate: Certificate
 ) -> None:
-    """Draw locus.png and bounds.png of a run of the paper's identifier."""
     design = paper_design(history)
     chosen = LAWS[design.law]
     law = chosen.error(design.gains.lead)
@@ -72,22 +72,24 @@ def draw_check(
 def _error_bounds(certificate: Certificate) -> dict[str, float]:
     """Return the bounds of the error norm [U s] in a certificate, by the name in a legend."""
     known = {entry.name: entry.value for entry in certificate.properties}
-    return {title: known[name] for name, title in BOUNDS.items() if name in known}
+    return {title: known[name] for name, title in _BOUNDS.items() if name in known}
 
 
-CONDITIONS = {  # field of the declared driving, and the option that says otherwise
-    "v_x": "speed",
-    "slip": "slip",
-    "friction": "friction",
-    "bandwidth": "bandwidth",
-    "noise_v_x": "noise_v_x",
-    "noise_v_y": "noise_v_y",
-    "noise_r": "noise_r",
-    "noise_delta": "noise_delta",
+_CONDITIONS = {"v_x": "speed"} | {  # field of the declared driving, and the option of it
+    name: name
+    for name in (
+        "slip",
+        "friction",
+        "bandwidth",
+        "noise_v_x",
+        "noise_v_y",
+        "noise_r",
+        "noise_delta",
+    )
 }
 _OF_ALL = ("v_x", "friction")  # conditions of which not gains alone are judged
-_OF_GAINS = tuple(option for field, option in CONDITIONS.items() if field not in _OF_ALL)
-TEXT, NUMBERS = "certificate.txt", "certificate.json"
+_OF_GAINS = tuple(option for field, option in _CONDITIONS.items() if field not in _OF_ALL)
+_TEXT, _NUMBERS = "certificate.txt", "certificate.json"
 
 
 def add_parser(commands: Any) -> None:
@@ -168,8 +170,8 @@ def run(options: argparse.Namespace) -> int:
     with ExitStack() as stack:  # where a part fails, none is there
         if options.out is not None:
             folder = stack.enter_context(output_folder(options.out, force=options.force))
-            write_json(folder / NUMBERS, numbers)
-            write_file(folder / TEXT, f"{text}\n")
+            write_json(folder / _NUMBERS, numbers)
+            write_file(folder / _TEXT, f"{text}\n")
             if paper is not None:
                 learnt = history or identify(drive_to_learn(), vehicle, paper)
                 draw_check(folder, learnt, paper.operation(vehicle, driving), certificate)
@@ -182,7 +184,7 @@ def run(options: argparse.Namespace) -> int:
     return FAILS if certificate.verdict == "fail" else DONE
 
 
-def _method(options: argparse.Namespace, vehicle: Vehicle) -> shared.Chosen:
+def _method(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Method]:
     """Return what is judged; gains that are to be found are those of a law of the paper."""
     if options.tune is None:
         return shared.chosen_method(options, vehicle, online=True)
@@ -197,7 +199,7 @@ def _method(options: argparse.Namespace, vehicle: Vehicle) -> shared.Chosen:
     margin = options.phase_margin or PHASE_MARGIN
     found = design_for(vehicle, driving, law=law, phase_margin=margin)
     known = found.operation(vehicle, driving)
-    return shared.Chosen(law, with_keeping(found, known, options.keep or DEFAULT_KEEPING))
+    return law, with_keeping(found, known, options.keep or DEFAULT_KEEPING)
 
 
 def _refuse_gains(options: argparse.Namespace, name: str) -> None:
@@ -240,7 +242,7 @@ def _require_sense(options: argparse.Namespace) -> None:
         for name in ("phase_margin", "keep"):
             if getattr(options, name) is not None:
                 raise ValueError("--phase-margin and --keep go with --tune FILE")
-    for name in (*CONDITIONS.values(), "phase_margin"):
+    for name in (*_CONDITIONS.values(), "phase_margin"):
         value, noise = getattr(options, name), name.startswith("noise")
         if value is not None and not (0.0 < value < math.inf or (noise and value == 0.0)):
             rule = "not be negative" if noise else "be positive"
@@ -250,13 +252,14 @@ def _require_sense(options: argparse.Namespace) -> None:
 
 
 def _overrides(options: argparse.Namespace) -> dict[str, float]:
-    given = {field: getattr(options, option) for field, option in CONDITIONS.items()}
+    given = {field: getattr(options, option) for field, option in _CONDITIONS.items()}
     return {field: value for field, value in given.items() if value is not None}
 
 
 def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving) -> str:
-    """Return where the conditions come from."""
-    changed = ", ".join(f"--{CONDITIONS[field].replace('_', '-')}" for field in _overrides(options))
+    changed = ", ".join(
+        f"--{_CONDITIONS[field].replace('_', '-')}" for field in _overrides(options)
+    )
     stored = options.design is not None and design.driving is not None
     origin = "none stored in the design, those of the car" if options.design else "of the car"
     said = f"conditions: {'as stored in the design' if stored else origin}"
@@ -275,16 +278,17 @@ def _conditions(design: PaperIdentifier, vehicle: Vehicle, driving: Driving, sai
         f"{driving.noise_v_x:.3g} and {driving.noise_v_y:.3g} m/s, {driving.noise_r:.3g} rad/s, "
         f"{driving.noise_delta:.3g} rad\n{said}\n"
         f"{design.law} law, {design.network.hidden} units, {design.integrator} at "
-        f"{1e3 * design.dt:g} ms, forces in {unit}: A_d {rows}, lambda "
-        f"{gains.forgetting:.4g}, eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W "
-        f"{gains.rho_W:.4g}, rho_V {gains.rho_V:.4g}{_radii(gains)}\n"
+        f"{1e3 * design.dt:g} ms, forces in {unit}: A_d {rows}, {_rates(gains)}\n"
     )
 
 
-def _radii(gains: Gains) -> str:
-    """Return the balls that the weights are kept in, as far as there are any."""
-    radii = {name: getattr(gains, name) for name in ("W_free", "V_free", "W_max", "V_max")}
-    return "".join(f", {name} {r:.4g}" for name, r in radii.items() if 0.0 < r < math.inf)
+def _rates(gains: Gains) -> str:
+    """Return the rates of a law, and the radii that its weights are kept in, if any."""
+    names = ("W_free", "V_free", "W_max", "V_max")
+    radii = {name: r for name in names if 0.0 < (r := getattr(gains, name)) < math.inf}
+    rates = {name: getattr(gains, name) for name in ("eta_W", "eta_V", "rho_W", "rho_V")}
+    numbers = {"lambda": gains.forgetting, **rates, **radii}
+    return ", ".join(f"{name} {value:.4g}" for name, value in numbers.items())
 
 
 def _along(history: History, design: PaperIdentifier) -> str:
@@ -317,16 +321,15 @@ def _proposal(
         return f"no better gains at this bandwidth: {error}"
     gains, verdict = better.gains, certify(better, vehicle, driving).verdict
     return (
-        f"proposal ({verdict}): A_d = -{-gains.A_d[0][0]:.4g} I, lambda {gains.forgetting:.4g}, "
-        f"eta_W {gains.eta_W:.4g}, eta_V {gains.eta_V:.4g}, rho_W {gains.rho_W:.4g}, rho_V "
-        f"{gains.rho_V:.4g}{_radii(gains)}{f', lead {gains.lead:.4g}' if gains.lead else ''}\n"
+        f"proposal ({verdict}): A_d = -{-gains.A_d[0][0]:.4g} I, {_rates(gains)}"
+        f"{f', lead {gains.lead:.4g}' if gains.lead else ''}\n"
         f"write it with: tireid check --tune design.toml --method {design.law}{_given(options)}"
     )
 
 
 def _given(options: argparse.Namespace) -> str:
     """Return the options that say which car drives how hard, as they were given."""
-    names = ("vehicle", *CONDITIONS.values())
+    names = ("vehicle", *_CONDITIONS.values())
     given = {name: getattr(options, name) for name in names if getattr(options, name) is not None}
     return "".join(
         f" --{name.replace('_', '-')} {shlex.quote(str(value))}" for name, value in given.items()

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from identifier.compare.study import cannot_learn, run_comparison
-from identifier.method import Method
 from identifier.methods import DEFAULT, methods, require_method
 from identifier.own_network import FrozenMethod
 from identifier.paper.design import PaperIdentifier
@@ -21,7 +20,6 @@ from tireid.commands import options as shared
 from tireid.commands.demo_story import plant_recordings
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, say, tell
-from tireid.reports.compare import write_compare_report
 from tireid.verdicts import verdicts_text
 
 _FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
@@ -67,7 +65,8 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
     watch = Stopwatch()
     vehicle = shared.read_vehicle(options)
-    others = _network(options, vehicle)
+    network = shared.network_model(options, vehicle, PaperIdentifier.for_vehicle(vehicle).min_speed)
+    others = {} if network is None else {options.network.name: FrozenMethod(model=network)}
     parts = {"methods": 9.0, "step times, tables and figures": 1.0}
     with (
         output_folder(options.out, force=options.force) as folder,
@@ -104,29 +103,14 @@ def run(options: argparse.Namespace) -> int:
         )
         work.begin("step times, tables and figures")
         figures = results.write_comparison(folder, comparison, verdicts)
-        rows = results.summary_rows(comparison)
-        write_compare_report(
-            folder,
-            comparison,
-            rows,
-            figures,
-            verdicts,
-            remarks=results.remarks(comparison),
-            command=options.words,
-        )
+        results.write_compare_report(folder, comparison, figures, verdicts, options.words)
         tables = [results.summary_table(comparison)]
         if len(comparison.names) ** 2 <= _FEW_PAIRS:
             tables.append(results.pair_tables(comparison))
-    tables += [verdicts_text(verdicts)] if verdicts else []
+    tables += [verdicts_text(verdicts, "default identified on")] if verdicts else []
     tell("\n".join(tables))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
     return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
-
-
-def _network(options: argparse.Namespace, vehicle: Vehicle) -> dict[str, Method]:
-    """Return the network of --network as a method by the name of its file."""
-    model = shared.network_model(options, vehicle, PaperIdentifier.for_vehicle(vehicle).min_speed)
-    return {} if model is None else {options.network.name: FrozenMethod(model=model)}
 
 
 def _recordings(options: argparse.Namespace, vehicle: Vehicle, seed: int) -> list[Recording]:

@@ -24,7 +24,7 @@ from identifier.compare.course import Trial, same_and_other
 from identifier.compare.study import Comparison, ranking
 from identifier.frozen import vehicle_numbers
 from identifier.methods import make_method, methods
-from identifier.reproducibility import AxleRmse
+from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.verdict import Verdict
 from tireid import __version__
 from tireid.figures.compare import matrix_figure, methods_figure
@@ -32,14 +32,17 @@ from tireid.figures.side_slip import side_slip_figure
 from tireid.figures.style import save_figures
 from tireid.output import text_table, write_json
 from tireid.progress import say
+from tireid.report import Block, Headline, Report, Section, Table, write_report
+from tireid.reports.common import REPORT, drawings, origin
+from tireid.verdicts import verdict_warnings, verdicts_headline
 
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:
     """Return the means over recordings of every method, best on other recordings first."""
-    lines = [["method", "online", "frozen, same drive", "frozen, elsewhere", *SLIP, "step"]]
+    lines = [["method", "online", "frozen, same drive", "frozen, elsewhere", *_SLIP, "step"]]
     for name in ranking(comparison):
         trial = comparison.trials[name]
-        time = NOT_TOLD
+        time = _NOT_GIVEN
         if name in comparison.step_times:
             time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
         pairs = same_and_other(trial.frozen or {})
@@ -51,8 +54,8 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
     return lines
 
 
-SLIP = ("side slip [deg]", "within 2 sigma")  # columns of methods that estimate v_y
-NOT_TOLD = "-"
+_SLIP = ("side slip [deg]", "within 2 sigma")  # columns of methods that estimate v_y
+_NOT_GIVEN = "-"
 _NOT_SHOWN = "get no v_y; they estimate it, and side slip is judged by the recorded one"
 
 
@@ -62,17 +65,16 @@ def _slip_cells(trial: Trial) -> list[str]:
     errors = [one.rms for one in notes if one.rms is not None]
     shares = [one.within for one in notes if one.within is not None]
     return [
-        f"{np.mean(errors):.3f}" if errors else NOT_TOLD,
-        f"{np.mean(shares):.0f} %" if shares else NOT_TOLD,
+        f"{np.mean(errors):.3f}" if errors else _NOT_GIVEN,
+        f"{np.mean(shares):.0f} %" if shares else _NOT_GIVEN,
     ]
 
 
 def summary_table(comparison: Comparison) -> str:
-    """Return the same as text."""
-    n, lines = len(comparison.names), summary_rows(comparison)
-    measure = comparison.course.measure
+    n, measure = len(comparison.names), comparison.course.measure
     title = f"{measure}, front / rear, % of rms (N), mean over {n} recordings"
-    return _text(title, lines) + "".join(f"  {line}\n" for line in remarks(comparison))
+    rows = _text(title, summary_rows(comparison))
+    return rows + "".join(f"  {line}\n" for line in remarks(comparison))
 
 
 def remarks(comparison: Comparison) -> list[str]:
@@ -90,7 +92,6 @@ def remarks(comparison: Comparison) -> list[str]:
 
 
 def pair_tables(comparison: Comparison) -> str:
-    """Return one table for each recording identified on and recording replayed."""
     blocks = []
     for learnt in comparison.names:
         for replayed in comparison.names:
@@ -131,7 +132,7 @@ def _text(title: str, lines: list[list[str]]) -> str:
     return "\n".join([title, text_table(lines, indent="  "), ""])
 
 
-Row = tuple[str | float | int, ...]
+_Row = tuple[str | float | int, ...]
 
 
 def write_comparison(
@@ -148,7 +149,7 @@ def write_comparison(
     path = folder / "compare.csv"
     with naming(path), path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(ERROR_COLUMNS)
+        writer.writerow(_ERROR_COLUMNS)
         for row in _error_rows(comparison):
             writer.writerow(f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row)
     say("drawing figures")
@@ -162,7 +163,6 @@ def write_comparison(
 
 
 def _comparison_numbers(comparison: Comparison) -> dict[str, Any]:
-    """Return what compare.json holds."""
     course = comparison.course
     return {
         "recordings": {
@@ -204,16 +204,16 @@ def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
     }
 
 
-ERROR_COLUMNS = (
+_ERROR_COLUMNS = (
     *("method", "kind", "identified_on", "replayed_on", "front_N", "rear_N"),
     *("front_percent", "rear_percent", "both_percent"),
 )
 
 
-def _error_rows(comparison: Comparison) -> Iterator[Row]:
+def _error_rows(comparison: Comparison) -> Iterator[_Row]:
     sizes = {rec.name: comparison.course.size(rec) for rec in comparison.course.recordings}
 
-    def row(method: str, kind: str, learnt: str, name: str, error: AxleRmse) -> Row:
+    def row(method: str, kind: str, learnt: str, name: str, error: AxleRmse) -> _Row:
         front, rear = error.front / sizes[name].front, error.rear / sizes[name].rear
         both = comparison.course.share(name, error)
         return method, kind, learnt, name, error.front, error.rear, 100 * front, 100 * rear, both
@@ -224,3 +224,82 @@ def _error_rows(comparison: Comparison) -> Iterator[Row]:
         for learnt, replays in (trial.frozen or {}).items():
             for name, error in replays.items():
                 yield row(method, "frozen", learnt, name, error)
+
+
+def write_compare_report(
+    folder: Path,
+    comparison: Comparison,
+    figures: Mapping[str, Figure],
+    verdicts: Mapping[str, Verdict],
+    command: str,
+) -> None:
+    """Write the report of a comparison.
+
+    verdicts : on what the default learns, by recording.
+    """
+    course, rows, said = comparison.course, summary_rows(comparison), remarks(comparison)
+    captions = {
+        "methods": "Errors of every method.",
+        "matrix": "Identified on one recording, validated on another.",
+        "side_slip": "Side slip estimated by methods without a lateral velocity.",
+    }
+    blocks: list[Block] = [
+        Table(
+            caption=f"{course.measure}, front / rear, in percent of the rms force (and N), mean "
+            f"over {len(comparison.names)} recordings." + "".join(f" {line}." for line in said),
+            header=rows[0],
+            rows=rows[1:],
+        ),
+        *drawings(figures, captions),
+    ]
+    learnt = "recordings with a valid model of the default"
+    report = Report(
+        title=f"Methods compared on {course.vehicle.name}",
+        summary="Each method is identified on each recording, frozen at its end and replayed on "
+        "all.",
+        numbers=[*verdicts_headline(verdicts, learnt, "good"), *_compare_headlines(comparison)],
+        warnings=[
+            *_compare_warnings(comparison),
+            *(
+                one
+                for name, verdict in verdicts.items()
+                for one in verdict_warnings(verdict, f"The default identified on {name}: ")
+            ),
+        ],
+        sections=[
+            Section(heading="Errors of the methods", blocks=blocks),
+            origin(command, course.vehicle, course.recordings, seed=str(comparison.seed)),
+        ],
+    )
+    write_report(folder / REPORT, report)
+
+
+def _compare_headlines(comparison: Comparison) -> list[Headline]:
+    numbers = []
+    elsewhere = len(comparison.names) > 1
+    for name in ranking(comparison):
+        shares = comparison.shares(name)
+        value = shares.other if elsewhere else shares.in_sample
+        if value is not None and np.isfinite(value):
+            where = "frozen, on other recordings" if elsewhere else "frozen, same drive"
+            numbers.append(
+                Headline(f"{value:.1f} %", f"error in % of the rms force, {name}, {where}")
+            )
+    return numbers[:4]
+
+
+def _compare_warnings(comparison: Comparison) -> list[str]:
+    vehicle = comparison.course.vehicle
+    said = [f"{vehicle.estimates}."] if vehicle.estimates else []
+    if comparison.course.by_motion:
+        said.append(
+            "Without true forces, methods are judged by the mean force in the motion over 0.3 s, "
+            "sensor noise subtracted. A wrong mass scales all alike."
+        )
+    for name, trial in comparison.trials.items():
+        at = [f"{where} at {freeze_key(t)} s" for where, t in trial.diverged_at.items()]
+        if at:
+            said.append(f"{name} diverged on {', '.join(at)}.")
+    if len(comparison.names) == 1:
+        said.append("One recording only: give a second one as validation drive.")
+    return said

@@ -15,18 +15,17 @@ from tireid import report as page
 from tireid.commands import COMMANDS, certificate_table, demo_parts
 from tireid.commands import options as shared
 from tireid.commands.check import draw_check
-from tireid.commands.demo_story import FREEZE, PREDICT, SPEED, Story, run_story
+from tireid.commands.demo_story import FREEZE, SPEED, STORY, Story, run_story
 from tireid.commands.paper import (
     MEANING,
     MEASURES_MEAN,
-    SCHEME,
-    header,
-    rows,
     settings,
+    study_table,
     table_text,
     write_study,
 )
 from tireid.figures.forces import side_by_side_figure
+from tireid.figures.paper import SCHEME
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, tell
 from tireid.reports.common import READ, REPORT, drawing, origin
@@ -44,7 +43,7 @@ from tireid.verdicts import (
     verdict_warnings,
 )
 
-REFERENCE = (
+_REFERENCE = (
     'Hong and Choi, "Integral Error-Based Adaptive Neural Identifier for Nonlinear Lateral Tire '
     'Forces"'
 )
@@ -54,7 +53,7 @@ def _demo_report(
     story: Story,
     shipped: demo_parts.Shipped,
     study: Study,
-    driven: dict[str, demo_parts.Driven],
+    driven: Mapping[str, demo_parts.Driven],
     figures: Mapping[str, Mapping[str, Figure]],
     folder: Path,
     command: str,
@@ -63,12 +62,12 @@ def _demo_report(
     model, runs, verdict = story.axle.model, story.axle.runs, story.axle.verdict
     return page.Report(
         title=_TITLE,
-        summary=SUMMARY,
+        summary=_SUMMARY,
         numbers=[
             verdict_headline(verdict),
             *missed_headline(verdict),
             *number_headlines(verdict),
-            *identify_headlines(model, runs, story.axle.replays),
+            *identify_headlines(story.axle),
             *demo_parts.drive_numbers(driven),
         ],
         warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
@@ -78,16 +77,7 @@ def _demo_report(
             _learn(figures["identify"], model, verdict),
             _predict(story),
             demo_parts.package_section(shipped),
-            page.Section(
-                heading="The paper's study",
-                blocks=[
-                    *_certify(story, folder / "paper_network"),
-                    *_network(story, figures["paper"]),
-                    *_slalom(study, figures["paper"]),
-                    *_step(study, figures["paper"]),
-                ],
-                folded=True,
-            ),
+            _paper_study(story, study, figures["paper"], folder / "paper_network"),
             origin(command, story.car, [run.recording for run in runs]),
         ],
     )
@@ -139,20 +129,26 @@ def _predict(story: Story) -> page.Section:
             rows=[[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
-    for history in story.axle.runs[1:]:
-        name = history.recording.name
-        said = name.replace("_", " ")
-        figure = side_by_side_figure(story.side_by_side(name))
-        caption = f"Both methods, frozen after the slalom, on the {said}."
+    methods = {
+        "axle identifier (curves of slip)": story.axle,
+        "paper (network, integral law)": story.paper,
+    }
+    for run in story.axle.runs[1:]:
+        name = run.recording.name
+        figure = side_by_side_figure({title: one.replays[name] for title, one in methods.items()})
+        caption = f"Both methods, frozen after the slalom, on the {name.replace('_', ' ')}."
         blocks.append(drawing(figure, caption, READ["replay"]))
     return page.Section(heading="Prediction of validation drives", blocks=blocks)
 
 
-def _certify(story: Story, learning: Path) -> list[page.Block]:
-    certificate, unit = story.certificate, story.design.force_unit
+def _paper_study(
+    story: Story, study: Study, figures: Mapping[str, Figure], learning: Path
+) -> page.Section:
+    certificate, design = story.certificate, story.design
+    gains, seeds = design.gains, len(study.errors["slalom"]["integral"])
     said = [f"{e.title}: {e.status}; {e.advice}." for e in certificate_table.advised(certificate)]
     said += [f"Note: {remark}." for remark in certificate_table.notes(certificate)]
-    return [
+    blocks: list[page.Block] = [
         page.Subheading(text="The gains of the paper's law are judged before it learns"),
         page.Paragraph(
             text="The certificate follows from the gains, the network and how hard the car is "
@@ -163,8 +159,10 @@ def _certify(story: Story, learning: Path) -> list[page.Block]:
             caption="Properties of the learning loop at the worst regressor; those without a "
             "limit are stated, not judged.",
             header=list(certificate_table.HEADER),
-            rows=[[page.printed(c) if isinstance(c, str) else c for c in row]
-                  for row in certificate_table.certificate_rows(certificate, unit)],
+            rows=[
+                [page.printed(cell) for cell in row]
+                for row in certificate_table.certificate_rows(certificate, design.force_unit)
+            ],
         ),
         *(page.Paragraph(text=page.printed(one)) for one in said),
         page.Picture(
@@ -177,12 +175,6 @@ def _certify(story: Story, learning: Path) -> list[page.Block]:
             caption="Proven bounds on the error norm, and the error that happened.",
             read="The error stays below each bound; the gap is the conservatism of the proof.",
         ),
-    ]  # fmt: skip
-
-
-def _network(story: Story, paper: Mapping[str, Figure]) -> list[page.Block]:
-    design, gains = story.design, story.design.gains
-    return [
         page.Subheading(text="The paper's network on the same slalom"),
         page.Paragraph(
             text="At every sample an observer predicts the motion; its error drives the weights of "
@@ -193,51 +185,34 @@ def _network(story: Story, paper: Mapping[str, Figure]) -> list[page.Block]:
             f"ρ₂ = {gains.rho_V:.4g} kN⁻¹ s⁻². What it predicts stands beside the axle "
             "identifier above; its figures are in the folder paper_network."
         ),
-        drawing(
-            paper[SCHEME],
-            "The identifier, as Fig. 1 of the paper; orange is what the laws differ in, and where "
-            "a freeze cuts.",
+        page.Picture(
+            image=SCHEME.with_suffix(".svg"),
+            caption="The identifier, as Fig. 1 of the paper; orange is what the laws differ in, "
+            "and where a freeze cuts.",
         ),
-    ]
-
-
-def _slalom(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
-    captions = {
-        "slalom_errors": "The table as a picture; hollow marks are the paper's values.",
-        "fig4_slalom_instantaneous": "Instantaneous law, as Fig. 4 of the paper (seed of "
-        "median error); all errors count from the onset on.",
-        "fig5_slalom_integral": "Integral law, as Fig. 5 of the paper (seed of median error).",
-    }
-    return [
         page.Subheading(text="The frozen-weight reproducibility test: slalom"),
         page.Paragraph(
-            text=f"{REFERENCE} freezes the weights at an instant and replays the past with "
+            text=f"{_REFERENCE} freezes the weights at an instant and replays the past with "
             "them: a law that follows the instant forgets earlier driving. "
             f"{page.printed(MEASURES_MEAN)}"
         ),
-        _table(
-            study,
+        study_table(
             "slalom",
-            "Table II of the paper beside ours, RMSE of the axle force [kN]: median "
-            f"and quartiles of {len(study.errors['slalom']['integral'])} seeds.",
+            study,
+            "Table II of the paper beside ours, RMSE of the axle force "
+            f"[kN]: median and quartiles of {seeds} seeds.",
         ),
         page.Paragraph(text=page.printed(MEANING)),
-        *_drawn(figures, captions),
+        *_drawn(
+            figures,
+            {
+                "slalom_errors": "The table as a picture; hollow marks are the paper's values.",
+                "fig4_slalom_instantaneous": "Instantaneous law, as Fig. 4 of the paper (seed of "
+                "median error); all errors count from the onset on.",
+                "fig5_slalom_integral": "Integral law, as Fig. 5 of the paper (likewise).",
+            },
+        ),
         page.Paragraph(text=page.printed(settings(GAINS, NETWORK).splitlines()[0])),
-    ]
-
-
-def _table(study: Study, maneuver: str, caption: str) -> page.Table:
-    head = [page.printed(word) for word in header()]
-    return page.Table(caption=caption, header=head, rows=rows(maneuver, study))
-
-
-def _step(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
-    drawn = (
-        "The table as a picture; hollow marks are the paper's values. "
-        "The drives are Figs. 2 and 3 in the folder paper."
-    )
-    return [
         page.Subheading(text="The frozen-weight reproducibility test: step steer"),
         page.Paragraph(
             text="The step is held from 29 s on and goes back to half its angle at 36 s. By the "
@@ -246,13 +221,18 @@ def _step(study: Study, figures: Mapping[str, Figure]) -> list[page.Block]:
             "than what its frozen weights say of it. After 36 s, at an angle outside the "
             "identification drive, all have a larger error than the linear tire."
         ),
-        _table(
-            study,
-            "step_steer",
-            "Table I of the paper beside ours, RMSE of the axle force [kN].",
+        study_table(
+            "step_steer", study, "Table I of the paper beside ours, RMSE of the axle force [kN]."
         ),
-        *_drawn(figures, {"step_steer_errors": drawn}),
+        *_drawn(
+            figures,
+            {
+                "step_steer_errors": "The table as a picture; hollow marks are the paper's values. "
+                "The drives are Figs. 2 and 3 in the folder paper.",
+            },
+        ),
     ]
+    return page.Section(heading="The paper's study", blocks=blocks, folded=True)
 
 
 def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[page.Block]:
@@ -263,19 +243,19 @@ def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[p
 
 
 _TITLE = "tireid: lateral tire forces, identified while driving"
-SUMMARY = (
+_SUMMARY = (
     "tireid identifies the tire forces of a driven car from speed, lateral velocity, yaw rate "
     "and steering. The frozen model then predicts validation drives and steers the car."
 )
 SEEDS = 20
-LEARNING, _EXPORTING = "driving the sedan, learning, predicting", "as C, compiled and tested"
-_TESTING, DRIVING = "the frozen-weight test of the paper", "driving on the identified tires"
+_LEARNING, _EXPORTING = "driving the sedan, learning, predicting", "as C, compiled and tested"
+_TESTING, _DRIVING = "the frozen-weight test of the paper", "driving on the identified tires"
 _REPORTING = "writing the report"
-PARTS = {
-    LEARNING: 15.0,
+_PARTS = {
+    _LEARNING: 15.0,
     _EXPORTING: 20.0,
     _TESTING: 20.0,
-    DRIVING: 40.0,
+    _DRIVING: 40.0,
     _REPORTING: 2.0,
 }  # about s
 
@@ -297,9 +277,9 @@ def run(options: argparse.Namespace) -> None:
     watch = Stopwatch()
     with (
         output_folder(options.out, force=options.force) as folder,
-        Progress("demo", PARTS, long=True) as work,
+        Progress("demo", _PARTS, long=True) as work,
     ):
-        story = run_story(partial(work.begin(LEARNING).step, 2 * (1 + len(PREDICT))))
+        story = run_story(partial(work.begin(_LEARNING).step, 2 * len(STORY)))
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
             one.mkdir()
@@ -313,7 +293,7 @@ def run(options: argparse.Namespace) -> None:
         shipped = demo_parts.ship(story, folder / demo_parts.FOLDER)
         study = run_study(SEEDS, partial(work.begin(_TESTING).step, STEPS))
         figures["paper"] = write_study(folders["paper"], study)
-        work.begin(DRIVING)
+        work.begin(_DRIVING)
         driven = demo_parts.drive_story(story, folder)
         work.begin(_REPORTING)
         report = _demo_report(story, shipped, study, driven, figures, folder, options.words)

@@ -8,34 +8,44 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen import find_compiler
-from codegen.processor import CROSS_COMPILER, EMULATOR, Cost, missing_tools
+from codegen.processor import CROSS_COMPILER, EMULATOR, missing_tools
 from identifier.export.compiled import CompiledPackage
-from identifier.export.package import Package, build_package
-from identifier.export.processor import figures_text, measure
 from identifier.run import identify
 from mpc.path import BUILT_IN
 from tireid.animation import FORMATS
 from tireid.commands.demo_story import Story
-from tireid.commands.drive_results import drive_lines, headline, inputs_of, write_drives
-from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions, Run, run_drive
+from tireid.driving.results import SCORES, Drives, headline, known_blocks, score_rows
+from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
 from tireid.driving.setup import Setup, SpeedWish
-from tireid.exporting import Verdict, self_test, write_files
+from tireid.exporting import Exported, Verdict, export, self_test
 from tireid.report import Block, Headline, Paragraph, Picture, Section, Table
 from tireid.reports.common import READ, drawing
-from tireid.reports.drive import SCORES, known_blocks, score_rows
 
 LANE_CHANGE, _SLIPPERY = "drive", "drive_slippery"  # folders beside the report
-FILM = FORMATS[0]
-DELAY = 2  # periods of 10 ms
-_SOURCE = "frozen ones identified on the slalom"
+_FILM = FORMATS[0]
+_CASES = {  # path, share of the grip, drops of friction [m] and to what, tires; in a number's words
+    LANE_CHANGE: (
+        "iso-3888-2",
+        0.9,
+        (),
+        (FROZEN, LINEAR, ORACLE),
+        "in the lane change at 90 % of the grip",
+    ),
+    _SLIPPERY: (
+        "slalom",
+        0.57,
+        ((110.0, 0.5),),
+        (LEARNING, FROZEN, LINEAR),
+        "where friction drops to half",
+    ),
+}
 NOT_DRIVEN = "No C compiler (gcc) was found: the tracker cannot be built, the car did not drive."
 
 
 class Driven(NamedTuple):
-    """Drives along one path: what they were like, what came of them, and its figures."""
+    """Drives along one path, and their figures."""
 
-    conditions: Conditions
-    runs: Sequence[Run]
+    drives: Drives
     figures: Mapping[str, Figure]
 
 
@@ -43,27 +53,28 @@ def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
     """Drive the cases of the demo and write what `tireid drive` writes; nothing without a
     compiler.
     """
-    if find_compiler() is None:
-        return {}
-    lane_change = _setup(story, "iso-3888-2", 0.9, ())
-    slippery = _setup(story, "slalom", 0.57, ((110.0, 0.5),))
-    return {
-        LANE_CHANGE: _drive(story, lane_change, (FROZEN, LINEAR, ORACLE), folder / LANE_CHANGE),
-        _SLIPPERY: _drive(story, slippery, (LEARNING, FROZEN, LINEAR), folder / _SLIPPERY),
-    }
+    found: dict[str, Driven] = {}
+    for name, (path, share, drops, labels, _) in _CASES.items() if find_compiler() else ():
+        wish = SpeedWish(share, None)
+        setup = Setup(path=BUILT_IN[path](), vehicle=story.car, mu=1.0, drops=drops, wish=wish)
+        conditions = Conditions(setup=setup, delay=2, noise=True, seed=0, laps=1.0)
+        source = "frozen ones identified on the slalom"
+        drives = Drives.driven(conditions, labels, story.axle.model, source)
+        (folder / name).mkdir()
+        found[name] = Driven(drives, drives.write(folder / name, _FILM))
+    return found
 
 
-def drive_text(driven: dict[str, Driven]) -> str:
-    """Return what came of the drives, as lines of text."""
-    blocks = [f"{headline(one.conditions)}\n{drive_lines(one.runs)}" for one in driven.values()]
+def drive_text(driven: Mapping[str, Driven]) -> str:
+    blocks = [one.drives.text() for one in driven.values()]
     return "\n\n".join(["Driving on the identified tires:", *blocks]) if blocks else NOT_DRIVEN
 
 
-def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
+def drive_section(driven: Mapping[str, Driven], folder: Path) -> Section:
     heading = "The car drives on the identified tires"
     if not driven:
         return Section(heading=heading, blocks=[Paragraph(text=NOT_DRIVEN)])
-    lane, slippery = driven[LANE_CHANGE], driven[_SLIPPERY]
+    slippery = driven[_SLIPPERY]
     blocks: list[Block] = [
         Paragraph(
             text="A model predictive tracker steers the car around the cones. It plans 2 s ahead, "
@@ -74,59 +85,38 @@ def drive_section(driven: dict[str, Driven], folder: Path) -> Section:
             "others keep the tires that were frozen before, or the linear ones."
         ),
         Picture(
-            image=folder / _SLIPPERY / f"drive.{FILM}",
+            image=folder / _SLIPPERY / f"drive.{_FILM}",
             caption="The drive of the learning car; outlines are the others.",
             read=READ["film"],
         ),
-        _scores(slippery),
-        drawing(slippery.figures["errors"], "Deviation and the rest along the path.",
-                READ["errors"]),
-        *known_blocks(slippery.runs, slippery.figures),
+        *_scores(slippery, "Deviation and the rest along the path."),
+        *known_blocks(slippery.drives.runs, slippery.figures),
         Paragraph(
             text="The lane change of ISO 3888-2 at 90 % of the lateral acceleration that the tires "
             "can give: with the frozen model the tracker drives as well as with the true tires. "
-            f"The film is {LANE_CHANGE}/drive.{FILM}."
+            f"The film is {LANE_CHANGE}/drive.{_FILM}."
         ),
-        _scores(lane),
-        drawing(lane.figures["errors"], "Deviation and the rest along the lane change.",
-                READ["errors"]),
-    ]  # fmt: skip
+        *_scores(driven[LANE_CHANGE], "Deviation and the rest along the lane change."),
+    ]
     return Section(heading=heading, blocks=blocks)
 
 
-def _scores(one: Driven) -> Table:
-    caption = f"{headline(one.conditions)}."
-    return Table(caption=caption, header=SCORES, rows=score_rows(one.runs))
-
-
-def drive_numbers(driven: dict[str, Driven]) -> list[Headline]:
-    said = {
-        LANE_CHANGE: "in the lane change at 90 % of the grip",
-        _SLIPPERY: "where friction drops to half",
-    }
+def _scores(one: Driven, caption: str) -> list[Block]:
+    case = f"{headline(one.drives.conditions)}."
     return [
-        Headline(
-            " / ".join(f"{run.scores.rms_e_y_m:.3f}" for run in one.runs[:2]) + " m",
-            f"rms off the path {said[name]}, {one.runs[0].label} / {one.runs[1].label} tires",
-        )
-        for name, one in driven.items()
+        Table(caption=case, header=SCORES, rows=score_rows(one.drives.runs)),
+        drawing(one.figures["errors"], caption, READ["errors"]),
     ]
 
 
-def _setup(story: Story, path: str, share: float, drops: tuple[tuple[float, float], ...]) -> Setup:
-    return Setup(
-        path=BUILT_IN[path](), vehicle=story.car, mu=1.0, drops=drops, wish=SpeedWish(share, None)
-    )
-
-
-def _drive(story: Story, setup: Setup, labels: Sequence[str], folder: Path) -> Driven:
-    learnt = story.axle.model
-    conditions = Conditions(setup=setup, delay=DELAY, noise=True, seed=0, laps=1.0)
-    runs = [run_drive(label, conditions, learnt) for label in labels]
-    folder.mkdir()
-    inputs = inputs_of(conditions, labels, _SOURCE, learnt)
-    figures = write_drives(folder, conditions, runs, learnt, inputs, FILM)
-    return Driven(conditions, runs, figures)
+def drive_numbers(driven: Mapping[str, Driven]) -> list[Headline]:
+    numbers = []
+    for name, one in driven.items():
+        first, second = one.drives.runs[:2]
+        off = f"{first.scores.rms_e_y_m:.3f} / {second.scores.rms_e_y_m:.3f} m"
+        meaning = f"rms off the path {_CASES[name][-1]}, {first.label} / {second.label} tires"
+        numbers.append(Headline(off, meaning))
+    return numbers
 
 
 FOLDER = "package"
@@ -135,7 +125,7 @@ NOT_BUILT = (
 )
 
 
-class Check(NamedTuple):
+class _Check(NamedTuple):
     """A build of the package on this machine.
 
     precision : float or double.   verdict : of its self-test.   difference : largest of a force
@@ -150,63 +140,60 @@ class Check(NamedTuple):
 
 
 class Shipped(NamedTuple):
-    """The package, its builds here (none without a compiler) and its costs on Arm (or none)."""
+    """What was exported, and its builds here: none without a compiler."""
 
-    package: Package
-    checks: Sequence[Check]
-    costs: Sequence[Cost]
+    exported: Exported
+    checks: Sequence[_Check]
 
 
 def ship(story: Story, folder: Path) -> Shipped:
-    """Export what the axle identifier learnt, compile it and test it."""
+    """Export what the axle identifier learnt, as `tireid export` does, compile it and test it."""
     learnt, model = story.axle.runs[0], story.axle.model
-    package = build_package(learnt.design, story.car, model)
-    costs = measure(package)
-    write_files(folder, package, figures_text(costs), costs)
-    checks: list[Check] = []
+    exported = export(learnt.design, folder, start=model, vehicle=story.car)
+    name, checks = exported.package.specialized.name, list[_Check]()
     if find_compiler() is not None:
         expected = identify(learnt.recording, story.car, learnt.design, model).axle_force
-        for single in (False, True):
-            verdict = self_test(folder, package.specialized.name, single=single)
+        for precision, single in (("double", False), ("float", True)):
+            verdict = self_test(folder, name, single=single)
             assert verdict is not None
             run = CompiledPackage.from_folder(folder, single=single).run(learnt.recording)
             difference = float(np.abs(run.axle_force - expected).max())
-            precision, refused = "float" if single else "double", np.count_nonzero(run.status)
-            checks.append(Check(precision, verdict, difference, int(refused), len(run.status)))
-    return Shipped(package, checks, costs)
+            refused = int(np.count_nonzero(run.status))
+            checks.append(_Check(precision, verdict, difference, refused, len(run.status)))
+    return Shipped(exported, checks)
 
 
 def shipped_text(shipped: Shipped) -> str:
-    """Return what came of the package, as lines of text."""
-    about = shipped.package.about
-    lines = [f"As a C package ({FOLDER}/, hash {about['hash']}):"]
+    lines = [f"As a C package ({FOLDER}/, hash {shipped.exported.package.about['hash']}):"]
     lines += [
         f"  {check.precision:8} self-test {check.verdict.verdict}; over the slalom within "
         f"{check.difference:.2g} N of Python, {check.refused} samples refused"
         for check in shipped.checks
     ] or [f"  {NOT_BUILT}"]
-    lines += [
-        f"  {cost.processor}, {cost.precision}: {cost.words}"
-        for cost in shipped.costs
-        if cost.single
-    ]
+    costs = [one for one in shipped.exported.costs if one.single]
+    lines += [f"  {one.processor}, {one.precision}: {one.words}" for one in costs]
     return "\n".join(lines)
 
 
 def package_section(shipped: Shipped) -> Section:
-    name, about = shipped.package.specialized.name, shipped.package.about
-    blocks: list[Paragraph | Table] = [
+    package, costs = shipped.exported.package, shipped.exported.costs
+    blocks: list[Block] = [
         Paragraph(
             text="The axle identifier, beginning with the weights of this drive, is written as a "
             f"C99 package to the folder {FOLDER}/ beside this report: library, example, self-test "
-            f"and README, every symbol begins with {name}_; hash {about['hash']}. It is what "
-            "tireid export writes."
+            f"and README, every symbol begins with {package.specialized.name}_; hash "
+            f"{package.about['hash']}. It is what tireid export writes."
         )
     ]
     checks = [
-        [one.precision, test.verdict, test.difference, f"{one.difference:.2g}", of]
+        [
+            one.precision,
+            one.verdict.verdict,
+            one.verdict.difference,
+            f"{one.difference:.2g}",
+            f"{one.refused} of {one.samples}",
+        ]
         for one in shipped.checks
-        for test, of in [(one.verdict, f"{one.refused} of {one.samples}")]
     ]
     if checks:
         caption = (
@@ -217,13 +204,19 @@ def package_section(shipped: Shipped) -> Section:
         blocks.append(Table(caption=caption, header=header, rows=checks))
     else:
         blocks.append(Paragraph(text=NOT_BUILT))
-    if shipped.costs:
+    if costs:
         caption = f"What a step costs, {CROSS_COMPILER} -O2 in {EMULATOR}."
         header = ["processor", "precision", "instructions", "flash [B]", "RAM [B]", "stack [B]"]
         rows = [
-            [one.processor, one.precision, *(f"{n}" for n in numbers)]
-            for one in shipped.costs
-            for numbers in [(one.replay.instructions, one.flash, one.ram, one.replay.stack)]
+            [
+                one.processor,
+                one.precision,
+                str(one.replay.instructions),
+                str(one.flash),
+                str(one.ram),
+                str(one.replay.stack),
+            ]
+            for one in costs
         ]
         blocks.append(Table(caption=caption, header=header, rows=rows))
     else:

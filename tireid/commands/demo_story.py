@@ -11,16 +11,16 @@ import numpy as np
 from identifier.method import Method
 from identifier.methods import LIVE, REFERENCE, certify, make_method
 from identifier.paper.design import PaperIdentifier
-from identifier.reproducibility import Replay, force_rms, online_error
+from identifier.reproducibility import force_rms, online_error
 from identifier.run import identify
 from identifier.stability import Certificate
-from identifier.verdict import judge, judge_prediction
+from identifier.verdict import calibrated, judge, judge_prediction
 from models.maneuvers import DoubleLaneChange, Maneuver, Slalom, StepSteer
 from models.plant import Plant
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import Vehicle, sedan
-from tireid.commands.identify_results import Results
+from tireid.identified import Results
 from tireid.output import text_table
 
 SPEED = 20.0  # m/s
@@ -32,7 +32,7 @@ SENSORS = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))  # m/s and rad/
 SLALOM = Slalom(
     amplitude=np.radians(4.0), frequency=0.5, onset=2.0, rate_limit=RATE_LIMIT, duration=30.0
 )
-LANE_CHANGE = DoubleLaneChange(
+_LANE_CHANGE = DoubleLaneChange(
     amplitude=np.radians(4.5),
     frequency=0.6,
     pause=1.0,
@@ -40,14 +40,18 @@ LANE_CHANGE = DoubleLaneChange(
     rate_limit=RATE_LIMIT,
     duration=10.0,
 )
-STEP = StepSteer(amplitude=np.radians(4.0), onset=2.0, rate_limit=RATE_LIMIT, duration=8.0)
-FASTER = replace(SLALOM, amplitude=np.radians(3.5), frequency=0.6, duration=20.0)
-PREDICT: Mapping[str, Maneuver] = {"double_lane_change": LANE_CHANGE, "step_steer": STEP}
-DRIVES: Mapping[str, tuple[Maneuver, float]] = {  # and the speed [m/s]
+_STEP = StepSteer(amplitude=np.radians(4.0), onset=2.0, rate_limit=RATE_LIMIT, duration=8.0)
+_FASTER = replace(SLALOM, amplitude=np.radians(3.5), frequency=0.6, duration=20.0)
+STORY: Mapping[str, tuple[Maneuver, float]] = {  # and the speed [m/s]; to learn on is the first
+    "slalom": (SLALOM, SPEED),
+    "double_lane_change": (_LANE_CHANGE, SPEED),
+    "step_steer": (_STEP, SPEED),
+}
+DRIVES: Mapping[str, tuple[Maneuver, float]] = {
     "slalom_20": (SLALOM, 20.0),
-    "step_steer": (STEP, 20.0),
-    "lane_change": (LANE_CHANGE, 20.0),
-    "slalom_25": (FASTER, 25.0),
+    "step_steer": (_STEP, 20.0),
+    "lane_change": (_LANE_CHANGE, 20.0),
+    "slalom_25": (_FASTER, 25.0),
 }
 
 
@@ -79,78 +83,54 @@ class Story:
                 rows.setdefault(name, [name]).extend([*cells, share])
         return list(rows.values())
 
-    def side_by_side(self, drive: str) -> dict[str, Replay]:
-        """Return the replays of both methods over a drive, by the name in a legend."""
-        return {
-            "axle identifier (curves of slip)": self.axle.replays[drive],
-            "paper (network, integral law)": self.paper.replays[drive],
-        }
-
     def text(self) -> str:
-        """Return the rows as lines of text."""
         cells = ["online", "frozen", "of rms"]
-        rows = [["drive", *(f"{who} {what}" for who in ("axle,", "paper,") for what in cells)]]
-        return "\n".join(
-            [
-                "Frozen after the slalom, on validation drives: RMSE [kN]; the axle identifier "
-                "and the paper's (network, integral law)",
-                text_table([*rows, *self.rows()], "<>>>>>>", indent="  "),
-            ]
+        head = ["drive", *(f"{who} {what}" for who in ("axle,", "paper,") for what in cells)]
+        return (
+            "Frozen after the slalom, on validation drives: RMSE [kN]; the axle identifier and the "
+            "paper's (network, integral law)\n"
+            + text_table([head, *self.rows()], "<>>>>>>", indent="  ")
         )
-
-
-def drives(maneuvers: Mapping[str, Maneuver]) -> dict[str, Recording]:
-    """Drive the sedan; sensors are noisy with a fixed seed."""
-    plant, rng = Plant(sedan()), np.random.default_rng(1)
-    return {
-        name: plant.simulate(maneuver, speed=SPEED, name=name).recording(SENSORS, rng)
-        for name, maneuver in maneuvers.items()
-    }
-
-
-def drive_to_learn() -> Recording:
-    return drives({"slalom": SLALOM})["slalom"]
 
 
 def run_story(progress: Callable[[], None] = lambda: None) -> Story:
     """Drive, learn, freeze and predict, with both methods."""
     car = sedan()
-    recordings = drives({"slalom": SLALOM, **PREDICT})
+    recordings = plant_recordings(car, np.random.default_rng(1), STORY)
     design = PaperIdentifier.for_vehicle(car)
-    return Story(
-        car=car,
-        design=design,
-        axle=_learning(LIVE, make_method(LIVE, car), car, recordings, progress),
-        paper=_learning(REFERENCE, design, car, recordings, progress),
-    )
+
+    def learnt(law: str, method: Method) -> Results:
+        runs = []
+        for recording in recordings:
+            runs.append(identify(recording, car, method))
+            progress()
+        model, verdict = runs[0].freeze(FREEZE), judge(runs[0], FREEZE)
+        asked = {run.recording.name: judge_prediction(model, run.recording) for run in runs[1:]}
+        tire = calibrated(runs[0], FREEZE, verdict)
+        return Results.learnt(law, runs, [FREEZE], tire, verdict, asked)
+
+    axle, paper = learnt(LIVE, make_method(LIVE, car)), learnt(REFERENCE, design)
+    return Story(car=car, design=design, axle=axle, paper=paper)
 
 
-def _learning(
-    law: str,
-    method: Method,
-    car: Vehicle,
-    recordings: Mapping[str, Recording],
-    progress: Callable[[], None],
-) -> Results:
-    runs = []
-    for recording in recordings.values():
-        runs.append(identify(recording, car, method))
-        progress()
-    model, verdict = runs[0].freeze(FREEZE), judge(runs[0], FREEZE)
-    asked = {run.recording.name: judge_prediction(model, run.recording) for run in runs[1:]}
-    return Results.learnt(law, runs, [FREEZE], verdict, asked)
+def drive_to_learn() -> Recording:
+    """Return the story's drive that the methods learn on."""
+    slalom = {"slalom": STORY["slalom"]}
+    return plant_recordings(sedan(), np.random.default_rng(1), slalom)[0]
 
 
 def plant_recordings(
-    vehicle: Vehicle, rng: np.random.Generator | None = None
+    vehicle: Vehicle,
+    rng: np.random.Generator | None = None,
+    drives: Mapping[str, tuple[Maneuver, float]] = DRIVES,
 ) -> tuple[Recording, ...]:
     """Drive the plant of a vehicle through every maneuver.
 
-    rng : of the noise of `SENSORS`; None measures exactly.
+    rng : of the noise of `SENSORS`; None measures exactly.   drives : maneuver and speed [m/s].
     """
     plant = Plant(vehicle)
     sensors = None if rng is None else SENSORS
     return tuple(
         plant.simulate(maneuver, speed=speed, name=name).recording(sensors, rng)
-        for name, (maneuver, speed) in DRIVES.items()
+        for name, (maneuver, speed) in drives.items()
     )

@@ -11,7 +11,7 @@ from tireid.commands import COMMANDS, DONE, NOT_VALID
 from tireid.commands import options as shared
 from tireid.diagnoses import add_repair, diagnosis_text, write_doctor_report, write_repair
 from tireid.figures.forces import draw_diagnosis
-from tireid.figures.style import save_figure
+from tireid.figures.style import save_figures
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import say, tell
 
@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
     if options.out is not None:
         with output_folder(options.out, force=options.force) as folder:
             figure = draw_diagnosis(recording, vehicle, repaired, car)
-            save_figure(figure, folder / "slip.png")
+            save_figures(folder, {"slip": figure})
             write_json(folder / "summary.json", summary(diagnosis, repair, after))
             write_doctor_report(
                 folder, recording, vehicle, diagnosis, after, figure, command=options.words
@@ -70,7 +70,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _tell_repair(options: argparse.Namespace, repair: Repair, after: Diagnosis | None) -> None:
-    """Say what the repair is, and what is left after it."""
     if after is None:
         tell(f"no sure repair: with {options.repair} the log stays as it is")
         return

@@ -9,12 +9,11 @@ from tireid.animation import FORMATS, SHOWN, require_ffmpeg
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.drive_case import ALL, conditions_of, frozen_tires, labels_of
-from tireid.commands.drive_results import NO_FILM, drive_lines, headline, inputs_of, write_drives
 from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION
+from tireid.driving.results import NO_FILM, Drives, headline, write_drive_report
 from tireid.output import output_folder
 from tireid.progress import say, tell
-from tireid.reports.drive import write_drive_report
 
 _NOT_COMPLETED = 1
 _EPILOG = (
@@ -118,19 +117,11 @@ def run(options: argparse.Namespace) -> int:
         source, learnt = frozen_tires(options, labels, conditions)
         if learnt is not None:
             learnt.save(folder / "weights.json")
-        runs = [driving.run_drive(label, conditions, learnt) for label in labels]
-        inputs = inputs_of(conditions, labels, source, learnt)
-        figures = write_drives(folder, conditions, runs, learnt, inputs, options.film)
-        write_drive_report(
-            folder,
-            runs,
-            inputs,
-            figures,
-            headline=headline(conditions),
-            film=folder / f"drive.{options.film}" if options.film in SHOWN else None,
-            command=options.words,
-        )
-        declared = f"{headline(conditions)}\ntires: {source}\n{drive_lines(runs)}"
-    tell(declared)
+        drives = Drives.driven(conditions, labels, learnt, source)
+        figures = drives.write(folder, options.film)
+        film = folder / f"drive.{options.film}" if options.film in SHOWN else None
+        write_drive_report(folder, drives, figures, film, options.words)
+        case, _, scores = drives.text().partition("\n")
+    tell(f"{case}\ntires: {source}\n{scores}")
     say(f"wrote {options.out}/")
-    return 0 if runs[0].scores.completed else _NOT_COMPLETED
+    return 0 if drives.runs[0].scores.completed else _NOT_COMPLETED

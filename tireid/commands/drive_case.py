@@ -26,15 +26,15 @@ from tireid.commands.options import (
 )
 from tireid.driving import runs
 from tireid.driving.learn import learning_drive
-from tireid.driving.setup import FRICTIONS, PERIOD, Setup, SpeedWish
+from tireid.driving.setup import FRICTIONS, Setup, SpeedWish
 from tireid.learning import identify
 from tireid.progress import Progress
 from tireid.verdicts import warn_of
 
-PLAIN = 1.5  # a number without a unit up to here is a share of the grip
+_PLAIN = 1.5  # a number without a unit up to here is a share of the grip
 
 
-def parse_speed(text: str) -> SpeedWish:
+def _parse_speed(text: str) -> SpeedWish:
     """Return what --speed says.
 
     text : 90% or 0.9 of the grip, 17m/s or 60km/h.
@@ -42,7 +42,7 @@ def parse_speed(text: str) -> SpeedWish:
     value, unit = number_with_unit(text, "%", "m/s", "km/h")
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(f"--speed wants a share of the grip or a speed (90%, 17m/s), not {text!r}")
-    if unit is None and value > PLAIN:
+    if unit is None and value > _PLAIN:
         raise ValueError(f"--speed {text} has no unit: write {text}%, {text}m/s or {text}km/h")
     if unit in ("m/s", "km/h"):
         speed = value / (3.6 if unit == "km/h" else 1.0)
@@ -50,12 +50,12 @@ def parse_speed(text: str) -> SpeedWish:
             raise ValueError(f"--speed must be 3 to 100 m/s, it is {speed:.3g} m/s")
         return SpeedWish(None, speed)
     share = value / (100.0 if unit == "%" else 1.0)
-    if not 0.05 <= share <= PLAIN:
+    if not 0.05 <= share <= _PLAIN:
         raise ValueError(f"--speed must be 5 to 150 % of the grip, it is {100.0 * share:.3g} %")
     return SpeedWish(share, None)
 
 
-def parse_drop(text: str) -> tuple[float, float]:
+def _parse_drop(text: str) -> tuple[float, float]:
     """Return the place [m] and the friction from there on [-] of --mu-drop S:MU.
 
     text : such as 60:0.5.
@@ -100,7 +100,6 @@ def parse_fault(text: str, kind: str = runs.FULL) -> SensorFault:
 
 
 ALL = "all"
-_LONGEST_DELAY = 100.0  # ms
 
 
 def labels_of(words: Sequence[str]) -> list[str]:
@@ -122,14 +121,14 @@ def conditions_of(options: argparse.Namespace) -> runs.Conditions:
         path,
         vehicle=None if options.vehicle is None else read_vehicle(options),
         mu=options.mu,
-        drops=[parse_drop(text) for text in options.mu_drop],
-        wish=parse_speed(options.speed),
+        drops=[_parse_drop(text) for text in options.mu_drop],
+        wish=_parse_speed(options.speed),
     )
     hours = options.laps * setup.time_at(setup.path.s[-2]) / 3600.0
     require_few(ValueError, f"--path {path.name}", hours, "hours", "hours of driving")
     return runs.Conditions(
         setup=setup,
-        delay=_periods(options.delay),
+        delay=runs.delay_periods(1e-3 * options.delay, "--delay"),
         noise=options.noise,
         seed=seed_of(options),
         laps=options.laps,
@@ -139,18 +138,7 @@ def conditions_of(options: argparse.Namespace) -> runs.Conditions:
     )
 
 
-def _periods(delay: float) -> int:
-    periods = delay / (1e3 * PERIOD)
-    if not (0.0 <= delay <= _LONGEST_DELAY and abs(periods - round(periods)) < 1e-9):
-        raise ValueError(
-            f"--delay must be 0 to {_LONGEST_DELAY:g} ms in steps of {1e3 * PERIOD:g} ms, it is "
-            f"{delay:g}"
-        )
-    return round(periods)
-
-
 def _named_path(name: str) -> Path:
-    """Return a built-in path, or one from way-points in a file."""
     if name in BUILT_IN:
         return BUILT_IN[name]()
     if not FilePath(name).suffix:

@@ -21,16 +21,16 @@ def add_parser(commands: Any) -> None:
         "written, or none.",
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
-    text = "tire property files (PAC2002): car.tir gives car_front.tir and car_rear.tir"
-    parser.add_argument("--tir", type=Path, metavar="FILE", help=text)
-    text = "folder of a car of 1:10 for slipx 0.2.0"
-    parser.add_argument("--slipx", type=Path, metavar="DIR", help=text)
-    text = "speed, largest a_x and a_y, for raceline planners; at the lower end of the band"
-    parser.add_argument("--ggv", type=Path, metavar="FILE", help=text)
+    files = {
+        "--tir FILE": "tire property files (PAC2002): car.tir gives car_front.tir and car_rear.tir",
+        "--slipx DIR": "folder of a car of 1:10 for slipx 0.2.0",
+        "--ggv FILE": "speed, largest a_x and a_y, for raceline planners; at the lower end of the "
+        "band",
+        "--out FILE": "with --understeer: also write it as CSV",
+    }
+    shared.add_options(parser, Path, files)
     text = "print the understeer gradient over speed and a_y, with its standard deviation"
-    parser.add_argument("--understeer", action="store_true", help=text)
-    text = "with --understeer: also write it as CSV"
-    parser.add_argument("--out", type=Path, metavar="FILE", help=text)
+    shared.add_options(parser, bool, {"--understeer": text})
     shared.add_force(parser)
     parser.set_defaults(run=run)
 

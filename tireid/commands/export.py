@@ -46,10 +46,10 @@ def run(options: argparse.Namespace) -> None:
     if options.caution and not options.mpc:
         raise ValueError("--caution goes with --mpc: it is of the tracker")
     start = shared.stored_model(options.weights)
-    vehicle = shared.car_of(options, start, options.weights)
+    vehicle = shared.read_vehicle(options, start, options.weights)
     v_y = options.method != WITHOUT_V_Y
     if start is None or (v_y and shared.method_is_given(options)):
-        method = shared.chosen_method(options, vehicle, online=True).method
+        _, method = shared.chosen_method(options, vehicle, online=True)
     else:  # the one that goes on from the model
         method = continuing(start, vehicle, v_y=v_y)
     exported = export(

@@ -1,11 +1,11 @@
 """Thousands of logs in one command: learn, merge, prior for the next car, watch."""
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from identifier.tire_model import STIFFNESS
 from models.extras import needs
@@ -30,12 +30,11 @@ from tireid.fleet.watch import Watching, watch
 from tireid.output import output_folder, require_free, text_table, write_json
 from tireid.progress import Progress, Stopwatch, say, tell
 
-SHOWN = 5  # logs with errors that are named
+_SHOWN = 5  # logs with errors that are named
 _SUMMED = ("log", "run", "error", "valid", "seconds")  # columns of a row
 
 
 def add_parser(commands: Any) -> None:
-    """Add the command to the parser."""
     parser = commands.add_parser(
         "fleet",
         help=str(__doc__)[:-1].lower(),
@@ -45,10 +44,15 @@ def add_parser(commands: Any) -> None:
     )
     tasks = parser.add_subparsers(dest="task", metavar="TASK", required=True)
     _add_learn(tasks)
-    _add_merge(tasks)
-    _add_prior(tasks)
-    _add_watch(tasks)
-    _add_report(tasks)
+    for name, question in _QUESTIONS.items():
+        task = tasks.add_parser(name, help=question.help, description=question.text)
+        _add_question(task, question.by, question.out)
+        if name in ("watch", "report"):
+            _add_watching(task)
+        if name == "prior":
+            car: dict[str, Any] = {"type": Path, "required": True, "metavar": "FILE"}
+            task.add_argument("--vehicle", help="the next car, as TOML", **car)
+        task.set_defaults(run=question.run)
 
 
 def _add_learn(tasks: Any) -> None:
@@ -110,43 +114,6 @@ def _add_question(parser: argparse.ArgumentParser, by: str, out: str) -> None:
     add_force(parser)
 
 
-def _add_merge(tasks: Any) -> None:
-    parser = tasks.add_parser(
-        "merge",
-        help="one model of the logs of each group",
-        description="Add up the information of the logs, group by group; write a model of each "
-        "group, as weights.json, and a table.",
-    )
-    _add_question(parser, "vehicle,tires", "tireid-fleet-merge")
-    parser.set_defaults(run=_merge)
-
-
-def _add_prior(tasks: Any) -> None:
-    parser = tasks.add_parser(
-        "prior",
-        help="prior for the next car",
-        description="Estimate the mean and the spread of a store's cars, and write a prior to "
-        "begin with: tireid identify --weights FILE.",
-    )
-    _add_question(parser, "vehicle,tires", "prior.json")
-    car: dict[str, Any] = {"type": Path, "required": True, "metavar": "FILE"}
-    parser.add_argument("--vehicle", help="the next car, as TOML", **car)
-    parser.set_defaults(run=_prior)
-
-
-def _add_watch(tasks: Any) -> None:
-    parser = tasks.add_parser(
-        "watch",
-        help="whose tires changed, when, and the likely cause",
-        description="Compare each car's later logs with its first ones, its baseline, and tell of "
-        "changes of stiffness and friction: wear, other tires, a wet road. Exit code 1 where one "
-        "lasts. Logs are ordered by their date.",
-    )
-    _add_question(parser, "vehicle", "tireid-fleet-watch")
-    _add_watching(parser)
-    parser.set_defaults(run=_watch)
-
-
 def _add_watching(parser: argparse.ArgumentParser) -> None:
     usual = Watching()
     numbers = {
@@ -161,18 +128,6 @@ def _add_watching(parser: argparse.ArgumentParser) -> None:
 
 def _watching(options: argparse.Namespace) -> Watching:
     return Watching(**{one.name: getattr(options, one.name) for one in fields(Watching)})
-
-
-def _add_report(tasks: Any) -> None:
-    parser = tasks.add_parser(
-        "report",
-        help="a report on the store, with figures",
-        description="Write report.html: merged models, how stiffness went log by log, what "
-        "changed, and which logs were left out.",
-    )
-    _add_question(parser, "vehicle", "tireid-fleet")
-    _add_watching(parser)
-    parser.set_defaults(run=_report)
 
 
 @contextmanager
@@ -195,7 +150,7 @@ def _learn(options: argparse.Namespace) -> int:
     """Learn logs into a store; return 1 where a log could not be used."""
     clock, jobs = Stopwatch(), jobs_of(options)
     tasks, left = find_logs(options.logs, options.vehicle, options.tags, options.root)
-    for log, why in list(left.items())[:SHOWN]:
+    for log, why in list(left.items())[:_SHOWN]:
         say(f"{log}: left out, {why}")
     telling = Telling(
         log_map=given_map(options),
@@ -223,9 +178,9 @@ def _learn(options: argparse.Namespace) -> int:
     wanted = {task.log for task in tasks} | {name for _, name in became.copies}
     rows = [row for row in store.stream(_SUMMED) if row.log in wanted]
     errors = [row for row in rows if row.error]
-    for row in errors[:SHOWN]:
+    for row in errors[:_SHOWN]:
         say(f"{row.name}: {row.error}")
-    for log, name in became.copies[:SHOWN]:
+    for log, name in became.copies[:_SHOWN]:
         say(f"{log}: is in the store as {name}, of the same content")
     if became.others:
         count, first = len(became.others), became.others[0].name
@@ -276,7 +231,7 @@ class _Used:
 
 
 def _watch(options: argparse.Namespace) -> int:
-    """Tell whose tires changed; return 1 where a change lasts."""
+    """Say whose tires changed; return 1 where a change lasts."""
     from tireid.reports.fleet import write_watch_report  # draws, which learning does not
 
     watching, used = _watching(options), _Used(options)
@@ -292,7 +247,6 @@ def _watch(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
-    """Write a page on what a store holds."""
     from tireid.reports import fleet as page
 
     watching, used = _watching(options), _Used(options)
@@ -307,7 +261,6 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def _merge(options: argparse.Namespace) -> int:
-    """Merge the logs of each group into a model."""
     groups = _Used(options).groups
     with output_folder(options.out, force=options.force) as folder:
         table = []
@@ -353,7 +306,6 @@ def _table(groups: list[Merged]) -> str:
 
 
 def _prior(options: argparse.Namespace) -> int:
-    """Write prior for the next car."""
     require_free(options.out, force=options.force)
     vehicle = Vehicle.from_toml(options.vehicle)
     prior = fleet_prior(_Used(options).groups)
@@ -362,3 +314,50 @@ def _prior(options: argparse.Namespace) -> int:
     tell(f"where {vehicle.name} starts, from {prior.cars} cars:\n{model.summary()}")
     say(f"wrote {options.out}: tireid identify LOG --weights {options.out}")
     return DONE
+
+
+class _Question(NamedTuple):
+    """A task that asks a store: its help, what it groups by, what it writes, and who answers."""
+
+    help: str
+    text: str
+    by: str
+    out: str
+    run: Callable[[argparse.Namespace], int]
+
+
+_QUESTIONS = {
+    "merge": _Question(
+        "one model of the logs of each group",
+        "Add up the information of the logs, group by group; write a model of each group, as "
+        "weights.json, and a table.",
+        "vehicle,tires",
+        "tireid-fleet-merge",
+        _merge,
+    ),
+    "prior": _Question(
+        "prior for the next car",
+        "Estimate the mean and the spread of a store's cars, and write a prior to begin with: "
+        "tireid identify --weights FILE.",
+        "vehicle,tires",
+        "prior.json",
+        _prior,
+    ),
+    "watch": _Question(
+        "whose tires changed, when, and the likely cause",
+        "Compare each car's later logs with its first ones, its baseline, and report changes of "
+        "stiffness and friction: wear, other tires, a wet road. Exit code 1 where one lasts. Logs "
+        "are ordered by their date.",
+        "vehicle",
+        "tireid-fleet-watch",
+        _watch,
+    ),
+    "report": _Question(
+        "a report on the store, with figures",
+        "Write report.html: merged models, how stiffness went log by log, what changed, and which "
+        "logs were left out.",
+        "vehicle",
+        "tireid-fleet",
+        _report,
+    ),
+}

@@ -1,11 +1,13 @@
 """`tireid identify LOG --vehicle FILE --out DIR`: learn the tires of a recording, freeze them."""
 
 import argparse
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from identifier.axle.guarantee import ForceBound
 from identifier.doctor import diagnose
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
@@ -13,22 +15,22 @@ from identifier.paper.network import Weights
 from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import History, check_recording
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, judge, judge_prediction
+from identifier.verdict import Verdict, calibrated, guaranteed, judge, judge_prediction
 from models.recordings import Recording, Repair, check_against_vehicle, check_physics, joined
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.certificate_table import resumed_line, verdict_line
-from tireid.commands.identify_results import AskedBound, Results, file_name, guaranteed_text
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.figures.style import paper_design
+from tireid.identified import Results, file_name
 from tireid.learning import identify, with_v_y
 from tireid.output import output_folder, require_curves, require_free, write_json
 from tireid.progress import Progress, say, tell
-from tireid.reports.identify import side_slip_text, write_identify_report
-from tireid.verdicts import asked_text, verdict_text
+from tireid.reports.identify import guaranteed_text, side_slip_text, write_identify_report
+from tireid.verdicts import verdict_text, verdicts_text
 
-LEARNING, _JUDGING, DRAWING = "learning", "replays and verdict", "curves and figures"
+_LEARNING, _JUDGING, _DRAWING = "learning", "replays and verdict", "curves and figures"
 
 
 def add_parser(commands: Any) -> None:
@@ -76,14 +78,14 @@ def run(options: argparse.Namespace) -> int:
     vehicle = shared.read_vehicle(options)
     seed = None if options.seed is None else shared.seed_of(options)
     beside = options.network is not None  # of which something learns online
-    law, design = shared.chosen_method(options, vehicle, seed, online=beside)
-    if options.network is not None and options.freeze is not None:
+    if beside and options.freeze is not None:
         raise ValueError("--freeze is for identified models: the network of --network is frozen")
-    bound = None if options.bound is None else AskedBound.of(options.bound)
-    if bound is not None and options.network is not None:
+    if beside and options.bound is not None:
         raise ValueError(
             "--bound is for identified models: a network has no set of possible weights"
         )
+    bound = _force_bound(options.bound or ())
+    law, design = shared.chosen_method(options, vehicle, seed, online=beside)
     start = shared.stored_model(options.weights)
     if options.run_name is not None and len(options.logs) > 1:
         raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
@@ -95,11 +97,6 @@ def run(options: argparse.Namespace) -> int:
     _require_distinct([*logs, *others])
     recording = joined(logs)
     without_v_y = any(one.v_y is None for one in (*logs, *others))
-    if without_v_y:
-        law, design = shared.chosen_method(options, vehicle, seed, without_v_y=True, online=beside)
-        say(f"a log has no lateral velocity: {law} learns, and estimates it")
-    for one in (*logs, *others):
-        check_recording(one, design)
     say("the doctor looks at the log")
     diagnosis = diagnose(recording, vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()
@@ -107,11 +104,14 @@ def run(options: argparse.Namespace) -> int:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         recording = joined(logs)
         vehicle = repair.on(vehicle)
-        law, design = shared.chosen_method(
-            options, vehicle, seed, without_v_y=without_v_y, online=beside
-        )
-    if options.repair is not None and not options.no_check:
-        for one in (*logs, *others):
+    law, design = shared.chosen_method(
+        options, vehicle, seed, without_v_y=without_v_y, online=beside
+    )
+    if without_v_y:
+        say(f"a log has no lateral velocity: {law} learns, and estimates it")
+    for one in (*logs, *others):
+        check_recording(one, design)
+        if options.repair is not None and not options.no_check:
             check_physics(one)
             check_against_vehicle(one, vehicle)
     network = shared.network_model(options, vehicle, design.min_speed)
@@ -122,7 +122,7 @@ def run(options: argparse.Namespace) -> int:
     if start is not None and start.scales_with_load and not start.vehicle.moves_as(vehicle):
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     count = 1.0 + len(others)
-    parts = {LEARNING: 1.0 + count, _JUDGING: count, DRAWING: 2.0 + 3.0 * count}
+    parts = {_LEARNING: 1.0 + count, _JUDGING: count, _DRAWING: 2.0 + 3.0 * count}
     with (
         output_folder(options.out, force=options.force) as folder,
         Progress("identify", parts) as progress,
@@ -138,7 +138,7 @@ def run(options: argparse.Namespace) -> int:
             )
             say(f"learnt {law} over {one.name}")
         progress.begin(_JUDGING)
-        learnt, closing = runs[0], ""
+        learnt, last, closing = runs[0], freeze_times[-1], ""
         if network is not None:
             verdict = with_doctor(judge_prediction(network, learnt.recording), diagnosis, repair)
             asked, file = _asked(network, others), options.network.name
@@ -147,31 +147,22 @@ def run(options: argparse.Namespace) -> int:
             for t in freeze_times:
                 _require_tires(learnt, t)
             pieces = learnt.parts(logs) if len(logs) > 1 else []
-            verdict = with_doctor(judge(learnt, freeze_times[-1]), diagnosis, repair)
-            asked = _asked(learnt.freeze(freeze_times[-1]), others)
-            found = Results.learnt(law, runs, freeze_times, verdict, asked, pieces, bound)
-            closing = _closing_line(learnt, freeze_times[-1], vehicle, resumed=start is not None)
-        figures = found.write(folder, curves=options.curves, progress=progress.begin(DRAWING))
+            verdict = with_doctor(judge(learnt, last), diagnosis, repair)
+            asked = _asked(learnt.freeze(last), others)
+            tire = calibrated(learnt, last, verdict)
+            if options.bound is not None:
+                tire = guaranteed(learnt, bound, last, tire)
+            found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
+            closing = _closing_line(learnt, last, vehicle, resumed=start is not None)
+        figures = found.write(folder, curves=options.curves, progress=progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
-        write_identify_report(
-            folder,
-            law,
-            found.model,
-            runs,
-            found.by_label,
-            figures,
-            verdict,
-            found.parts,
-            diagnosis=diagnosis,
-            command=options.words,
-            asked=asked,
-        )
+        write_identify_report(folder, found, figures, diagnosis, options.words)
         given = (
             found.table(),
             closing,
-            "" if bound is None else guaranteed_text(found.model),
+            "" if options.bound is None else guaranteed_text(found.model),
             doctor_text(diagnosis, repair, options.repair),
-            asked_text(asked),
+            verdicts_text(asked, "replayed on"),
             verdict_text(verdict),
         )
     if repair:
@@ -180,6 +171,21 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join(part for part in given if part))
     say(f"wrote {options.out}/")
     return max(shared.exit_code(one, options) for one in (verdict, *asked.values()))
+
+
+def _force_bound(numbers: Sequence[float]) -> ForceBound | None:
+    """Return the bound of --bound: error [static axle loads] and lateness [s]; None estimates it.
+
+    numbers : the two, or the first of them, or none.
+    """
+    if len(numbers) > 2:
+        raise ValueError(
+            f"--bound takes an error and a lateness, it was given {len(numbers)} numbers"
+        )
+    if not numbers:
+        return None
+    error, late = (*numbers, 0.0)[:2]
+    return ForceBound(error=(error, error), lateness=(late, late))
 
 
 def _asked(model: TireModel, others: list[Recording]) -> dict[str, Verdict]:

@@ -12,7 +12,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from identifier.method import Method
 from identifier.methods import (
@@ -63,33 +63,33 @@ def add_vehicle(
     parser.add_argument("--vehicle", required=required, type=Path, metavar="FILE", help=text)
 
 
-def read_vehicle(options: argparse.Namespace) -> Vehicle:
-    """Return the car of --vehicle, the sedan without, and say what of it is estimated."""
+def read_vehicle(
+    options: argparse.Namespace, model: TireModel | None = None, source: Path | None = None
+) -> Vehicle:
+    """Return the car of --vehicle, without it that of a model or the sedan, as --log repairs it.
+
+    What of it is estimated or repaired is said.
+
+    source : the file of the model.
+    """
     path: Path | None = options.vehicle
     if path is not None and path.suffix.lower() != ".toml":
         raise ValueError(
             f"--vehicle {path}: must be the .toml of a car, by its ending; tireid init writes one "
             "to fill in"
         )
-    vehicle = sedan() if options.vehicle is None else Vehicle.from_toml(options.vehicle)
-    say_estimates(vehicle, options.vehicle)
-    return repaired_vehicle(vehicle, options)
-
-
-def say_estimates(vehicle: Vehicle, source: Path | None) -> None:
-    """Say which numbers of a car are estimated, where any are: once in a command."""
+    known = sedan() if model is None else model.vehicle
+    vehicle = known if path is None else Vehicle.from_toml(path)
     if vehicle.estimates:
-        say(f"{source}: {vehicle.estimates}")
-
-
-def repaired_vehicle(vehicle: Vehicle, options: argparse.Namespace) -> Vehicle:
-    """Return a car with the numbers that the repair of --log tells of it, and say which."""
-    path = _map_path(options)
-    numbers: dict[str, Any] = {} if path is None else dict(LogMap.from_toml(path).repair.vehicle)
+        say(f"{source if path is None else path}: {vehicle.estimates}")
+    mended = _map_path(options)
+    numbers: dict[str, Any] = (
+        {} if mended is None else dict(LogMap.from_toml(mended).repair.vehicle)
+    )
     if not numbers:
         return vehicle
     said = ", ".join(f"{name} = {value:.6g}" for name, value in numbers.items())
-    say(f"{path} repairs the car: {said}")
+    say(f"{mended} repairs the car: {said}")
     return replace(vehicle, **numbers)
 
 
@@ -109,7 +109,6 @@ def add_force(parser: argparse.ArgumentParser) -> None:
 
 
 def add_accept(parser: argparse.ArgumentParser) -> None:
-    """Add the option that takes an answer as it is."""
     text = f"exit with 0 where the verdict is not valid, in place of {NOT_VALID}"
     parser.add_argument("--accept", action="store_true", help=text)
 
@@ -123,16 +122,7 @@ def stored_model(path: Path | None) -> TireModel | None:
     return model
 
 
-def car_of(options: argparse.Namespace, model: TireModel | None, source: Path | None) -> Vehicle:
-    """Return the car of --vehicle; where it is not given that of a model, if there is one."""
-    if model is None or options.vehicle is not None:
-        return read_vehicle(options)
-    say_estimates(model.vehicle, source)
-    return repaired_vehicle(model.vehicle, options)
-
-
 def require_toml(path: Path) -> None:
-    """Refuse a file to write whose name does not say that it is TOML."""
     if path.suffix.lower() != ".toml":
         raise ValueError(f"{path}: the name must end in .toml")
 
@@ -206,13 +196,6 @@ def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
     add_options(parser, Path, {"--design FILE": "design.toml, in place of --method"})
 
 
-class Chosen(NamedTuple):
-    """A method by the name that results are given under."""
-
-    name: str
-    method: Method
-
-
 def require_one(options: argparse.Namespace, *words: str) -> bool:
     """Refuse more than one of some options; return whether there is one."""
     given = [word for word in words if getattr(options, word)]
@@ -233,8 +216,8 @@ def chosen_method(
     *,
     without_v_y: bool = False,
     online: bool = False,
-) -> Chosen:
-    """Return what --method, --paper or --design say, the default where none is given.
+) -> tuple[str, Method]:
+    """Return what --method, --paper or --design say, by the name of its results, or the default.
 
     seed : of initial weights; None where nobody asks for one.
     without_v_y : whether a log has no lateral velocity, which changes the default.
@@ -245,12 +228,12 @@ def chosen_method(
         if seed is not None:
             raise ValueError(f"--seed is for a method: the seed of a design is in {options.design}")
         design = read_design(options.design)
-        return Chosen(design.law, design)
+        return design.law, design
     usual = (WITHOUT_V_Y if without_v_y else LIVE) if online else DEFAULT
     name = options.method or (REFERENCE if options.paper else usual)
     if seed is not None and not draws_weights(name):
         raise ValueError(f"--seed is of random initial weights, and {name} begins with none")
-    return Chosen(name, make_method(name, vehicle, seed or 0))
+    return name, make_method(name, vehicle, seed or 0)
 
 
 def add_log_reading(parser: argparse.ArgumentParser) -> None:
@@ -361,7 +344,6 @@ _CONVENTIONS = (
 
 
 def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option and what belongs to it."""
     group = parser.add_argument_group("your tire network", _CONVENTIONS)
     add_options(group, Path, {"--network FILE.onnx": what})
     text = f"what its columns are, in order, of {', '.join(SIGNALS)}"

@@ -21,18 +21,18 @@ from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import verdict_line
 from tireid.commands.options import add_output
 from tireid.figures.forces import force_figure
-from tireid.figures.paper import comparison_figure
-from tireid.figures.scheme import scheme_figure
+from tireid.figures.paper import SCHEME, comparison_figure
 from tireid.figures.style import save_figures
 from tireid.output import output_folder, text_table, write_json
 from tireid.progress import Progress, say, tell
+from tireid.report import Table, printed
 
 # What the paper prints in its Tables I and II: RMSE of the axle force [kN].
 #
 # Its gains, its car and its simulator are not public: these numbers stand beside ours, they are not
 # reproduced.
 
-PAPER: Mapping[str, Mapping[str, Mapping[str, float]]] = {
+_PAPER: Mapping[str, Mapping[str, Mapping[str, float]]] = {
     "step_steer": {  # Table I
         "instantaneous": {"online": 0.2690, "32": 0.6506, "35": 0.6488},
         "integral": {"online": 0.4077, "32": 0.5562, "35": 0.5015},
@@ -48,11 +48,11 @@ PAPER: Mapping[str, Mapping[str, Mapping[str, float]]] = {
 # The paper's values of frozen weights stand beside the measure that its section IV-A defines, the
 # past against the online output.
 
-TITLES = {
+_TITLES = {
     "step_steer": "Table I, step steer: RMSE of the axle force [kN]",
     "slalom": "Table II, slalom: RMSE of the axle force [kN]",
 }
-MEASURES = {
+_MEASURES = {
     paper_study.PAST_ONLINE: "past, against online (the paper's measure)",
     paper_study.PAST: "past, against truth",
     paper_study.AFTER: "after, against truth",
@@ -75,16 +75,16 @@ MEANING = (
 )
 
 
-def row_labels(maneuver: str) -> dict[str, str]:
+def _row_labels(maneuver: str) -> dict[str, str]:
     """Return the label of every row of a table, by its column in the study."""
     labels = {paper_study.ONLINE: "online, against truth"}
     for t in paper_study.FREEZES[maneuver]:
-        for measure, words in MEASURES.items():
+        for measure, words in _MEASURES.items():
             labels[paper_study.frozen_column(measure, t)] = f"frozen at {freeze_key(t)} s: {words}"
     return {name: labels[name] for name in paper_study.columns(maneuver)}
 
 
-def printed_values(maneuver: str) -> dict[str, dict[str, float]]:
+def _printed_values(maneuver: str) -> dict[str, dict[str, float]]:
     """Return what the paper prints by law and column, beside the measure that it defines [kN]."""
     beside = {paper_study.ONLINE: paper_study.ONLINE}
     beside |= {
@@ -93,19 +93,19 @@ def printed_values(maneuver: str) -> dict[str, dict[str, float]]:
     }
     return {
         law: {beside[name]: value for name, value in row.items()}
-        for law, row in PAPER[maneuver].items()
+        for law, row in _PAPER[maneuver].items()
     }
 
 
-def rows(maneuver: str, study: paper_study.Study) -> list[list[str]]:
+def _rows(maneuver: str, study: paper_study.Study) -> list[list[str]]:
     """Return the cells of a table: the label, and ours and the paper's value for each law.
 
     Medians and quartiles are those of the seeds that did not diverge; the last row counts those
     that did.
     """
-    table, paper = study.tables()[maneuver], printed_values(maneuver)
+    table, paper = study.tables()[maneuver], _printed_values(maneuver)
     cells = []
-    for name, label in row_labels(maneuver).items():
+    for name, label in _row_labels(maneuver).items():
         row = [label]
         for law in paper_study.LAWS:
             if table[law]:
@@ -123,19 +123,22 @@ def rows(maneuver: str, study: paper_study.Study) -> list[list[str]]:
     return [*cells, ["seeds that diverged", *(cell for pair in counts for cell in pair)]]
 
 
-def header() -> list[str]:
-    """Return the head of the table's columns."""
+def _header() -> list[str]:
     names = ["condition"]
     for law in paper_study.LAWS:
         names += [VARIANTS[law].title, "" if VARIANTS[law].scaled else "paper"]
     return names
 
 
+def study_table(maneuver: str, study: paper_study.Study, caption: str) -> Table:
+    head = [printed(word) for word in _header()]
+    return Table(caption=caption, header=head, rows=_rows(maneuver, study))
+
+
 def table_text(maneuver: str, study: paper_study.Study) -> str:
-    """Return a table as lines of text, with the number of seeds."""
-    lines = [header(), *rows(maneuver, study)]
+    lines = [_header(), *_rows(maneuver, study)]
     seeds = len(study.errors[maneuver]["integral"])
-    title = f"{TITLES[maneuver]}, median (quartiles) of {seeds} seeds"
+    title = f"{_TITLES[maneuver]}, median (quartiles) of {seeds} seeds"
     return "\n".join([title, text_table(lines, indent="  "), ""])
 
 
@@ -153,8 +156,7 @@ def settings(gains: Gains, network: Network) -> str:
     )
 
 
-SCHEME = "fig1_scheme"
-FIGURES = {  # number of the paper's figure, by maneuver and law
+_FIGURES = {  # number of the paper's figure, by maneuver and law
     ("step_steer", "instantaneous"): "fig2",
     ("step_steer", "integral"): "fig3",
     ("slalom", "instantaneous"): "fig4",
@@ -163,13 +165,11 @@ FIGURES = {  # number of the paper's figure, by maneuver and law
 
 
 def _study_text(study: paper_study.Study) -> str:
-    """Return the tables, every gain, and the verdict of each law's certificate as lines of text."""
     tables = [table_text(maneuver, study) for maneuver in study.errors]
-    return "\n".join([*tables, settings(paper_study.GAINS, paper_study.NETWORK), *verdicts()])
+    return "\n".join([*tables, settings(paper_study.GAINS, paper_study.NETWORK), *_verdicts()])
 
 
-def verdicts() -> list[str]:
-    """Return for each law one line with the verdict on the gains of the study."""
+def _verdicts() -> list[str]:
     return [
         f"{VARIANTS[law].title}: {verdict_line(certify(design, sedan()))}"
         for law in paper_study.LAWS
@@ -183,7 +183,8 @@ def write_study(folder: Path, study: paper_study.Study) -> dict[str, Figure]:
     write_json(folder / "diverged.json", study.diverged())
     write_file(folder / "tables.txt", _study_text(study) + "\n")
     say("drawing figures")
-    figures = {SCHEME: scheme_figure()}
+    write_file(folder / SCHEME.name, SCHEME.read_bytes())
+    figures: dict[str, Figure] = {}
     for maneuver in study.errors:
         figures |= _draw(study, maneuver)
     return save_figures(folder, figures)
@@ -199,7 +200,7 @@ def _draw(study: paper_study.Study, maneuver: str) -> dict[str, Figure]:
     }
     printed = {
         law: {labels[name]: value for name, value in row.items()}
-        for law, row in printed_values(maneuver).items()
+        for law, row in _printed_values(maneuver).items()
     }
     if any(results.values()):
         figures[f"{maneuver}_errors"] = comparison_figure(results, printed)
@@ -210,7 +211,7 @@ def _draw(study: paper_study.Study, maneuver: str) -> dict[str, Figure]:
         if trial is None:
             say(f"{maneuver}: the {law} law diverged on every seed, no figure")
             continue
-        label = FIGURES.get((maneuver, law), "control")
+        label = _FIGURES.get((maneuver, law), "control")
         figures[f"{label}_{maneuver}_{law}"] = force_figure(
             trial.history, trial.replays, window=window, since=onset
         )
@@ -227,7 +228,7 @@ def _compared(maneuver: str) -> dict[str, str]:
     return labels
 
 
-_STUDY, DRAWING = "the study", "figures"
+_STUDY, _DRAWING = "the study", "figures"
 
 
 def add_parser(commands: Any) -> None:
@@ -246,7 +247,7 @@ def run(options: argparse.Namespace) -> None:
     if options.seeds < 1:
         raise ValueError(f"--seeds must be at least 1, it is {options.seeds}")
     require_few(ValueError, "--seeds", options.seeds, "runs", "runs")
-    parts = {_STUDY: float(options.seeds), DRAWING: 10.0}
+    parts = {_STUDY: float(options.seeds), _DRAWING: 10.0}
     with (
         output_folder(options.out, force=options.force) as folder,
         Progress("paper", parts, long=True) as progress,
@@ -254,7 +255,7 @@ def run(options: argparse.Namespace) -> None:
         study = paper_study.run_study(
             options.seeds, partial(progress.begin(_STUDY).step, paper_study.STEPS)
         )
-        progress.begin(DRAWING)
+        progress.begin(_DRAWING)
         write_study(folder, study)
         text = (folder / "tables.txt").read_text(encoding="utf-8").rstrip("\n")
     tell(text)

@@ -3,14 +3,16 @@
 import argparse
 import math
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from codegen.arrays import Array
 from identifier.frozen import vehicle_numbers
-from identifier.plan import STEERING_LAG, Plan, hold_of
+from identifier.plan import STEERING_LAG, Plan, Rehearsal, Rival, hold_of
 from identifier.plan.search import REAR
 from models.files import digest
 from models.rules import require_positive, require_within
@@ -22,10 +24,11 @@ from tireid.figures.plan import plan_area_figure, plan_band_figure, plan_steerin
 from tireid.figures.style import save_figures
 from tireid.output import output_folder, text_table, write_csv, write_json
 from tireid.progress import Progress, say, tell
-from tireid.reports.plan import RIVALS, plan_words, rival_rows, write_plan_report
+from tireid.report import Headline, Paragraph, Report, Section, Table, write_report
+from tireid.reports.common import READ, REPORT, drawing, origin
 
-PERIOD = 0.01  # s, of steering.csv
-RUN_UP = 1.0  # s straight ahead, before each pass
+_PERIOD = 0.01  # s, of steering.csv
+_RUN_UP = 1.0  # s straight ahead, before each pass
 
 
 def add_parser(commands: Any) -> None:
@@ -71,15 +74,14 @@ def add_parser(commands: Any) -> None:
     parser.set_defaults(run=run)
 
 
-def run(options: argparse.Namespace) -> int:
-    """Run the command; return 0."""
-    area, speed = parse_area(options.area), parse_speed(options.speed)
+def run(options: argparse.Namespace) -> None:
+    area, speed = _parse_area(options.area), _parse_speed(options.speed)
     ratio, rate = options.steering_ratio, options.steering_rate
     if ratio is not None and not 1.0 <= ratio <= 100.0:
         raise ValueError(f"--steering-ratio must be 1 to 100, it is {ratio:g}")
     _require_ranges(options)
     seed, model = shared.seed_of(options), shared.stored_model(options.after)
-    vehicle = shared.car_of(options, model, options.after)
+    vehicle = shared.read_vehicle(options, model, options.after)
     with output_folder(options.out, force=options.force) as folder:
         with Progress("planning") as progress:
             found = planning.plan(
@@ -98,9 +100,12 @@ def run(options: argparse.Namespace) -> int:
                 seed=seed,
                 progress=progress,
             )
-        driven = planning.rehearsals(found)
-        inputs = inputs_of(options, vehicle, area, speed)
-        _write_plan(folder, found, inputs, ratio)
+        driven, inputs = planning.rehearsals(found), _inputs_of(options, vehicle, area, speed)
+        write_csv(folder / "steering.csv", _steering_columns(found, ratio))
+        for k in range(len(found.passes)):
+            name = "path.csv" if k == 0 else f"path_{k + 1}.csv"
+            write_csv(folder / name, _path_columns(found, k))
+        write_json(folder / "summary.json", _summary(found, inputs))
         figures = {
             "area": plan_area_figure(found),
             "steering": plan_steering_figure(found, ratio),
@@ -112,7 +117,6 @@ def run(options: argparse.Namespace) -> int:
         )
     tell("\n".join([*plan_words(found, driven), text_table([RIVALS, *rival_rows(found)], "<>>>")]))
     say(f"wrote {options.out}/")
-    return 0
 
 
 def _require_ranges(options: argparse.Namespace) -> None:
@@ -131,7 +135,7 @@ def _require_ranges(options: argparse.Namespace) -> None:
         require_positive(ValueError, **{"--steering-rate": options.steering_rate})
 
 
-def parse_area(text: str) -> tuple[float, float]:
+def _parse_area(text: str) -> tuple[float, float]:
     """Return length and width [m] of --area.
 
     text : such as 40x40 or 60x20.5m.
@@ -148,7 +152,7 @@ def parse_area(text: str) -> tuple[float, float]:
     return sides[0], sides[1]
 
 
-def parse_speed(text: str) -> float:
+def _parse_speed(text: str) -> float:
     """Return the speed [m/s] of --speed: 15, 15m/s or 54km/h."""
     value, unit = shared.number_with_unit(text, "m/s", "km/h")
     speed = value / (3.6 if unit == "km/h" else 1.0)
@@ -157,7 +161,7 @@ def parse_speed(text: str) -> float:
     return speed
 
 
-def inputs_of(
+def _inputs_of(
     options: argparse.Namespace, vehicle: Vehicle, area: tuple[float, float], speed: float
 ) -> dict[str, Any]:
     """Return all that went into a plan, ready for JSON.
@@ -184,11 +188,11 @@ def inputs_of(
 def _steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
     """Return the columns of steering.csv: pass by pass from its entry on, with the course.
 
-    ratio : hand wheel over front wheels; None tells no hand wheel.
+    ratio : hand wheel over front wheels; None gives no hand wheel.
     """
     rows = []
     for k, one in enumerate(found.passes):
-        t = PERIOD * np.arange(round(one.steering.duration / PERIOD) + 1, dtype=np.float64)
+        t = _PERIOD * np.arange(round(one.steering.duration / _PERIOD) + 1, dtype=np.float64)
         delta = one.steering.steering(t)[:, 0]
         r = np.interp(t, one.t, one.motion.r[:, 0, 0])
         held = np.full(t.size, found.space.speed)
@@ -209,22 +213,12 @@ def _path_columns(found: Plan, k: int) -> dict[str, Array]:
     step = 0.4 * car.wheelbase / found.space.speed
     t = np.linspace(0.0, one.steering.duration, max(8, round(one.steering.duration / step)))
     X, Y, psi = one.course(t).T
-    back = np.arange(round(RUN_UP / step), 0, -1) * step * found.space.speed
+    back = np.arange(round(_RUN_UP / step), 0, -1) * step * found.space.speed
     before = X[0] - back * np.cos(psi[0]), Y[0] - back * np.sin(psi[0])
     return {"X_m": np.append(before[0], X), "Y_m": np.append(before[1], Y)}
 
 
-def _write_plan(folder: Path, found: Plan, inputs: dict[str, Any], ratio: float | None) -> None:
-    """Write steering.csv, a path for each pass and summary.json."""
-    write_csv(folder / "steering.csv", _steering_columns(found, ratio))
-    for k in range(len(found.passes)):
-        name = "path.csv" if k == 0 else f"path_{k + 1}.csv"
-        write_csv(folder / name, _path_columns(found, k))
-    write_json(folder / "summary.json", summary(found, inputs))
-
-
-def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
-    """Return what summary.json holds."""
+def _summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
     slips, before, after = found.deviations()
     hold = hold_of(found.tires, found.space.speed)
     return {
@@ -255,3 +249,160 @@ def summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
         "hash": digest(inputs),
         "version": __version__,
     }
+
+
+_PULL = 3.0  # m/s², of a car that comes to speed, and of one that stops
+
+
+def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
+    """Return what to expect and what is safe, as sentences."""
+    space, count = found.space, len(found.passes)
+    each = found.time / count
+    times = f"one pass of {each:.1f} s" if count == 1 else f"{count} passes of {each:.1f} s"
+    said = [
+        f"{times} at {space.speed:.3g} m/s in {space.length:g} x {space.width:g} m: the expected "
+        f"error of the forces falls from {100.0 * found.error_before:.0f} to "
+        f"{100.0 * found.error:.1f} % of the grip."
+    ]
+    slalom = found.rivals[0]
+    said.append(_against(slalom, found))
+    distance = space.speed**2 / (2.0 * _PULL)
+    said.append(
+        f"Up to {found.lateral_acceleration:.1f} m/s² sideways, {100.0 * space.share:.0f} % of the "
+        f"grip of the likely tires; the car stays {found.clearance:.2g} m from the edge with "
+        f"every tire that it may have. It comes in at speed, about {distance:.0f} m of run-up, and "
+        f"needs as much to stop behind the area."
+    )
+    if driven:
+        side_slip = max(one.side_slip for one in driven)
+        said.append(
+            f"Rehearsed on the double-track car of the vehicle file: {_least(driven):.2g} m from "
+            f"the edge, side slip up to {math.degrees(side_slip):.1f} degrees."
+        )
+    return said
+
+
+def _least(driven: Sequence[Rehearsal]) -> float:
+    """Return the least distance to the edge in rehearsals [m]."""
+    return min(one.clearance for one in driven)
+
+
+def _against(slalom: Rival, found: Plan) -> str:
+    """Return what a slalom would need."""
+    later = "is not as good in ten times of it"
+    if math.isfinite(slalom.catches_up):
+        length = slalom.length * slalom.catches_up / found.time
+        later = f"is as good after {slalom.catches_up:.0f} s, {length:.0f} m"
+    return (
+        f"A slalom at the same share of the grip leaves {100.0 * slalom.error:.1f} % in that time, "
+        f"and {later}."
+    )
+
+
+def write_plan_report(
+    folder: Path,
+    found: Plan,
+    figures: Mapping[str, Figure],
+    *,
+    inputs: Mapping[str, Any],
+    command: str,
+    driven: Sequence[Rehearsal],
+) -> None:
+    words = plan_words(found, driven)
+    report = Report(
+        title=f"Maneuver in {found.space.length:g} x {found.space.width:g} m",
+        summary=words[0],
+        numbers=[
+            Headline(f"{100.0 * found.error:.1f} %", "expected error of the forces over the grip"),
+            Headline(f"{100.0 * found.error_before:.0f} %", "before it"),
+            Headline(f"{100.0 * found.rivals[0].error:.1f} %", "after a slalom of that length"),
+            Headline(f"{found.clearance:.2g} m", "least distance to the edge"),
+        ],
+        warnings=_plan_warnings(found, driven),
+        sections=[
+            Section(
+                heading="Maneuver",
+                blocks=[
+                    drawing(figures["area"], "Passes in the area.", READ["plan_area"]),
+                    drawing(figures["steering"], "Steering.", READ["plan_steering"]),
+                    Paragraph(text=_how(found)),
+                ],
+            ),
+            Section(
+                heading="Expected gain",
+                blocks=[
+                    drawing(
+                        figures["band"], "The band of 90 % before and after.", READ["plan_band"]
+                    ),
+                    Paragraph(text=words[1]),
+                    Table(
+                        caption="The plan and maneuvers of the same length at the same share of "
+                        "the grip, error over the grip; their room is that on an open field, "
+                        "without margins; random is the median of eight.",
+                        header=RIVALS,
+                        rows=rival_rows(found),
+                    ),
+                ],
+            ),
+            Section(heading="Safety", blocks=[Paragraph(text=text) for text in words[2:]]),
+            origin(
+                command,
+                found.tires.vehicle,
+                (),
+                all_inputs=f"hash {digest(dict(inputs))}, listed in summary.json",
+            ),
+        ],
+    )
+    write_report(folder / REPORT, report)
+
+
+def _plan_warnings(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
+    said = [
+        "Drive on a closed field only, at half the speed first: tires outside of what was taken "
+        "for possible, a wet place or a lower speed change the way."
+    ]
+    if not found.space.held:
+        said.append("Open loop: disturbances of the course are not corrected.")
+    if driven and _least(driven) < 0.0:
+        said.append(
+            f"The double-track car of the vehicle file leaves the area by {-_least(driven):.2g} m: "
+            "its tires are outside the planned set. Set --mu, or ask for less --grip."
+        )
+    return said
+
+
+def _how(found: Plan) -> str:
+    """Return how steering.csv is to be driven."""
+    space, lag = found.space, 1e3 * float(found.tires.steering_lag[0])
+    paths = "path.csv" if len(found.passes) == 1 else "path.csv, path_2.csv, ..."
+    how = (
+        "steering.csv has the front wheel angle [rad], to the left positive, over the time since "
+        "the entry of each pass, and the course of the center of gravity that follows: X along "
+        "the longer side of the area, Y to the left of it, both from the corner in which the "
+        f"area begins, psi from X to the left. The wheels follow over {lag:.0f} ms. The speed is "
+        f"constant. {paths}: the course with a straight run-up, as tireid drive --path path.csv "
+        f"--speed {space.speed:g}m/s and other path trackers read it; who tracks it well steers "
+        "much the same."
+    )
+    if not space.held:
+        return how
+    hold = hold_of(found.tires, space.speed)
+    return (
+        f"{how} The robot or driver of steering.csv also corrects the course, slowly: add "
+        f"{hold.heading:.3g} rad per rad of heading that is missing and {hold.aside:.3g} rad per "
+        "meter that the car is off to the right."
+    )
+
+
+RIVALS = ("maneuver", "time", "room", "expected error")
+
+
+def rival_rows(found: Plan) -> list[list[str]]:
+    """Return the plan beside slalom and random steering, under `RIVALS`."""
+    space, time = found.space, f"{found.time:.1f} s"
+    room = f"{space.length:g} x {space.width:g} m"
+    rows = [["plan", time, room, f"{100.0 * found.error:.1f} %"]]
+    for one in found.rivals:
+        room = f"{one.length:.0f} x {one.width:.1f} m"
+        rows.append([one.name, time, room, f"{100.0 * one.error:.1f} %"])
+    return rows

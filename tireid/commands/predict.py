@@ -1,6 +1,7 @@
 """`tireid predict MODEL LOG`: the axle forces of a drive by a stored model, and what they miss."""
 
 import argparse
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,18 +17,36 @@ from identifier.prediction import Prediction
 from identifier.reproducibility import beyond_known
 from identifier.tire_model import UNCALIBRATED, TireModel
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
+from identifier.verdict.verdict import PERCENT
+from models.files import digest
 from tireid import __version__, output
+from tireid import report as page
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
-from tireid.commands.identify_results import error_cells
 from tireid.figures.forces import prediction_figure
 from tireid.figures.predict import friction_figure, motion_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import slip_figure
+from tireid.identified import error_cells
 from tireid.learning import replay
 from tireid.progress import say, tell
-from tireid.reports.predict import write_predict_report
-from tireid.verdicts import verdict_text
+from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.reports.identify import (
+    asked_warnings,
+    band_sentence,
+    curve_drawing,
+    guaranteed_sentence,
+)
+from tireid.verdicts import (
+    known_headline,
+    missed_headline,
+    of_answer,
+    stored_warning,
+    verdict_headline,
+    verdict_section,
+    verdict_text,
+    verdict_warnings,
+)
 
 
 def add_parser(commands: Any) -> None:
@@ -64,29 +83,34 @@ def run(options: argparse.Namespace) -> int:
     recording = prediction.recording
     if recording.estimated:
         say(f"{recording.name}: vy is estimated, beginning with the tires of the model")
-    verdict = prediction.verdict
-    facts, friction = Facts.of(prediction), verdict.friction
+    verdict, facts = prediction.verdict, _Facts.of(prediction)
     with output.output_folder(options.out, force=options.force) as folder:
-        columns = (force_columns(prediction, facts.half, part) for part in blocks(len(recording)))
+        columns = (_force_columns(prediction, facts.half, part) for part in blocks(len(recording)))
         output.write_long_csv(folder / "forces.csv", columns)
-        if friction is not None:
+        if (friction := verdict.friction) is not None:
             given = {"t_s": friction.t, "friction": friction.ratio, "sd_of_log": friction.sd}
             given |= {"another": friction.another, "unexplained": friction.unexplained}
             output.write_csv(folder / "friction.csv", given)
         output.write_json(folder / "summary.json", summary(prediction, verdict, facts))
         lines = _prediction_text(prediction, friction, facts)
         say("drawing figures")
-        figures = draw(folder, prediction, verdict)
+        figures = {
+            "slip": slip_figure(model, recording),
+            "forces": prediction_figure(prediction),
+        }
+        if verdict.shown is not None:
+            figures["motion"] = motion_figure(verdict.shown, model.vehicle)
+        if friction is not None:
+            figures["friction"] = friction_figure(friction)
+        save_figures(folder, figures)
         write_predict_report(
-            folder,
-            prediction,
-            verdict,
-            figures,
-            given=lines,
-            source=options.model,
-            command=options.words,
+            folder, prediction, figures, lines, source=options.model, command=options.words
         )
-    table = error_table(prediction)
+    error, table = prediction.against_truth, ""
+    if error is not None:
+        name = visible(recording.name)
+        cells = [name, *error_cells(error, prediction.true_force)]
+        table = output.text_table([["predicted", "front", "rear"], cells], "<>>")
     tell("\n".join(one for one in (table, lines, verdict_text(verdict, numbers=False)) if one))
     say(f"wrote {options.out}/")
     return shared.exit_code(verdict, options)
@@ -96,7 +120,7 @@ def _model(options: argparse.Namespace) -> TireModel:
     """Return the model, on the car that drove."""
     model = shared.stored_model(options.model)
     assert model is not None
-    vehicle = shared.car_of(options, model, options.model)
+    vehicle = shared.read_vehicle(options, model, options.model)
     if vehicle.moves_as(model.vehicle):
         return model
     if not model.scales_with_load:
@@ -109,7 +133,7 @@ def _model(options: argparse.Namespace) -> TireModel:
     return model.mounted_on(vehicle)
 
 
-class Facts(NamedTuple):
+class _Facts(NamedTuple):
     """What is asked of a prediction, each None where nobody knows.
 
     half : width of the band of its forces (n, 2) [N].
@@ -125,7 +149,7 @@ class Facts(NamedTuple):
     against: tuple[Array, NDArray[np.bool_]] | None
 
     @classmethod
-    def of(cls, prediction: Prediction) -> "Facts":
+    def of(cls, prediction: Prediction) -> "_Facts":
         model, recording = prediction.model, prediction.recording
         half, truth, held = model.half_band_over(recording), recording.axle_force, None
         if half is not None and truth is not None and (half > 0.0).any():
@@ -140,7 +164,7 @@ class Facts(NamedTuple):
         )
 
 
-def force_columns(prediction: Prediction, half: Array | None, part: slice) -> dict[str, Array]:
+def _force_columns(prediction: Prediction, half: Array | None, part: slice) -> dict[str, Array]:
     """Return the columns of forces.csv: time, slip angles, predicted, band and true forces.
 
     half : width of its band (n, 2) [N]; None where the model has none.
@@ -155,7 +179,7 @@ def force_columns(prediction: Prediction, half: Array | None, part: slice) -> di
     return columns
 
 
-def summary(prediction: Prediction, verdict: Verdict, facts: Facts) -> dict[str, Any]:
+def summary(prediction: Prediction, verdict: Verdict, facts: _Facts) -> dict[str, Any]:
     """Return what summary.json holds; null stands for what cannot be known."""
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     friction, model = verdict.friction, prediction.model
@@ -191,34 +215,10 @@ def summary(prediction: Prediction, verdict: Verdict, facts: Facts) -> dict[str,
     }
 
 
-def draw(folder: Path, prediction: Prediction, verdict: Verdict) -> dict[str, Figure]:
-    """Write the figures of a prediction; return them by the name of their file."""
-    figures = {
-        "slip": slip_figure(prediction.model, prediction.recording),
-        "forces": prediction_figure(prediction),
-    }
-    if verdict.shown is not None:
-        figures["motion"] = motion_figure(verdict.shown, prediction.model.vehicle)
-    if verdict.friction is not None:
-        figures["friction"] = friction_figure(verdict.friction)
-    return save_figures(folder, figures)
-
-
-def error_table(prediction: Prediction) -> str:
-    """Return the errors against the true forces as a table; empty where there are none."""
-    error, size = prediction.against_truth, prediction.true_force
-    if error is None:
-        return ""
-    name = visible(prediction.recording.name)
-    return output.text_table(
-        [["predicted", "front", "rear"], [name, *error_cells(error, size)]], "<>>"
-    )
-
-
-def _prediction_text(prediction: Prediction, friction: RoadFriction | None, facts: Facts) -> str:
+def _prediction_text(prediction: Prediction, friction: RoadFriction | None, facts: _Facts) -> str:
     """Return what is to be said of a prediction beside its errors, as lines of text.
 
-    friction : of the drive's road; None where nobody can tell.
+    friction : of the drive's road; None where it is not observable.
     """
     motion, model, lines = prediction.motion, prediction.model, []
     inside, held, beyond, known = facts.inside, facts.held, facts.beyond, model.known_slip
@@ -260,7 +260,6 @@ def _prediction_text(prediction: Prediction, friction: RoadFriction | None, fact
 
 
 def _contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
-    """Return whether a drive contradicts what is guaranteed, in words."""
     if not broken.any():
         return "no moment of the drive contradicts the guaranteed forces"
     front, rear = 100.0 * broken.mean(axis=0)
@@ -268,3 +267,90 @@ def _contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
         f"the bound of the guaranteed forces is violated: {front:.2g} / {rear:.2g} % of the "
         f"moments of 0.3 s contradict it (front / rear), first at {t[broken.any(axis=1)][0]:g} s"
     )
+
+
+def write_predict_report(
+    folder: Path,
+    prediction: Prediction,
+    figures: Mapping[str, Figure],
+    lines: str,
+    *,
+    source: Path,
+    command: str,
+) -> None:
+    """Write the report of a prediction.
+
+    lines : what is said of it beside its errors.   source : the model's file.
+    """
+    model, recording, verdict = prediction.model, prediction.recording, prediction.verdict
+    notes: list[str | page.Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
+    found: list[page.Block] = [*_errors(prediction)]
+    found += [page.Paragraph(text=page.printed(line)) for line in lines.splitlines()]
+    captions = {
+        "motion": "Mean force over windows of 0.3 s: from the motion, and from the model.",
+        "forces": "Axle forces over time.",
+        "friction": "Friction of the road over that of the identification drive.",
+    }
+    found += [
+        drawing(figures[name], caption, READ["replay" if name == "forces" else name])
+        for name, caption in captions.items()
+        if name in figures
+    ]
+    tires = [
+        page.Paragraph(text=text) for text in (band_sentence(model), guaranteed_sentence(model))
+    ]
+    report = page.Report(
+        title=f"Tires of {source.name} on {recording.name}",
+        summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, not used for "
+        "identification.",
+        numbers=[
+            verdict_headline(verdict, notes),
+            *of_answer(verdict, [*missed_headline(verdict), *_predict_headlines(prediction)]),
+        ],
+        lead=[curve_drawing(figures, verdict)],
+        warnings=[*verdict_warnings(verdict), *notes],
+        sections=[
+            verdict_section(verdict),
+            page.Section(
+                heading="What it predicts", blocks=[*found, *(one for one in tires if one.text)]
+            ),
+            origin(
+                command,
+                model.vehicle,
+                [recording],
+                model=f"{source.name}, hash {digest(model.to_dict())}",
+            ),
+        ],
+    )
+    page.write_report(folder / REPORT, report)
+
+
+def _predict_headlines(prediction: Prediction) -> list[page.Headline]:
+    """Return what is missed of the true force, explained of the motion, and the known slip."""
+    numbers = []
+    error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
+    if error is not None and size is not None and min(size.front, size.rear) > 0.0:
+        shares = error.front / size.front, error.rear / size.rear
+        front, rear = (f"{PERCENT * share:.1f}" for share in shares)
+        numbers.append(page.Headline(f"{front} / {rear} %", "of the rms true force, front / rear"))
+    if motion is not None and None not in motion.explained:
+        lateral, yaw = (f"{PERCENT * max(share or 0.0, 0.0):.1f}" for share in motion.explained)
+        numbers.append(
+            page.Headline(f"{lateral} / {yaw} %", "explained of the lateral / the yaw acceleration")
+        )
+    return [*numbers, *known_headline(prediction.model)]
+
+
+def _errors(prediction: Prediction) -> list[page.Block]:
+    error, size = prediction.against_truth, prediction.true_force
+    if error is None or size is None:
+        return []
+    rows: list[list[page.Cell]] = [
+        [axle, newtons, PERCENT * newtons / force if force > 0.0 else None]
+        for axle, newtons, force in (
+            ("front", error.front, size.front),
+            ("rear", error.rear, size.rear),
+        )
+    ]
+    caption = "RMSE of the axle force against the true one, and its share of the rms force."
+    return [page.Table(caption=caption, header=["axle", "RMSE [N]", "share [%]"], rows=rows)]

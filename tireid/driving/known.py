@@ -15,7 +15,7 @@ from mpc.handover.learner import Learner
 from mpc.loop.sensing import Measured
 from mpc.tires import PredictionTire, prediction_tire
 
-EVERY = 8  # samples between two looks
+_EVERY = 8  # samples between two looks
 
 
 class Known(NamedTuple):
@@ -49,7 +49,7 @@ class Witness:
     def observe(self, measured: Measured, tracker: Any) -> str | None:
         """Ask the learner; return what it said."""
         said = self._learner.observe(measured, tracker)
-        if self._samples % EVERY == 0:
+        if self._samples % _EVERY == 0:
             self._look(tracker.tire)
         self._samples += 1
         return said

@@ -15,14 +15,14 @@ from tireid.driving.setup import PERIOD
 from tireid.progress import Progress
 
 DURATION = 40.0  # s
-SPEED = 20.0  # m/s
-FREQUENCY = 0.6  # Hz, of the fastest swings
-SLIP = np.radians(3.5)  # of the front axle, at the limit of grip
-GENTLE, GROWS = 0.3, 30.0  # share of the angles at the start, and time to all of them [s]
-SPUN = np.tan(np.radians(15.0))  # of the side slip
-TIPS = 1.2  # times the grip: a car that is said to have more is falling over
-FORGOTTEN = 0.5  # s before a car spins or tips that are not learnt from
-RATE_LIMIT = 1.0  # rad/s at the road wheels
+_SPEED = 20.0  # m/s
+_FREQUENCY = 0.6  # Hz, of the fastest swings
+_SLIP = np.radians(3.5)  # of the front axle, at the limit of grip
+_GENTLE, GROWS = 0.3, 30.0  # share of the angles at the start, and time to all of them [s]
+_SPUN = np.tan(np.radians(15.0))  # of the side slip
+_TIPS = 1.2  # times the grip: a car that is said to have more is falling over
+_FORGOTTEN = 0.5  # s before a car spins or tips that are not learnt from
+_RATE_LIMIT = 1.0  # rad/s at the road wheels
 
 
 def learning_drive(
@@ -38,31 +38,31 @@ def learning_drive(
     """Drive a car without a path and return what its sensors saw; a car that spins or tips ends it.
 
     grip : largest lateral acceleration [m/s²], which sizes the steering.
-    lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
-    they show.
+    lateral : estimates v_y, and a_y in the plane of the road, in place of the sensors; None takes
+    what they measure.
     """
     # Angle of a bend at that acceleration, and the slip that the front axle needs beyond it.
-    amplitude = car.vehicle.wheelbase * grip / SPEED**2 + SLIP
+    amplitude = car.vehicle.wheelbase * grip / _SPEED**2 + _SLIP
     maneuver = RandomSteer(
         amplitude=amplitude,
-        frequency=min(FREQUENCY, 0.9 * RATE_LIMIT / (2.0 * np.pi * amplitude)),
+        frequency=min(_FREQUENCY, 0.9 * _RATE_LIMIT / (2.0 * np.pi * amplitude)),
         seed=seed,
         onset=1.0,
-        rate_limit=RATE_LIMIT,
+        rate_limit=_RATE_LIMIT,
         duration=DURATION,
     )
     t = car.period * np.arange(round(DURATION / car.period), dtype=np.float64)
-    steering = maneuver.steering(t)[:, 0] * np.minimum(GENTLE + t / GROWS, 1.0)
-    state, samples, forces = car.start(SPEED), [], []
+    steering = maneuver.steering(t)[:, 0] * np.minimum(_GENTLE + t / GROWS, 1.0)
+    state, samples, forces = car.start(_SPEED), [], []
     for k, angle in enumerate(steering):
         measured = sensors.measure(state, rng)
         if lateral is not None:
             measured = lateral.tell(measured).in_place_of(measured)
         samples.append(measured)
         forces.append(state.axle_force)
-        state = car.step(state, float(angle), SPEED)
-        if abs(state.v_y) > SPUN * state.v_x or abs(state.a_y) > TIPS * grip:
-            kept = max(len(samples) - round(FORGOTTEN / car.period), 10)
+        state = car.step(state, float(angle), _SPEED)
+        if abs(state.v_y) > _SPUN * state.v_x or abs(state.a_y) > _TIPS * grip:
+            kept = max(len(samples) - round(_FORGOTTEN / car.period), 10)
             samples, forces = samples[:kept], forces[:kept]
             break
         if progress is not None:

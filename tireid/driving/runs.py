@@ -38,15 +38,15 @@ from tireid.driving.setup import FRICTIONS, PERIOD, Setup, SpeedWish
 from tireid.progress import Progress
 
 
-class Informer:
-    """Tells the tracker of an oracle the true tire of the road that the car is on."""
+class _Informer:
+    """Gives the tracker of an oracle the true tire of the road that the car is on."""
 
     def __init__(self, setup: Setup) -> None:
         self._setup, self._friction, self._mu = setup, setup.friction(), setup.mu
 
     def observe(self, measured: Measured, tracker: Any) -> str | None:
         """Change the tire where the friction has changed; return that it was done."""
-        mu = friction_now(self._friction, measured)
+        mu = _friction_now(self._friction, measured)
         if mu == self._mu:
             return None
         self._mu = mu
@@ -54,10 +54,10 @@ class Informer:
         return f"given friction {mu:g}"
 
 
-NOTED = 0.1  # change of the grip that is worth a note
+_NOTED = 0.1  # change of the grip that is worth a note
 
 
-class BacksOff:
+class _BacksOff:
     """Stands between a drive and what learns, and notes where the tracker plans with less grip.
 
     Parameters
@@ -71,14 +71,14 @@ class BacksOff:
     def observe(self, measured: Measured, tracker: Any) -> str | None:
         """Ask what learns; return what it said, and the grip where that changed."""
         said = None if self._beside is None else self._beside.observe(measured, tracker)
-        if abs(tracker.grip - self._noted) < NOTED:
+        if abs(tracker.grip - self._noted) < _NOTED:
             return said
         self._noted = tracker.grip
         grip = f"plans with {tracker.grip:.2f} of the grip"
         return grip if said is None else f"{said}; {grip}"
 
 
-def friction_now(friction: Friction, measured: Measured) -> float:
+def _friction_now(friction: Friction, measured: Measured) -> float:
     """Return the friction where the car is, of a road whose changes are steps [-]."""
     mu = friction.scale
     for change in friction.changes:
@@ -113,7 +113,7 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
 LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learning")
 FULL, IMU = SENSORS = ("full", "imu")
 WIDEST = 2.0  # deviation at which a car is off the path [m]
-PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
+_PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -145,7 +145,7 @@ class Conditions:
         return inertial_unit() if self.noise else CarSensors()
 
     def lateral(self, learnt: TireModel | None = None) -> LateralVelocity | None:
-        """Return what tells v_y on a drive, None where a sensor shows it."""
+        """Return what estimates v_y on a drive, None where a sensor measures it."""
         return None if self.kind == FULL else lateral_velocity(self.setup.vehicle, learnt)
 
     @property
@@ -190,6 +190,19 @@ def require_compiler() -> None:
         )
 
 
+def delay_periods(delay: float, name: str = "delay") -> int:
+    """Return a delay in control periods.
+
+    delay : a multiple of the period [s].   name : of the argument, in an error.
+    """
+    periods = delay / PERIOD
+    if not (0.0 <= delay <= 0.1 and abs(periods - round(periods)) < 1e-9):
+        raise ValueError(
+            f"{name} must be 0 to 100 ms in steps of {1e3 * PERIOD:g} ms, it is {1e3 * delay:g}"
+        )
+    return round(periods)
+
+
 def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> PredictionTire:
     """Return the tire that a tracker is given at the start."""
     if label == LINEAR:
@@ -230,11 +243,11 @@ def run_drive(
             sensors=conditions.driving_sensors,
             delay=conditions.delay,
             rng=np.random.default_rng([conditions.seed, 2]),
-            learner=BacksOff(beside) if conditions.caution > 0.0 else beside,
+            learner=_BacksOff(beside) if conditions.caution > 0.0 else beside,
             lateral=conditions.lateral(learnt),
             laps=conditions.laps,
             widest=WIDEST,
-            plan_every=PLAN_EVERY,
+            plan_every=_PLAN_EVERY,
             name=f"{setup.path.name}, {label}",
             progress=progress,
         )
@@ -252,7 +265,7 @@ def run_drive(
 
 def _learner(label: str, setup: Setup, learnt: TireModel | None) -> LearningTires | None:
     if label == ORACLE and setup.drops:
-        return Informer(setup)
+        return _Informer(setup)
     if label == LEARNING:
         assert learnt is not None
         return make_learner(learnt, setup.vehicle)
@@ -290,7 +303,7 @@ def drive(
     learning : go on learning from the tire while driving, and hand over what is fit.
     noise : whether sensors are noisy.
     sensors : full, or imu: gyro, accelerometer, wheel speed, steering and a localization of
-        position and heading, but no v_y, which an inertial identifier tells.
+        position and heading, but no v_y, which an inertial identifier estimates.
     laps : of a closed path.
     seed : of the noise.
     caution : share of the tires' uncertainty that the tracker plans for, from 0 to 1, the least
@@ -309,9 +322,7 @@ def drive(
         Where a number is not that of a drive, there is no tire to go on learning from, or no C
         compiler for the tracker.
     """
-    periods = delay / PERIOD
-    if not (0.0 <= delay <= 0.1 and abs(periods - round(periods)) < 1e-9):
-        raise ValueError(f"delay must be 0 to 0.1 s in steps of {PERIOD:g} s, it is {delay:g}")
+    periods = delay_periods(delay)
     for name, value in (("share", share), ("laps", laps), ("speed", speed)):
         if value is not None and not value > 0.0:
             raise ValueError(f"{name} must be positive, it is {value:g}")
@@ -333,7 +344,7 @@ def drive(
     )
     conditions = Conditions(
         setup=setup,
-        delay=round(periods),
+        delay=periods,
         noise=noise,
         seed=seed,
         laps=laps,

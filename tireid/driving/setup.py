@@ -20,8 +20,8 @@ from mpc.path import Path, grip_speed, steady_speed
 from mpc.tires import PredictionTire, oracle_tire
 
 PLANT = "double-track"
-FASTEST = 30.0  # on a closed course [m/s]
-ACCELERATION, BRAKING = 2.0, 3.0  # on a closed course at friction 1 [m/s²]
+_FASTEST = 30.0  # on a closed course [m/s]
+_ACCELERATION, _BRAKING = 2.0, 3.0  # on a closed course at friction 1 [m/s²]
 PERIOD = 0.01  # control period [s]
 FRICTIONS = (0.05, 1.5)  # least and most over that of the tire's measurement [-]
 
@@ -84,9 +84,9 @@ class Setup:
         return grip_speed(
             self.path,
             a_y_max=a_y,
-            v_max=FASTEST,
-            a_accel=self.mu * ACCELERATION,
-            a_brake=self.mu * BRAKING,
+            v_max=_FASTEST,
+            a_accel=self.mu * _ACCELERATION,
+            a_brake=self.mu * _BRAKING,
         )
 
     def profile(self) -> SpeedProfile:

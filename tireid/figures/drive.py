@@ -18,18 +18,18 @@ if TYPE_CHECKING:
     from mpc.path import Path
 
 _BINS = 60
-WIDE = 10.0  # times slower than the median: from there on the axis is logarithmic
-MILLI = 1e3
+_WIDE = 10.0  # times slower than the median: from there on the axis is logarithmic
+_MILLI = 1e3
 
 
 @style.styled
 def drive_solve_figure(drive: "Drive") -> Figure:
     """Draw the solve times of a drive as a histogram and over time."""
-    times = MILLI * drive.solve_time
+    times = _MILLI * drive.solve_time
     median, p99, largest = np.quantile(times, [0.5, 0.99, 1.0])
     figure = style.new_figure(style.PAGE, 2.7)
     left, right = figure.subplots(1, 2)
-    wide = largest > WIDE * median
+    wide = largest > _WIDE * median
     low = float(times.min()) / 1.1 if wide else 0.0
     bins = (np.geomspace if wide else np.linspace)(low, 1.1 * largest, _BINS)
     left.hist(times, bins=list(bins), color=style.BLUE, alpha=0.8)
@@ -50,7 +50,7 @@ def drive_solve_figure(drive: "Drive") -> Figure:
         right.set_yscale("log")
         for axis in (left.xaxis, right.yaxis):
             style.few_ticks(axis)
-    period = f"largest {largest:.3g} ms of a period of {MILLI * drive.period:g} ms"
+    period = f"largest {largest:.3g} ms of a period of {_MILLI * drive.period:g} ms"
     right.set_title(period, loc="right")
     left.set_title(f"{times.size} steps")
     style.legend_above(figure)
@@ -74,8 +74,8 @@ CONES: Mapping[str, Any] = {
 }
 ORACLE = "oracle"  # the name of the true tire
 AT_THE_END = " at the end"  # what a label ends with that is of a tire as it was then
-LATER = (0, (2.5, 0.9))
-TIRES: Mapping[str, Mapping[str, Any]] = {
+_LATER = (0, (2.5, 0.9))
+_TIRES: Mapping[str, Mapping[str, Any]] = {
     "linear": {"color": style.GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.3},
     "frozen": {"color": style.ORANGE, "linestyle": "-", "linewidth": 1.2},
     ORACLE: {"color": style.BLACK, "linestyle": (0, (5, 1.5)), "linewidth": 1.1},
@@ -85,8 +85,8 @@ TIRES: Mapping[str, Mapping[str, Any]] = {
 
 def tire_look(label: str) -> dict[str, Any]:
     """Return color, line style and width of a tire in every figure."""
-    look = dict(TIRES.get(label.split()[0], TIRES["frozen"]))
-    return look | {"linestyle": LATER, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
+    look = dict(_TIRES.get(label.split()[0], _TIRES["frozen"]))
+    return look | {"linestyle": _LATER, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
 
 
 _REPLANNED, _NOTICED = "plans with another tire or grip", "sensor fault noticed"
@@ -194,7 +194,7 @@ def _roomy(axes: Axes, slowest: float) -> None:
     axes.set_ylim(min(low, slowest), high)
 
 
-NEAR = 0.75  # a limit is drawn where a command comes this close to it
+_NEAR = 0.75  # a limit is drawn where a command comes this close to it
 
 
 @style.styled
@@ -236,7 +236,7 @@ def drive_steering_figure(
 
 def _limits(axes: Axes, limit: float) -> None:
     low, high = axes.get_ylim()
-    if max(-low, high) > NEAR * limit:
+    if max(-low, high) > _NEAR * limit:
         for side in (-limit, limit):
             axes.axhline(side, color="#AA4499", linewidth=0.8, linestyle=(0, (4, 2)), label="limit")
 
@@ -247,11 +247,11 @@ _FRONT_OVERHANG, _REAR_OVERHANG = 0.32, 0.36  # of the wheelbase, beyond the axl
 # Pictures need a length, a width and wheels; a vehicle without a chassis gets those that are usual
 # for its wheelbase.
 
-TRACK = 0.57  # of the wheelbase, where no chassis says
+_TRACK = 0.57  # of the wheelbase, where no chassis says
 _BODY_BESIDE_TRACK = 0.1  # of the wheelbase: how much wider than the track the body is
 _WHEEL_LENGTH, _WHEEL_WIDTH = 0.24, 0.085  # of the wheelbase
-CORNERS = 33  # points of the body
-ROUNDING = 0.3  # of its corners: exponent of a circle that becomes a rectangle
+_CORNERS = 33  # points of the body
+_ROUNDING = 0.3  # of its corners: exponent of a circle that becomes a rectangle
 
 
 class _CarShape(NamedTuple):
@@ -270,12 +270,12 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
     """
     long = vehicle.wheelbase
     chassis = vehicle.chassis
-    tracks = (TRACK * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
+    tracks = (_TRACK * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
     half = 0.5 * (max(tracks) + _BODY_BESIDE_TRACK * long)
     front, rear = vehicle.l_f + _FRONT_OVERHANG * long, -vehicle.l_r - _REAR_OVERHANG * long
-    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS)
+    angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
     round_ = np.column_stack([np.cos(angle), np.sin(angle)])
-    body = np.sign(round_) * np.abs(round_) ** ROUNDING * (0.5 * (front - rear), half)
+    body = np.sign(round_) * np.abs(round_) ** _ROUNDING * (0.5 * (front - rear), half)
     body += (0.5 * (front + rear), 0.0)
     glass = np.array([(0.37, 0.6), (0.23, 0.78), (0.23, -0.78), (0.37, -0.6)]) * (long, half)
     corners = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
@@ -299,12 +299,12 @@ def _turn(angle: float) -> Array:
 _ROW_LENGTH = 80.0  # a long and narrow path goes on in the next row after about this many meters
 _MOST_ROWS = 5
 _NARROW = 4.0  # from this ratio between its extents on a path is long and narrow
-MARGIN = 3.0  # around the path [m]
-RUN_UP = 16.0  # of the straights before and after the cones that is shown [m]
+_MARGIN = 3.0  # around the path [m]
+_RUN_UP = 16.0  # of the straights before and after the cones that is shown [m]
 _INNER_WIDTH = style.PAGE - 0.75  # what labels leave of the page [in]
 _HIGHEST = 5.0  # panel [in]
 _CARS_EVERY = 2.6  # wheelbases between two outlines
-SMALL = 160.0  # in a picture of more than that [m] cars cannot be seen
+_SMALL = 160.0  # in a picture of more than that [m] cars cannot be seen
 _ZOOM = 44.0  # a part of such a path that is drawn large, where a car was farthest off [m]
 _SEEN = 0.05  # deviations are drawn larger until the largest is this share of the picture
 
@@ -319,7 +319,7 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
     path = next(iter(drives.values())).path
     low, high = _extent(path, drives)
     width, height = high - low
-    if width <= _NARROW * height and max(width, height) > SMALL:
+    if width <= _NARROW * height and max(width, height) > _SMALL:
         return _large(path, drives)
     rows = 1
     if width > _NARROW * height:
@@ -342,12 +342,12 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
 def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
     """Corners of what is shown: the path with its cones, and the tracks as far as not absurd."""
     places = np.column_stack([path.X, path.Y])
-    low, high = places.min(axis=0) - MARGIN, places.max(axis=0) + MARGIN
+    low, high = places.min(axis=0) - _MARGIN, places.max(axis=0) + _MARGIN
     if len(path.cones):
         first, last = path.cones.min(axis=0), path.cones.max(axis=0)
-        low, high = np.minimum(low, first - MARGIN), np.maximum(high, last + MARGIN)
-        low[0], high[0] = max(low[0], first[0] - RUN_UP), min(high[0], last[0] + RUN_UP)
-    room = 2.0 * MARGIN
+        low, high = np.minimum(low, first - _MARGIN), np.maximum(high, last + _MARGIN)
+        low[0], high[0] = max(low[0], first[0] - _RUN_UP), min(high[0], last[0] + _RUN_UP)
+    room = 2.0 * _MARGIN
     for drive in drives.values():
         driven = np.column_stack([drive.X, drive.Y])
         low[1] = max(min(low[1], driven[:, 1].min() - 2.0), low[1] - room)

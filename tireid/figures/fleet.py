@@ -26,15 +26,15 @@ from tireid.fleet.merge import Merged
 from tireid.fleet.store import LogRow
 from tireid.fleet.watch import TITLES, Alarm, Seen
 
-NAMED = len(SERIES) - 1  # groups that have a color of their own; the others are gray
-SLIP = 0.25  # rad, up to which curves are drawn that nobody knows farther
-PERCENT = 100.0
-DAY = 86_400.0  # s
+_NAMED = len(SERIES) - 1  # groups that have a color of their own; the others are gray
+_SLIP = 0.25  # rad, up to which curves are drawn that nobody knows farther
+_PERCENT = 100.0
+_DAY = 86_400.0  # s
 
 
 @styled
 def stiffness_figure(rows: Sequence[LogRow]) -> Figure:
-    """Draw the cornering stiffness that each log tells, over the days, a color for each car.
+    """Draw the cornering stiffness identified in each log, over the days, a color for each car.
 
     rows : of logs that were learnt; what the verdict refuses is drawn hollow.
     """
@@ -68,7 +68,7 @@ def curves_figure(groups: Sequence[Merged]) -> Figure:
         color, label = _look(k, one.name, len(groups))
         for i, axes in enumerate(panels):
             known = float(one.model.known_slip[i])
-            slip = np.linspace(0.0, known or SLIP, 100)
+            slip = np.linspace(0.0, known or _SLIP, 100)
             force = one.model.force_at(slip)[:, i] / one.model.vehicle.axle_loads[i]
             style = "-" if known else ":"
             axes.plot(np.degrees(slip), force, style, color=color, label=label)
@@ -87,7 +87,7 @@ def watch_figure(car: str, seen: Seen, alarms: Sequence[Alarm]) -> Figure:
     minutes = seen.driven / 60.0
     for k, (axes, title) in enumerate(zip(panels, TITLES, strict=True)):
         sd = np.sqrt(seen.variance[:, k])
-        _points(axes, minutes, PERCENT * seen.z[:, k], PERCENT * sd)
+        _points(axes, minutes, _PERCENT * seen.z[:, k], _PERCENT * sd)
         axes.set(ylabel="[%]")
         axes.set_title(title, loc="left")
         for one in alarms:
@@ -109,9 +109,9 @@ def _points(axes: Axes, x: Array, z: Array, sd: Array) -> None:
 
 def _look(k: int, name: str, of: int) -> tuple[str, str]:
     """Return the color and the label of a group."""
-    if k < NAMED:
+    if k < _NAMED:
         return SERIES[k], mathtext(name)
-    return GREY, f"{of - NAMED} others"
+    return GREY, f"{of - _NAMED} others"
 
 
 def _days(rows: Sequence[LogRow]) -> Array:
@@ -120,4 +120,4 @@ def _days(rows: Sequence[LogRow]) -> Array:
         when = np.array([datetime.fromisoformat(row.date).timestamp() for row in rows])
     except ValueError:
         return np.arange(len(rows), dtype=np.float64)
-    return np.asarray((when - when.min()) / DAY, dtype=np.float64)
+    return np.asarray((when - when.min()) / _DAY, dtype=np.float64)

@@ -22,8 +22,8 @@ from models.vehicle import Vehicle
 from tireid.figures import style
 from tireid.figures.thinned import Signal, drawn_times, shown
 
-Curve = tuple[Array, Mapping[str, Any]]  # forces of both axles (n, 2) [N], and their look
-RESIDUAL: Mapping[str, Any] = {  # noise for the most part, which would make a drawing large
+_Curve = tuple[Array, Mapping[str, Any]]  # forces of both axles (n, 2) [N], and their look
+_RESIDUAL: Mapping[str, Any] = {  # noise for the most part, which would make a drawing large
     "linewidth": 0.8,
     "linestyle": "-",
     "rasterized": True,
@@ -32,9 +32,9 @@ RESIDUAL: Mapping[str, Any] = {  # noise for the most part, which would make a d
 
 def _force_panels(
     recording: Recording,
-    rows: Sequence[tuple[str, Sequence[Curve]]],
+    rows: Sequence[tuple[str, Sequence[_Curve]]],
     known: Array | None,
-    missed: Sequence[Curve],
+    missed: Sequence[_Curve],
     window: style.Window = None,
     heights: tuple[float, float] = (2.0, 1.0),
 ) -> tuple[Figure, NDArray[Any], style.ForceUnit]:
@@ -67,7 +67,7 @@ def _force_panels(
             panels[-1, axle].axhline(0.0, color=style.GREY, linewidth=0.6)
             for residual, look in residuals:
                 drawn = np.clip(residual[:, axle], -1e6, 1e6)
-                panels[-1, axle].plot(t, drawn, **{**look, **RESIDUAL})
+                panels[-1, axle].plot(t, drawn, **{**look, **_RESIDUAL})
         style.label_time(panels[-1, axle], recording.t)
     if residuals:
         within = (np.clip(residual, *limits) for residual, _ in residuals)
@@ -105,10 +105,10 @@ def force_figure(
     recording, truth, first = history.recording, history.recording.axle_force, int(history.online)
     for at, replay in replays.items():
         _require_same(replay, history, f"the replay frozen at {freeze_key(at)} s")
-    online: list[Curve] = [(history.axle_force, style.ONLINE)] * first
+    online: list[_Curve] = [(history.axle_force, style.ONLINE)] * first
     shown_in_all = online if truth is None else [(truth, style.TRUTH), *online]
     frozen = {at: (replay.axle_force, style.FROZEN) for at, replay in replays.items()}
-    rows: list[tuple[str, Sequence[Curve]]] = [(", online", shown_in_all)] * first
+    rows: list[tuple[str, Sequence[_Curve]]] = [(", online", shown_in_all)] * first
     rows += [
         (f", {style.frozen_title(recording.t, at)}", [*shown_in_all, curve])
         for at, curve in frozen.items()

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import cycle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,8 @@ from identifier.stability.margins import gain_margin, phase_margin
 from tireid.figures import style
 from tireid.figures.thinned import shown_of_run
 
-WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
+SCHEME = Path(__file__).with_name("fig1_scheme.png")  # Fig. 1, and as .svg beside it
+_WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
 
 
 @style.styled
@@ -45,7 +47,7 @@ def error_figure(
     figure = style.new_figure(style.PAGE, 2.6)
     axes = figure.subplots()
     axes.set_xlim(ends)
-    if top > WIDE * peak or peak > 100.0 * WIDE * typical:
+    if top > _WIDE * peak or peak > 100.0 * _WIDE * typical:
         axes.set_yscale("log")
         axes.set_ylim(typical / 30.0, 2.0 * top)
     else:
@@ -57,8 +59,8 @@ def error_figure(
         axes.axhline(bound, color=color, linestyle=dashes, linewidth=1.1, label=name)
     for t_freeze in freeze_times:
         style.mark_freeze(axes, t_freeze, prediction=False)
-    unit = style.impulse_unit(style.paper_design(history).force_unit)
-    axes.set(ylabel=rf"error norm $|\tilde{{\xi}}|$ [{unit}]")
+    unit = force_unit_name(style.paper_design(history).force_unit)
+    axes.set(ylabel=rf"error norm $|\tilde{{\xi}}|$ [{unit} s]")
     style.label_time(axes, recording.t)
     style.legend_above(figure, columns=min(4, 1 + len(known) + bool(freeze_times)))
     return figure
@@ -125,7 +127,7 @@ _MARKS: Mapping[str, tuple[str, str]] = {  # color, marker
     "instantaneous_scaled": (style.GREEN, "D"),
 }
 _FURTHER = ((style.PURPLE, "^"), (style.AMBER, "v"))
-OFFSET = 0.2  # between neighboring laws, as a share of the distance of columns
+_OFFSET = 0.2  # between neighboring laws, as a share of the distance of columns
 
 
 @style.styled
@@ -152,7 +154,7 @@ def comparison_figure(
         label = VARIANTS[law].title.replace("eta/lambda", "η/λ")
         color, marker = _MARKS.get(law, _FURTHER[number % len(_FURTHER)])
         order += [label, f"{label} (paper)"]
-        shift = OFFSET * (number - (len(results) - 1) / 2)
+        shift = _OFFSET * (number - (len(results) - 1) / 2)
         middle, low, high = np.array(list(row.values()), dtype=np.float64).T
         middle = np.where(np.isfinite(middle), middle, np.nan)
         whiskers = [np.where(np.isfinite(end), abs(middle - end), 0.0) for end in (low, high)]
@@ -166,7 +168,7 @@ def comparison_figure(
             axes.plot(at, list(printed.values()), marker, label=f"{label} (paper)", **look)
         drawn += [*middle, *(middle - whiskers[0]), *(middle + whiskers[1]), *printed.values()]
     positive = [value for value in drawn if value > 0.0]
-    if positive and max(positive) > WIDE * min(positive):
+    if positive and max(positive) > _WIDE * min(positive):
         axes.set(yscale="log", ylim=(min(positive) / 1.5, max(positive) * 1.5))
     else:
         axes.set_ylim(0.0, 1.08 * max(positive, default=1.0))
@@ -180,7 +182,7 @@ def comparison_figure(
     return figure
 
 
-FACTORS = np.geomspace(1e-3, 1e3, 1500)  # on the loop gain, along the locus
+_FACTORS = np.geomspace(1e-3, 1e3, 1500)  # on the loop gain, along the locus
 
 
 @style.styled
@@ -192,7 +194,7 @@ def locus_figure(loop: Loop, *, integrator: str, dt: float) -> Figure:
     integrator : "euler" or "rk4".   dt : sampling interval [s].
     """
     step = INTEGRATORS[integrator]
-    locus = step(root_locus(loop, FACTORS) * dt).ravel()
+    locus = step(root_locus(loop, _FACTORS) * dt).ravel()
     design = step(eigenvalues(loop.matrix()) * dt)
     margin = gain_margin(loop, step, dt)
     circle = np.exp(1j * np.linspace(-np.pi, np.pi, 2881))

@@ -13,7 +13,7 @@ from identifier.axle.curve import unit_matrix
 from identifier.plan import Plan
 from tireid.figures import style
 
-ARROW = 0.07  # lengths of the area: that shows where and whither a pass comes in
+_ARROW = 0.07  # lengths of the area: of the arrow at the entry of a pass
 
 
 @style.styled
@@ -34,11 +34,11 @@ def plan_area_figure(found: Plan) -> Figure:
         others = axes.plot(X[:, 1:], Y[:, 1:], color=color, alpha=0.4, linewidth=0.6)
         axes.plot(X[:, 0], Y[:, 0], color=color, label=f"pass {k + 1}")
         others[0].set_label("other tires" if k == 0 else None)
-        (x, y, psi), ahead = one.course(np.zeros(1))[0], ARROW * space.length
+        (x, y, psi), ahead = one.course(np.zeros(1))[0], _ARROW * space.length
         tail = x - ahead * np.cos(psi), y - ahead * np.sin(psi)
         arrow = {"arrowstyle": "-|>", "color": color}
         axes.annotate("", (x, y), tail, arrowprops=arrow, annotation_clip=False)
-    axes.set_xlim(-1.3 * ARROW * space.length, 1.03 * space.length)
+    axes.set_xlim(-1.3 * _ARROW * space.length, 1.03 * space.length)
     axes.set(xlabel="X [m]", ylabel="Y [m]", aspect="equal")
     style.legend_above(figure)
     return figure

@@ -11,7 +11,7 @@ from identifier.verdict import RoadFriction, WindowForces
 from models.vehicle import Vehicle
 from tireid.figures import style
 
-POINTS: Mapping[str, Any] = {"linestyle": "", "marker": ".", "markersize": 3.0, "rasterized": True}
+_POINTS: Mapping[str, Any] = {"linestyle": "", "marker": ".", "markersize": 3.0, "rasterized": True}
 
 
 @style.styled
@@ -23,10 +23,10 @@ def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
     figure, panels = style.axle_panels([2.0, 1.0])
     for axle, (upper, lower) in enumerate(panels.T):
         seen, said = measured[:, axle] / unit.newtons, modelled[:, axle] / unit.newtons
-        upper.plot(shown.t, seen, color=style.BLACK, label="from the motion", **POINTS)
-        upper.plot(shown.t, said, color=style.ORANGE, label="model", **POINTS)
+        upper.plot(shown.t, seen, color=style.BLACK, label="from the motion", **_POINTS)
+        upper.plot(shown.t, said, color=style.ORANGE, label="model", **_POINTS)
         lower.axhline(0.0, color=style.BLACK, linewidth=0.6)
-        lower.plot(shown.t, said - seen, color=style.ORANGE, **POINTS)
+        lower.plot(shown.t, said - seen, color=style.ORANGE, **_POINTS)
         style.label_time(lower, shown.t)
     panels[0, 0].set_ylabel(f"mean force [{unit.name}]")
     panels[1, 0].set_ylabel(f"missed [{unit.name}]")

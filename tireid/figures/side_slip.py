@@ -18,14 +18,14 @@ from tireid.figures.thinned import Signal, drawn_times, shown
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
 
-FIRST = "inertial"  # which has the band where several tell v_y
-MOST = 4  # recordings that are drawn
-OTHERS = (style.ORANGE, style.GREEN, style.PURPLE, style.AMBER, style.SKY, style.GREY)
-COLUMNS = 5  # entries of a row of the legend
-BAND = "within 2 standard deviations"
-MILLI = 1e3
+_FIRST = "inertial"  # which has the band where several estimate v_y
+_MOST = 4  # recordings that are drawn
+_OTHERS = (style.ORANGE, style.GREEN, style.PURPLE, style.AMBER, style.SKY, style.GREY)
+_COLUMNS = 5  # entries of a row of the legend
+_BAND = "within 2 standard deviations"
+_MILLI = 1e3
 _SHADE: Mapping[str, Any] = {"color": style.BLUE, "alpha": 0.2, "linewidth": 0.0}
-BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
+_BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
 
 
 @style.styled
@@ -37,12 +37,12 @@ def side_slip_figure(
     Without a recorded v_y there is an estimate with its band, and nothing is missed. A band is
     drawn of the inertial identifier, of the first method with one where it is not there.
     """
-    drawn = list(recordings)[:MOST]
+    drawn = list(recordings)[:_MOST]
     given = {name: by_name for name, by_name in given.items() if by_name}
     if not given:
         raise ValueError("no method estimated a lateral velocity")
     has_band = {n: any(one.v_y_sd is not None for one in given[n].values()) for n in given}
-    first = max(given, key=lambda name: (name == FIRST, has_band[name]))
+    first = max(given, key=lambda name: (name == _FIRST, has_band[name]))
     known = [recording.logged_v_y is not None for recording in drawn]
     ratios = [ratio for one in known for ratio in ([1.5, 0.9] if one else [1.5])]
     figure = style.new_figure(style.PAGE, 0.7 + sum(ratios))
@@ -54,7 +54,7 @@ def side_slip_figure(
         upper.set_title(names[recording.name])
         _draw(upper, next(panels) if has_truth else None, recording, here, first)
     figure.align_ylabels()
-    style.legend_above(figure, columns=COLUMNS)
+    style.legend_above(figure, columns=_COLUMNS)
     return figure
 
 
@@ -69,7 +69,7 @@ def _draw(
     slips = {name: _degrees(one.v_y[part], at) for name, one in given.items()}
     exact = None if truth is None else _degrees(truth[part], at)
     reach = float(np.abs(slips[first] if exact is None else exact).max())
-    limit = BEYOND * max(reach, 0.1)
+    limit = _BEYOND * max(reach, 0.1)
     band = given[first].v_y_sd
     if band is not None:
         low, high = (
@@ -78,10 +78,12 @@ def _draw(
             )
             for side in (-1.0, 1.0)
         )
-        upper.fill_between(t, low, high, label=BAND, **_SHADE)
+        upper.fill_between(t, low, high, label=_BAND, **_SHADE)
     if exact is not None:
         upper.plot(t, exact, **{**style.TRUTH, "label": "recorded"})
-    colors = dict(zip((name for name in given if name != first), OTHERS * len(given), strict=False))
+    colors = dict(
+        zip((name for name in given if name != first), _OTHERS * len(given), strict=False)
+    )
     errors = {}
     for name in (*colors, first):  # the first lies above the others
         look: dict[str, Any] = {"color": colors.get(name, style.BLUE), "linewidth": 0.9}
@@ -118,10 +120,10 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     above.plot(drive.s, drive.v_y, **style.TRUTH)
     above.plot(drive.s, v_y, **look)
     above.set_ylabel("$v_y$\n[m/s]")
-    below.fill_between(drive.s, -MILLI * band, MILLI * band, **shade)
-    below.plot(drive.s, MILLI * (inertial - drive.v_y), **alone)
-    below.plot(drive.s, MILLI * (v_y - drive.v_y), **look)
-    reach = 1.2 * MILLI * float(np.max(np.maximum(band, np.abs(v_y - drive.v_y))))
+    below.fill_between(drive.s, -_MILLI * band, _MILLI * band, **shade)
+    below.plot(drive.s, _MILLI * (inertial - drive.v_y), **alone)
+    below.plot(drive.s, _MILLI * (v_y - drive.v_y), **look)
+    reach = 1.2 * _MILLI * float(np.max(np.maximum(band, np.abs(v_y - drive.v_y))))
     below.set(ylabel="error of it\n[mm/s]", xlabel=ARC, ylim=(-reach, reach))
     below.set_xlim(0.0, float(drive.s[-1]))
     figure.align_ylabels([above, below])

@@ -26,9 +26,8 @@ from codegen.writing import write_file
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.run import History
-from identifier.setup import force_unit_name
 
-P = ParamSpec("P")
+_P = ParamSpec("_P")
 
 PAGE = 7.16  # width of both columns of a paper [in]
 _RESOLUTION = 200  # [dots per inch]
@@ -48,11 +47,11 @@ _look = rc_params_from_file(Path(__file__).with_name("look.mplstyle"), use_defau
 LOOK: dict[str, Any] = dict(_look.items())
 
 
-def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
+def styled(draw: Callable[_P, Figure]) -> Callable[_P, Figure]:
     """Return a drawing function that works in the look of the project, whatever the user's own."""
 
     @wraps(draw)
-    def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
+    def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> Figure:
         with style.context(["default", LOOK]):
             return draw(*args, **kwargs)
 
@@ -98,7 +97,7 @@ def label_forces(panels: NDArray[Any], unit: "ForceUnit", *, residual: bool) -> 
         axes.set_ylabel(f"{'residual' if missed else 'lateral force'} [{unit.name}]")
 
 
-def with_own_fonts() -> None:
+def _with_own_fonts() -> None:
     """List the fonts that Matplotlib brings, where the list it keeps on this machine lacks them.
 
     A list that was made while an environment was being removed knows the fonts of the system only,
@@ -111,7 +110,7 @@ def with_own_fonts() -> None:
             fonts.addfont(path)
 
 
-with_own_fonts()
+_with_own_fonts()
 
 
 @contextmanager
@@ -167,10 +166,10 @@ Window = tuple[float, float] | None
 
 TIME = "time [s]"
 AXLES = ("Front axle", "Rear axle")
-FREEZE, _PREDICTION = "freeze", "after the freeze (prediction)"
+_FREEZE, _PREDICTION = "freeze", "after the freeze (prediction)"
 
 
-FAR = 1e5  # s: of a clock that begins later, as a Unix time does, only the last digits are shown
+_FAR = 1e5  # s: of a clock that begins later, as a Unix time does, only the last digits are shown
 _DIGITS_SHOWN = 100.0  # s
 
 
@@ -180,7 +179,7 @@ def _clock_zero(t: Array) -> float:
     t : times of the samples (n,) [s].
     """
     first = float(t[0])
-    return 0.0 if abs(first) < FAR else _DIGITS_SHOWN * float(np.floor(first / _DIGITS_SHOWN))
+    return 0.0 if abs(first) < _FAR else _DIGITS_SHOWN * float(np.floor(first / _DIGITS_SHOWN))
 
 
 def frozen_title(t: Array, t_freeze: float) -> str:
@@ -229,7 +228,7 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
         shade: Mapping[str, Any] = {"facecolor": "#F1EDE4", "edgecolor": "none", "zorder": 0}
         axes.axvspan(max(t_freeze, first), last, label=_PREDICTION, **shade)
     if first <= t_freeze <= last:
-        axes.axvline(t_freeze, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=FREEZE)
+        axes.axvline(t_freeze, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=_FREEZE)
 
 
 def few_ticks(axis: Axis) -> None:
@@ -247,7 +246,7 @@ def note(axes: Axes, text: str) -> None:
 
 
 def legend_above(
-    figure: Figure, *, columns: int | None = None, order: Sequence[str] = (FREEZE, _PREDICTION)
+    figure: Figure, *, columns: int | None = None, order: Sequence[str] = (_FREEZE, _PREDICTION)
 ) -> None:
     """Put one legend of all labeled curves above all panels, where it covers no data.
 
@@ -281,7 +280,7 @@ def _bolder(legend: Legend) -> None:
             line.set_alpha(1.0)
 
 
-FARTHEST = 3.0  # an axis reaches at most this many times beyond the force it is compared with
+_FARTHEST = 3.0  # an axis reaches at most this many times beyond the force it is compared with
 
 
 class ForceUnit(NamedTuple):
@@ -311,14 +310,6 @@ def force_unit_of(force: Array) -> ForceUnit:
     return _KILONEWTON if np.abs(_finite(force)).max(initial=0.0) >= 1000.0 else _NEWTON
 
 
-def impulse_unit(force_unit: float) -> str:
-    """Return the name of the unit of ξ, the force unit times one second.
-
-    force_unit : U [N].
-    """
-    return f"{force_unit_name(force_unit)} s"
-
-
 def paper_design(history: History) -> PaperIdentifier:
     """Return the design of a run of the paper's identifier, whose weights and error have units."""
     if not isinstance(history.design, PaperIdentifier):
@@ -332,7 +323,7 @@ def force_range(reference: Array, *others: Array) -> tuple[float, float]:
     A law that diverges or a model that is far off leaves the panel instead of flattening the rest.
     """
     largest = _finite(reference)
-    bound = FARTHEST * float(np.abs(largest).max(initial=0.0)) or np.inf
+    bound = _FARTHEST * float(np.abs(largest).max(initial=0.0)) or np.inf
     every = np.concatenate([largest, *(_finite(other) for other in others)])
     every = every[np.abs(every) <= 1e12]
     low = max(float(every.min(initial=0.0)), -bound)

@@ -10,25 +10,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import LONG, Array, blocks
+from codegen.arrays import LONG, Array, thinning
 from identifier.run import History
 from identifier.setup import Block
 from models.recordings import Recording
 
 COLUMNS = 1500  # of pixels, more than any panel has
-CELLS = (400, 240)  # of a cloud, across and up: a dot covers several
 
-Samples = NDArray[Any]  # indices, or whether each sample is meant
-Signal = Callable[[slice | Samples], NDArray[Any]]  # values (k,) or (k, m) at some samples
+_Samples = NDArray[Any]  # indices, or whether each sample is meant
+Signal = Callable[[slice | _Samples], NDArray[Any]]  # values (k,) or (k, m) at some samples
 
 
-def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> Samples:
+def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> _Samples:
     """Return which samples within the ends of a time axis are drawn.
 
     t : times of the samples (n,) [s].   ends : first and last time [s].
     """
     if len(t) <= LONG:
-        within: Samples = (t >= ends[0]) & (t <= ends[1])
+        within: _Samples = (t >= ends[0]) & (t <= ends[1])
         return within
     first = int(np.searchsorted(t, ends[0], side="left"))
     last = int(np.searchsorted(t, ends[1], side="right"))
@@ -39,7 +38,7 @@ def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> Samples:
     found = [np.array([first, last - 1])]
     for begin in range(first, last, size):
         part = slice(begin, min(begin + size, last))
-        found.append(begin + farthest([signal(part) for signal in signals], width))
+        found.append(begin + _farthest([signal(part) for signal in signals], width))
     return np.unique(np.concatenate(found))
 
 
@@ -53,7 +52,7 @@ def drawn_times(recording: Recording, t: Array) -> Array:
     return np.where(np.diff(segment, prepend=segment[:1]) > 0, np.nan, t)
 
 
-def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
+def _farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
     """Return the samples that are lowest or highest among `width` neighbors, rising.
 
     signals : (k,) or (k, m) each; the last neighbors may be fewer.
@@ -71,76 +70,29 @@ def farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
     return np.unique(np.concatenate(found))
 
 
-class DrawnRun:
-    """What is drawn of what a run recorded, gathered block by block."""
-
-    def __init__(self, history: History, tell: Callable[[Block], Sequence[Array]]) -> None:
-        self._recording, self._tell = history.recording, tell
-        n = len(self._recording)
-        self._width = 1 if n <= LONG else -(-n // COLUMNS)
-        self._times: list[Array] = []
-        self._values: list[list[Array]] = []
-
-    def take(self, block: Block) -> None:
-        given, here = self._tell(block), self._recording.t[block.part]
-        part: Any = slice(None) if self._width == 1 else farthest(given, self._width)
-        self._times.append(here[part])
-        self._values.append([one[part] for one in given])
-
-    def curves(self) -> tuple[Array, list[Array]]:
-        """Return times and values as they are drawn: (k,) and (k, ...) each.
-
-        Times are those of `drawn_times`.
-        """
-        joined = [np.concatenate(one) for one in zip(*self._values, strict=True)]
-        return drawn_times(self._recording, np.concatenate(self._times)), joined
-
-
 def shown_of_run(
     history: History, tell: Callable[[Block], Sequence[Array]]
 ) -> tuple[Array, list[Array]]:
-    """Return times and values of what a run recorded, as `DrawnRun` gathers them."""
-    drawn = DrawnRun(history, tell)
-    for block in history.blocks():
-        drawn.take(block)
-    return drawn.curves()
+    """Return times and values as they are drawn of what a run recorded: (k,) and (k, ...) each.
 
-
-def cloud(n: int, slips: Signal, heights: Sequence[Signal], counts: Signal) -> Samples:
-    """Return which samples a cloud of points shows: of those that look alike the first.
-
-    slips : across (k, m).   heights : of each curve (k, m).
-    counts : whether samples are drawn at all (k,).
+    tell : returns the values of a block.
     """
-    if n <= LONG:
-        everything: Samples = counts(slice(0, n))
-        return everything
-    signals = [slips, *heights]
-    low = [np.full(2, np.inf) for _ in signals]
-    high = [np.full(2, -np.inf) for _ in signals]
-    for part in blocks(n):
-        kept = counts(part)
-        for k, signal in enumerate(signals):
-            for axle, values in enumerate(signal(part)[kept].T.copy()):  # rows are looked at faster
-                low[k][axle] = min(low[k][axle], values.min(initial=np.inf))
-                high[k][axle] = max(high[k][axle], values.max(initial=-np.inf))
-    seen = np.zeros((len(heights), 2, *CELLS), dtype=bool)
-    first = np.zeros(CELLS[0] * CELLS[1], dtype=np.intp)
-    found = []
-    for part in blocks(n):
-        kept = np.flatnonzero(counts(part))
-        across = _cells(slips(part)[kept], low[0], high[0], CELLS[0])
-        for k, signal in enumerate(heights):
-            up = _cells(signal(part)[kept], low[1 + k], high[1 + k], CELLS[1])
-            for axle in (0, 1):
-                place = across[:, axle] * CELLS[1] + up[:, axle]
-                first[place[::-1]] = kept[::-1]  # the last that is written is the first sample
-                marks = seen[k, axle].reshape(-1)
-                found.append(part.start + kept[~marks[place] & (first[place] == kept)])
-                marks[place] = True
-    return np.unique(np.concatenate(found))
+    recording, n = history.recording, len(history.recording)
+    times, found = [], []
+    for block in history.blocks():
+        values, here = tell(block), recording.t[block.part]
+        part: Any = slice(None) if n <= LONG else _farthest(values, -(-n // COLUMNS))
+        times.append(here[part])
+        found.append([one[part] for one in values])
+    joined = [np.concatenate(one) for one in zip(*found, strict=True)]
+    return drawn_times(recording, np.concatenate(times)), joined
 
 
-def _cells(values: Array, low: Array, high: Array, count: int) -> NDArray[np.intp]:
-    share = (values - low) / np.maximum(high - low, 1e-300)
-    return np.clip(np.nan_to_num(share) * count, 0, count - 1).astype(np.intp)
+def cloud(t: Array, *signals: Signal) -> _Samples:
+    """Return which samples a cloud of points shows: some at even distances, and the outermost.
+
+    t : times of the samples (n,) [s].   signals : across and up.
+    """
+    every = np.arange(0, len(t), thinning(len(t)))
+    outermost = shown(t, (float(t[0]), float(t[-1])), *signals)
+    return every if len(t) <= LONG else np.union1d(every, outermost)

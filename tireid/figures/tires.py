@@ -17,13 +17,13 @@ from models.bicycle import measured_slip
 from models.recordings import Recording
 from tireid.figures import style
 from tireid.figures.drive import AT_THE_END, ORACLE, tire_look
-from tireid.figures.thinned import DrawnRun, cloud
+from tireid.figures.thinned import cloud, shown_of_run
 
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
 
-UNKNOWN = "slip not known"
-BAND = "band of 90 %"
+_UNKNOWN = "slip not known"
+_BAND = "band of 90 %"
 _GUARANTEED = "guaranteed, steady"
 _CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
     "linestyle": "",
@@ -58,7 +58,8 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         return np.rad2deg(recording.alpha(vehicle.l_f, vehicle.l_r, at))
 
     heights = [force.__getitem__, against.__getitem__, lambda at: force[at] - against[at]]
-    part = cloud(len(recording), slip, heights, lambda at: recording.v_x[at] >= model.min_speed)
+    part = cloud(recording.t, slip, *heights)
+    part = part[recording.v_x[part] >= model.min_speed]
     alpha, frozen, reference = slip(part), force[part], against[part]
     unit = style.force_unit_of(reference)
     frozen, reference = frozen / unit.newtons, reference / unit.newtons
@@ -87,7 +88,7 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         _label_slip(lowest, axle)
     style.label_forces(panels, unit, residual=known is not None)
     labels = {label for axes in figure.axes for label in axes.get_legend_handles_labels()[1]}
-    style.legend_above(figure, columns=None if len(labels) < 6 else 3, order=(UNKNOWN,))
+    style.legend_above(figure, columns=None if len(labels) < 6 else 3, order=(_UNKNOWN,))
     return figure
 
 
@@ -104,7 +105,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
     if band is not None:  # under the points, which it would make grey
         edge: Mapping[str, Any] = {"edgecolor": style.BLUE, "linewidth": 0.4, "zorder": 1.5}
         low, high = (force[:, axle] / newtons for force in band)
-        axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=BAND, **edge)
+        axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=_BAND, **edge)
     look: Mapping[str, Any] = {"color": style.PURPLE, "linewidth": 0.9, "linestyle": "--"}
     for side in model.guaranteed_band(slip) or ():
         axes.plot(degrees, side[:, axle] / newtons, label=_GUARANTEED, **look)
@@ -117,7 +118,7 @@ def _shade_unknown(axes: Axes, known: float, ends: Array) -> None:
     """Shade the slip [deg] that the model does not know."""
     for low, high in ((ends[0], -known), (known, ends[1])):
         if low < high:
-            axes.axvspan(low, high, color="#EFE9DD", linewidth=0.0, zorder=0, label=UNKNOWN)
+            axes.axvspan(low, high, color="#EFE9DD", linewidth=0.0, zorder=0, label=_UNKNOWN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,33 +195,19 @@ def _missed_of_truth(
     return [one for one in found if not one[0].startswith(ORACLE)]
 
 
-def drawn_tracks(history: History) -> DrawnRun | None:
-    """Return what gathers `learnt_axles_figure` block by block; None where there is nothing to."""
-    if not history.tracks_over(next(history.blocks())):
-        return None
-    return DrawnRun(history, lambda block: [one.values for one in history.tracks_over(block)])
-
-
 @style.styled
-def learnt_axles_figure(
-    history: History, freeze_times: Sequence[float] = (), drawn: DrawnRun | None = None
-) -> Figure:
+def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) -> Figure:
     """Draw what was learnt of both axles over time.
 
     Of the axle identifier cornering stiffness, relaxation length and capacity, the force at which
     the learnt curve saturates, over the static load of the axle.
 
     freeze_times : times at which weights were taken [s].
-    drawn : `drawn_tracks` that has taken all blocks; None looks at the run.
     """
-    if drawn is None:
-        drawn = drawn_tracks(history)
-        if drawn is None:
-            raise TypeError(f"{history.design} has no estimates of the axles")
-        for block in history.blocks():
-            drawn.take(block)
     tracks, t = history.tracks_over(next(history.blocks())), history.recording.t
-    at, curves = drawn.curves()
+    if not tracks:
+        raise TypeError(f"{history.design} has no estimates of the axles")
+    at, curves = shown_of_run(history, lambda block: [o.values for o in history.tracks_over(block)])
     figure = style.new_figure(style.PAGE, 4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):

@@ -1,7 +1,7 @@
 """Learning from thousands of logs: which they are, what is learnt of one, and who does it.
 
 A log is read and fitted as `tireid identify` does it, without figures, its samples averaged to 50
-Hz; what it tells without the prior is kept (`identifier.estimate.information`). A log that cannot
+Hz; its information without the prior is kept (`identifier.estimate.information`). A log that cannot
 be used becomes a row with its error. Work is done by processes of this machine or by a Dask
 cluster; a process that dies loses what it was doing, which is done again, and a log that it dies of
 twice becomes a row with an error.
@@ -45,14 +45,14 @@ from models.recordings import LogMap, Recording, RecordingError, read_repaired, 
 from models.vehicle import Vehicle
 from tireid.fleet.store import INDEX, LogRow, Store, information_columns, needed, protocols
 
-TOGETHER = 8  # logs that a process takes at most at once, and whose rows are written at once
+_TOGETHER = 8  # logs that a process takes at most at once, and whose rows are written at once
 _PORTIONS = 16  # that few logs are shared into
 PART = 300.0  # s of a log whose information is kept as one
-DT = 0.01  # s, to which logs are brought
-Judging = Literal["motion", "none"]
-DATE = r"\d{4}-\d{2}-\d{2}(?:[T ][\d.:-]+(?:Z|[+-]\d{2}:?\d{2})?)?"
+_DT = 0.01  # s, to which logs are brought
+_Judging = Literal["motion", "none"]
+_DATE = r"\d{4}-\d{2}-\d{2}(?:[T ][\d.:-]+(?:Z|[+-]\d{2}:?\d{2})?)?"
 _FIELD = re.compile(r"\{(\w+)\}")
-EXPECTED = (ValueError, ArithmeticError, OSError, MemoryError, CompilationError, ImportError)
+_EXPECTED = (ValueError, ArithmeticError, OSError, MemoryError, CompilationError, ImportError)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -88,7 +88,7 @@ class Telling:
 
     log_map: LogMap
     start: TireModel | None = None
-    judging: Judging = "motion"
+    judging: _Judging = "motion"
     check: bool = True
     part: float = PART
 
@@ -113,7 +113,7 @@ class Telling:
         parts = (
             vehicle,
             (beliefs.mean.tobytes(), beliefs.information.tobytes()),
-            InertialIdentifier.for_vehicle(vehicle, dt=DT),
+            InertialIdentifier.for_vehicle(vehicle, dt=_DT),
             replace(self.log_map, dbc=""),
             Path(dbc).read_bytes() if dbc else b"",
             None if self.start is None else json.dumps(self.start.to_dict()),
@@ -201,7 +201,7 @@ def tag_pattern(tags: str) -> re.Pattern[str]:
         raise ValueError(f"--tags {tags}: wants {{name}} for parts of a path, each name once")
     parts = _FIELD.split(tags)
     words = [re.escape(text).replace(r"\*", "[^/]*") for text in parts[::2]]
-    groups = [f"(?P<{name}>{DATE if name == 'date' else '[^/]+?'})" for name in parts[1::2]]
+    groups = [f"(?P<{name}>{_DATE if name == 'date' else '[^/]+?'})" for name in parts[1::2]]
     body = "".join(a + b for a, b in zip(words, [*groups, ""], strict=True))
     return re.compile(rf"(?:^|/){body}$")
 
@@ -216,17 +216,17 @@ def _absolute(root: str) -> str:
     return _address(*needed("fsspec.core").url_to_fs(root)).rstrip("/") + "/"
 
 
-CHANGES = ("etag", "lastmodified", "md5hash", "contentmd5", "generation", "mtime", "created")
+_CHANGES = ("etag", "lastmodified", "md5hash", "contentmd5", "generation", "mtime", "created")
 
 
 def _stamp(address: str, info: Mapping[str, Any]) -> str:
-    """Return a hash of what changes with a file; empty where its file system tells nothing."""
+    """Return a hash of what changes with a file; empty where its file system says nothing."""
     if "://" not in address:
         at = Path(address).stat()  # of the file itself, where `info` is of a link to it
         given: list[Any] = [at.st_ino, at.st_ctime_ns, at.st_mtime_ns, at.st_size]
     else:
         some = {key.replace("_", "").lower(): value for key, value in info.items()}
-        given = [(key, str(some[key])) for key in CHANGES if some.get(key)]
+        given = [(key, str(some[key])) for key in _CHANGES if some.get(key)]
         if not given:
             return ""
         given.append(("size", info.get("size")))
@@ -264,12 +264,11 @@ def _learn_log(task: _Task, telling: Telling, car: Car, known: Set[str] = frozen
                     raise
             each = [replace(row, run=name) for name in names]
             return Learnt([_tried(one, path, car.vehicle, telling) for one in each], [])
-    except EXPECTED as error:
+    except _EXPECTED as error:
         return Learnt([_failed(row, error)], [])
 
 
 def row_of(task: _Task, car: Car) -> LogRow:
-    """Return the row of a log of which nothing was read yet."""
     tags = dict(task.tags)
     return LogRow(
         log=task.log,
@@ -284,7 +283,6 @@ def row_of(task: _Task, car: Car) -> LogRow:
 
 
 def _content_of(path: Path) -> str:
-    """Return the hash of what a file holds."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, partial(hashlib.blake2b, digest_size=16)).hexdigest()
 
@@ -293,7 +291,7 @@ def _tried(row: LogRow, path: Path, vehicle: Vehicle, telling: Telling) -> LogRo
     """Return the row of a run; where it cannot be used, it says why."""
     try:
         return _of_run(row, path, vehicle, telling)
-    except EXPECTED as error:
+    except _EXPECTED as error:
         return _failed(row, error)
 
 
@@ -304,7 +302,7 @@ def _failed(row: LogRow, error: Exception) -> LogRow:
 
 def _of_run(row: LogRow, path: Path, vehicle: Vehicle, telling: Telling) -> LogRow:
     recording, vehicle = read_repaired(
-        path, vehicle, row.run or None, dt=DT, check=telling.check, log_map=telling.log_map
+        path, vehicle, row.run or None, dt=_DT, check=telling.check, log_map=telling.log_map
     )
     return learnt(row, recording, vehicle, telling)
 
@@ -312,7 +310,7 @@ def _of_run(row: LogRow, path: Path, vehicle: Vehicle, telling: Telling) -> LogR
 def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling) -> LogRow:
     """Return the row with what is learnt of its log.
 
-    recording : the log, at `DT`.
+    recording : the log, at `_DT`.
     """
     counted_samples(recording, vehicle.lowest_speed)  # refuses a car that never drives
     begin, start = float(recording.t[0]), telling.start
@@ -325,7 +323,7 @@ def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling
     model, _, parts = fit([measured], vehicle, priors, block=telling.part, coarse=True)
     return replace(
         row,
-        **conditions(recording),
+        **_conditions(recording),
         **(_judged(model, recording) if telling.judging == "motion" else {}),
         **_of_model(model),
         car=json.dumps(vehicle_numbers(vehicle)),
@@ -347,7 +345,7 @@ def _near(log: str) -> Iterator[Path]:
         yield near
 
 
-def conditions(recording: Recording) -> dict[str, Any]:
+def _conditions(recording: Recording) -> dict[str, Any]:
     """Return how a log was driven, by columns of a row."""
     a_y = recording.v_x * recording.r
     return {
@@ -413,7 +411,6 @@ class LearnSome:
     known: Set[str] = frozenset()
 
     def __call__(self, tasks: Sequence[_Task]) -> Learnt:
-        """Return the rows of some logs."""
         each = [_learn_log(one, self.telling, self.cars[one.vehicle], self.known) for one in tasks]
         return Learnt(
             [row for one in each for row in one.rows], [two for one in each for two in one.copies]
@@ -488,8 +485,7 @@ def learn_fleet(
 
 
 def _portions(tasks: Sequence[_Task]) -> list[tuple[_Task, ...]]:
-    """Return logs in portions, small ones where there are few."""
-    size = min(max(len(tasks) // _PORTIONS, 1), TOGETHER)
+    size = min(max(len(tasks) // _PORTIONS, 1), _TOGETHER)
     return [tuple(tasks[k : k + size]) for k in range(0, len(tasks), size)]
 
 
@@ -544,7 +540,7 @@ def on_this_machine(jobs: int) -> Map:
 def on_a_cluster(elsewhere: Callable[..., Iterator[Any]]) -> Map:
     """Return a map over portions of logs that outlives workers that die; its order is any.
 
-    elsewhere : of `tireid.cluster.cluster`; tells `lost` what several workers died of.
+    elsewhere : of `tireid.cluster.cluster`; gives `lost` what several workers died of.
     """
 
     def spread_map(work: Any, portions: Any) -> Iterator[Learnt]:
@@ -559,7 +555,7 @@ def on_a_cluster(elsewhere: Callable[..., Iterator[Any]]) -> Map:
     return spread_map
 
 
-_WORK: list[LearnSome] = []  # of a process: told once, as it holds what the store knows
+_WORK: list[LearnSome] = []  # of a process: given once, as it holds what the store knows
 
 
 def _prepare_process(work: LearnSome) -> None:

@@ -1,13 +1,13 @@
 """One model of many logs, and of many cars where the next one starts.
 
-What logs tell adds up (`identifier.estimate.information`), and the model of a group is the optimum
-of their sum and the prior of its car, counted once. Sensors are those of the car, in each log off
-by an error of its own (`APART` of their prior). Where the evidence of a log asks for another
-friction, by `PRICE` as inside a log, its friction is its own.
+The information of logs adds up (`identifier.estimate.information`). The model of a group is the
+optimum of their sum and the prior of its car, counted once. Sensors are those of the car, in each
+log off by an error of its own (`_APART` of their prior). Where the evidence of a log asks for
+another friction, by `PRICE` as inside a log, its friction is its own.
 
-Cars of a fleet differ: θ_v ~ N(m, T) of each car v, of which its logs tell θ̂_v with covariance P_v.
+Cars of a fleet differ: θ_v ~ N(m, T) of each car v, of which its logs give θ̂_v with covariance P_v.
 m and T are found by expectation and maximization (N. Laird and J. Ware, Biometrics 38, 1982), both
-held by the prior of the estimate: m ~ N(m₀, S₀), T as by `WORTH` more cars. Where the next car
+held by the prior of the estimate: m ~ N(m₀, S₀), T as by `_WORTH` more cars. Where the next car
 starts is m, as sure as N(m, T + M), M = (V/T + 1/S₀)⁻¹.
 """
 
@@ -34,24 +34,24 @@ from tireid.fleet.store import MOVING, LogRow
 
 _TAGGED = ("vehicle", "tires", "date")
 BY = (*_TAGGED, "week", "month", "log", "setting")
-INFORMATION = ("reach", "part_begin", "part_seconds", "matrix", "vector")
+_INFORMATION = ("reach", "part_begin", "part_seconds", "matrix", "vector")
 COLUMNS = (
     *WHICH,
     *_TAGGED,
     "tags",
     "valid",
     "car",
-    *INFORMATION,
+    *_INFORMATION,
 )  # of a row, that are asked for here
-ROUNDS = 3  # over the rows
-PASSES = 60  # of expectation and maximization
-WORTH = 2.0  # cars that the identifier's prior counts as
-CHANGES = ("steering_zero", "v_y_bias", "v_y_angle")  # of sensors, from log to log
-APART = 0.1  # their standard deviation, of that of their prior
-TIRES = [INDEX[name] for name in MOVING if name not in SENSORS]
-OFF = [INDEX[name] for name in SENSORS]
-ROAD = INDEX["ln_road"]
-Key = tuple[tuple[str, str], ...]
+_ROUNDS = 3  # over the rows
+_PASSES = 60  # of expectation and maximization
+_WORTH = 2.0  # cars that the identifier's prior counts as
+_CHANGES = ("steering_zero", "v_y_bias", "v_y_angle")  # of sensors, from log to log
+_APART = 0.1  # their standard deviation, of that of their prior
+_TIRES = [INDEX[name] for name in MOVING if name not in SENSORS]
+_OFF = [INDEX[name] for name in SENSORS]
+_ROAD = INDEX["ln_road"]
+_Key = tuple[tuple[str, str], ...]
 
 
 class MergeError(TireidError, ValueError):
@@ -66,7 +66,7 @@ class Merged:
     elsewhere : how many of them were driven on another road.
     """
 
-    key: Key
+    key: _Key
     logs: int
     elsewhere: int
     information: Information
@@ -78,7 +78,7 @@ class Merged:
         return " ".join(value or "-" for _, value in self.key) or "all"
 
 
-def key_of(row: LogRow, by: Sequence[str]) -> Key:
+def _key_of(row: LogRow, by: Sequence[str]) -> _Key:
     """Return what a log belongs to.
 
     by : names of `BY` or of tags.
@@ -101,7 +101,6 @@ def _value(row: LogRow, name: str) -> str:
 
 
 def day_of(row: LogRow) -> date:
-    """Return the day of a log."""
     try:
         return date.fromisoformat(row.date[:10])
     except ValueError:
@@ -118,20 +117,20 @@ def usable(row: LogRow, *, refused: bool = False) -> bool:
     return bool(not row.error and row.part_begin and (refused or row.valid is not False))
 
 
-def grouped(rows: Iterable[LogRow], by: Sequence[str]) -> Iterator[tuple[Key, LogRow]]:
+def grouped(rows: Iterable[LogRow], by: Sequence[str]) -> Iterator[tuple[_Key, LogRow]]:
     """Yield rows with what they belong to.
 
     by : names of `BY` or of tags.
     """
-    cars: dict[Key, tuple[str, str]] = {}
+    cars: dict[_Key, tuple[str, str]] = {}
     settings: dict[tuple[object, ...], str] = {}
     for row in rows:
-        key = key_of(row, by)
+        key = _key_of(row, by)
         car, first = cars.setdefault(key, (row.car, row.name))
         if car != row.car:
             raise MergeError(
                 f"{first} and {row.name} are of cars whose files differ: merge --by vehicle (or "
-                "tell it by --tags), or --by setting; fleet prior is for many cars"
+                "declare it by --tags), or --by setting; fleet prior is for many cars"
             )
         setting = settings.setdefault((key, *row.key[:2]), row.setting)
         if setting != row.setting:
@@ -146,11 +145,11 @@ def grouped(rows: Iterable[LogRow], by: Sequence[str]) -> Iterator[tuple[Key, Lo
 def merge(rows: Callable[[], Iterable[LogRow]], by: Sequence[str]) -> list[Merged]:
     """Return the model of each group of logs, by its key; rows are held one at a time.
 
-    rows : yields them, three times: what all say tells on which road each was, and most.
+    rows : yields them, three times: the sum of all shows on which road each was, and most.
     by : what the logs of a group have in common; empty merges all.
     """
-    sums: dict[Key, _Sum] = {}
-    for _ in range(ROUNDS):
+    sums: dict[_Key, _Sum] = {}
+    for _ in range(_ROUNDS):
         for key, row in grouped(rows(), by):
             if key not in sums:
                 sums[key] = _Sum(row.declared_car)
@@ -161,7 +160,7 @@ def merge(rows: Callable[[], Iterable[LogRow]], by: Sequence[str]) -> list[Merge
 
 
 class _Sum:
-    """What the logs of a group tell, in three rounds.
+    """The information of the logs of a group, in three rounds.
 
     At the optimum of all on one road (round 1) the friction of each part over it is found (2);
     their median is the road of the curves, and parts far from it have a friction of their own (3).
@@ -202,11 +201,11 @@ class _Sum:
         self.logs += 1
 
     def _on_its_road(self, one: Information) -> Information:
-        """Return what a part tells, its friction its own where the evidence asks for it."""
+        """Return the information of a part, its friction its own where the evidence asks for it."""
         if self.at is None:
             return one
         u, slopes = self.at
-        along = slopes[:, ROAD]
+        along = slopes[:, _ROAD]
         known = along @ one.matrix @ along + ANOTHER_ROAD**-2
         ln_m = float(along @ (one.vector - one.matrix @ u) / known)
         if self.road is None:
@@ -221,9 +220,9 @@ class _Sum:
         """Return the optimum and its covariance, as of `settled`."""
         return settled(self.beliefs.after(self.information), self.beliefs.mean)
 
-    def merged(self, key: Key) -> Merged:
+    def merged(self, key: _Key) -> Merged:
         p, covariance = self.settled()
-        of_next = [INDEX[name] for name in CHANGES]  # its sensors are off by an error of its own
+        of_next = [INDEX[name] for name in _CHANGES]  # its sensors are off by an error of its own
         covariance[of_next, of_next] += self.errors[1] ** 2
         model = _model(self.vehicle, p, covariance, self.reach)
         return Merged(
@@ -237,10 +236,10 @@ class _Sum:
 
 def errors_of(beliefs: Priors) -> tuple[Array, Array]:
     """Return along what in u sensors change from log to log (m, k), and by how much (k,)."""
-    along = np.zeros((SIZE, len(CHANGES)))
-    for k, name in enumerate(CHANGES):
+    along = np.zeros((SIZE, len(_CHANGES)))
+    for k, name in enumerate(_CHANGES):
         along[PLACE[name], k] = 1.0
-    return along, APART * beliefs.sd[[INDEX[name] for name in CHANGES]]
+    return along, _APART * beliefs.sd[[INDEX[name] for name in _CHANGES]]
 
 
 # Where the next car starts.
@@ -250,7 +249,7 @@ def errors_of(beliefs: Priors) -> tuple[Array, Array]:
 class _FleetPrior:
     """What cars of a fleet have in common, and how they differ.
 
-    mean : m of `TIRES`, lengths in wheelbases (q,).
+    mean : m of `_TIRES`, lengths in wheelbases (q,).
     spread : T + M (q, q).
     cars : V.
     reach : of all their drives.
@@ -268,8 +267,8 @@ class _FleetPrior:
         """
         usual, size = Priors.of(vehicle), sizes(vehicle)
         p, covariance = usual.mean.copy(), usual.covariance
-        p[TIRES] = self.mean * size
-        covariance[np.ix_(TIRES, TIRES)] = self.spread * np.outer(size, size)
+        p[_TIRES] = self.mean * size
+        covariance[np.ix_(_TIRES, _TIRES)] = self.spread * np.outer(size, size)
         return _model(vehicle, np.clip(p, usual.low, usual.high), covariance, self.reach)
 
 
@@ -280,11 +279,11 @@ def _model(vehicle: Vehicle, p: Array, covariance: Array, reach: Reach) -> Fitte
 
 
 def sizes(vehicle: Vehicle) -> Array:
-    """Return what `TIRES` of a car are measured in: lengths in wheelbases, (q,)."""
+    """Return what `_TIRES` of a car are measured in: lengths in wheelbases, (q,)."""
     lengths = {
         f"{name}_{axle}" for name, one in OF_AXLES.items() for axle in "fr" if one.per == "L"
     }
-    return np.array([vehicle.wheelbase if NAMES[k] in lengths else 1.0 for k in TIRES])
+    return np.array([vehicle.wheelbase if NAMES[k] in lengths else 1.0 for k in _TIRES])
 
 
 def fleet_prior(cars: Sequence[Merged]) -> _FleetPrior:
@@ -296,13 +295,13 @@ def fleet_prior(cars: Sequence[Merged]) -> _FleetPrior:
     m, T, V = m0, S0, len(listed)
     held = np.linalg.inv(S0)
     matrices, vectors = (np.array([one[k] for one in listed]) for k in (2, 3))
-    for _ in range(PASSES):
+    for _ in range(_PASSES):
         between = np.linalg.inv(T)
         P = np.linalg.inv(between + matrices)
         means = np.einsum("vij,vj->vi", P, between @ m + vectors)
         M = np.linalg.inv(V * between + held)
         m = M @ (between @ means.sum(axis=0) + held @ m0)
-        T = (WORTH * S0 + (means - m).T @ (means - m) + P.sum(axis=0)) / (WORTH + V)
+        T = (_WORTH * S0 + (means - m).T @ (means - m) + P.sum(axis=0)) / (_WORTH + V)
     reach = Reach()
     for one in cars:
         model = one.model
@@ -312,17 +311,17 @@ def fleet_prior(cars: Sequence[Merged]) -> _FleetPrior:
 
 
 def _of_size(one: Merged) -> tuple[Array, Array, Array, Array]:
-    """Return prior mean and covariance of a car's `TIRES`, and matrix and vector of its logs.
+    """Return prior mean and covariance of a car's `_TIRES`, and matrix and vector of its logs.
 
     All over its size; of the sensors the logs' information is marginal.
     """
     model = one.model
     usual, size = Priors.of(model.vehicle), sizes(model.vehicle)
     _, slope, H = one.information.around(model.p)
-    known = H[np.ix_(OFF, OFF)] + usual.information[np.ix_(OFF, OFF)]
-    across = H[np.ix_(TIRES, OFF)]
-    matrix = H[np.ix_(TIRES, TIRES)] - across @ np.linalg.solve(known, across.T)
-    vector = matrix @ model.p[TIRES] - slope[TIRES]  # at the optimum of the sensors
+    known = H[np.ix_(_OFF, _OFF)] + usual.information[np.ix_(_OFF, _OFF)]
+    across = H[np.ix_(_TIRES, _OFF)]
+    matrix = H[np.ix_(_TIRES, _TIRES)] - across @ np.linalg.solve(known, across.T)
+    vector = matrix @ model.p[_TIRES] - slope[_TIRES]  # at the optimum of the sensors
     both = np.outer(size, size)
-    covariance = usual.covariance[np.ix_(TIRES, TIRES)]
-    return usual.mean[TIRES] / size, covariance / both, matrix * both, vector * size
+    covariance = usual.covariance[np.ix_(_TIRES, _TIRES)]
+    return usual.mean[_TIRES] / size, covariance / both, matrix * both, vector * size

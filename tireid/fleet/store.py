@@ -34,15 +34,27 @@ from identifier.motion.parameters import NAMES
 from models.extras import needs
 from models.vehicle import Vehicle, sedan
 
-Key = tuple[str, str, str]
+_Key = tuple[str, str, str]
 _BUCKETS = 16
-FORMAT = "tireid fleet 3"
-BATCH = 512  # rows that are read at once
+_FORMAT = "tireid fleet 3"
+_BATCH = 512  # rows that are read at once
 SMALL = 1 << 22  # bytes of a file that is fetched as one
-HELD, AT_ONCE = 1 << 26, 1000  # bytes and files of what pends that are sorted at once
+_HELD, AT_ONCE = 1 << 26, 1000  # bytes and files of what pends that are sorted at once
 MOVING = [name for name, moves in zip(NAMES, Priors.of(sedan()).moves, strict=True) if moves]
-OBSERVABLE = np.array([*range(FORCES), *(PLACE[name] for name in MOVING if name in PLACE)])  # of u
-WHOLE = {"s3", "s3a", "gs", "gcs", "abfs", "abfss", "az", "adl", "oss", "oci", "memory"}  # see _put
+_OBSERVABLE = np.array([*range(FORCES), *(PLACE[name] for name in MOVING if name in PLACE)])  # of u
+_WHOLE = {
+    "s3",
+    "s3a",
+    "gs",
+    "gcs",
+    "abfs",
+    "abfss",
+    "az",
+    "adl",
+    "oss",
+    "oci",
+    "memory",
+}  # see _put
 
 
 class StoreError(TireidError, ValueError):
@@ -87,7 +99,7 @@ class LogRow:
         model of it leaves unexplained of both axles, (8,).
     part_begin : when the parts begin [s], counted from the first sample, k of them.
     part_seconds : of driving that counts [s], (k,).
-    matrix : information of the parts over `OBSERVABLE`, upper triangles, (k, q (q + 1)/2) by rows.
+    matrix : information of the parts over `_OBSERVABLE`, upper triangles, (k, q (q + 1)/2) by rows.
     vector : of the parts, (k, q) by rows.
     """
 
@@ -140,7 +152,7 @@ class LogRow:
         return f"{self.content} {self.setting}"
 
     @property
-    def key(self) -> Key:
+    def key(self) -> _Key:
         """What its row is known by: content, or name where that could not be read, run, setting."""
         return self.content or self.log, self.run, self.setting
 
@@ -152,7 +164,6 @@ class LogRow:
 
     @property
     def declared_car(self) -> Vehicle:
-        """The car as given."""
         try:
             return vehicle_from(json.loads(self.car))
         except ValueError as error:
@@ -160,22 +171,21 @@ class LogRow:
 
     @property
     def frozen(self) -> FittedModel:
-        """The frozen model."""
         return FittedModel.from_dict(json.loads(self.model), self.name)
 
     @property
     def parts(self) -> list[Information]:
-        """What its parts tell of the tires, in the order of time."""
-        k, q = len(self.part_begin), len(OBSERVABLE)
+        """The information of its parts, in the order of time."""
+        k, q = len(self.part_begin), len(_OBSERVABLE)
         self.numbers("part_begin", k)
         triangles = self.numbers("matrix", k, q * (q + 1) // 2)
         vectors, seconds = self.numbers("vector", k, q), self.numbers("part_seconds", k)
-        rows, columns = OBSERVABLE[np.array(np.triu_indices(q))]
+        rows, columns = _OBSERVABLE[np.array(np.triu_indices(q))]
         found = []
         for packed, vector, some in zip(triangles, vectors, seconds.tolist(), strict=True):
             matrix, whole = np.zeros((SIZE, SIZE)), np.zeros(SIZE)
             matrix[rows, columns] = matrix[columns, rows] = packed
-            whole[OBSERVABLE] = vector
+            whole[_OBSERVABLE] = vector
             try:
                 found.append(Information(matrix=matrix, vector=whole, seconds=some))
             except ValueError as error:
@@ -198,20 +208,20 @@ class LogRow:
 
 
 COLUMNS = tuple(field.name for field in fields(LogRow))
-LISTS = ("reach", *COLUMNS[COLUMNS.index("part_begin") :])
-WORDS = ("log", "run", "content", "setting", "stamp", "vehicle", "tires", "date", "tags", "error",
+_LISTS = ("reach", *COLUMNS[COLUMNS.index("part_begin") :])
+_WORDS = ("log", "run", "content", "setting", "stamp", "vehicle", "tires", "date", "tags", "error",
          "car", "model")  # fmt: skip
 INDEX = ("log", "run", "content", "setting", "stamp", "error")  # which rows there are
-HEAVY = (*LISTS, "car", "model")  # read where they are asked for by name
+_HEAVY = (*_LISTS, "car", "model")  # read where they are asked for by name
 
 
 def information_columns(parts: Sequence[Information]) -> dict[str, Any]:
-    """Return the columns that hold what parts of a log tell."""
-    rows, columns = OBSERVABLE[np.array(np.triu_indices(len(OBSERVABLE)))]
+    """Return the columns that hold the information of the parts of a log."""
+    rows, columns = _OBSERVABLE[np.array(np.triu_indices(len(_OBSERVABLE)))]
     return {
         "part_seconds": [one.seconds for one in parts],
         "matrix": np.ravel([one.matrix[rows, columns] for one in parts]).tolist(),
-        "vector": np.ravel([one.vector[OBSERVABLE] for one in parts]).tolist(),
+        "vector": np.ravel([one.vector[_OBSERVABLE] for one in parts]).tolist(),
     }
 
 
@@ -262,7 +272,6 @@ class Store:
             raise StoreError(f"{self.address} holds something else: choose another folder")
 
     def require(self) -> None:
-        """Refuse an address without rows."""
         if not self.exists:
             raise StoreError(f"{self.address} is no store: tireid fleet learn LOGS --out makes one")
 
@@ -295,10 +304,10 @@ class Store:
         columns = dict.fromkeys([*INDEX, *(_named_in(where) if where else ())])
         tables = {path: self._table(path, size, list(columns)) for path, size in files.items()}
         counts = np.cumsum([0, *map(len, tables.values())])
-        best: dict[Key, tuple[Any, int]] = {}
+        best: dict[_Key, tuple[Any, int]] = {}
         k = 0
         for path, table in tables.items():
-            for batch in table.select(INDEX).to_batches(BATCH):
+            for batch in table.select(INDEX).to_batches(_BATCH):
                 for row in _rows_of(batch):
                     rank = _rank(row, pending=self._pends(path)), k
                     best[row.key] = min(best.get(row.key, rank), rank)
@@ -338,7 +347,7 @@ class Store:
                 parquet.ParquetFile(source) as file,
             ):
                 _require_ours(path, file.schema_arrow)
-                for batch in file.iter_batches(BATCH, columns=names, use_threads=False):
+                for batch in file.iter_batches(_BATCH, columns=names, use_threads=False):
                     if "log" in names and batch.column("log").null_count:
                         raise StoreError(
                             f"{path}: log must be the name of a log in every row, one is empty"
@@ -373,10 +382,14 @@ class Store:
         table = table.replace_schema_metadata(schema().metadata)
         buffer = io.BytesIO()
         parquet.write_table(
-            table, buffer, compression="zstd", row_group_size=8 * BATCH, use_dictionary=list(WORDS)
+            table,
+            buffer,
+            compression="zstd",
+            row_group_size=8 * _BATCH,
+            use_dictionary=list(_WORDS),
         )
         fs, _ = self._place
-        if WHOLE & protocols(fs):
+        if _WHOLE & protocols(fs):
             fs.pipe_file(path, buffer.getvalue())
             return
         fs.makedirs(posixpath.dirname(path), exist_ok=True)
@@ -391,7 +404,7 @@ class Store:
         for path, size in self._sizes("pending").items():
             paths.append(path)
             tables.append(self._table(path, size))
-            if len(paths) == AT_ONCE or sum(table.nbytes for table in tables) > HELD:
+            if len(paths) == AT_ONCE or sum(table.nbytes for table in tables) > _HELD:
                 self._settle(paths, tables)
                 paths, tables = [], []
         if paths:
@@ -415,14 +428,18 @@ class Store:
             self._sort(bucket, sizes, [], frozenset(row.key for row in rows))
 
     def _sort(
-        self, bucket: str, sizes: Mapping[str, int], new: list[Any], without: Set[Key] = frozenset()
+        self,
+        bucket: str,
+        sizes: Mapping[str, int],
+        new: list[Any],
+        without: Set[_Key] = frozenset(),
     ) -> None:
         """Write a bucket with new rows and without some, one of each key, in order."""
         path = self._path("logs", bucket)
         old = [self._table(path, sizes[path])] if path in sizes else []
         table = needed("pyarrow").concat_tables([*old, *new])
         rows, settled = list(_rows_of(table.select(INDEX))), sum(map(len, old))
-        best: dict[Key, int] = {}
+        best: dict[_Key, int] = {}
         for k in sorted(range(len(rows)), key=lambda k: _rank(rows[k], pending=k >= settled)):
             if rows[k].key not in without:
                 best.setdefault(rows[k].key, k)
@@ -434,19 +451,18 @@ class Store:
 
 
 def protocols(fs: Any) -> set[str]:
-    """Return the names of a file system's protocol."""
     return {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)
 
 
 def _require_ours(path: str, found: Any) -> None:
     """Refuse a file whose columns are not those of this version's store."""
     given = (found.metadata or {}).get(b"format", b"").decode(errors="replace")
-    if given.startswith("tireid fleet") and given != FORMAT:
+    if given.startswith("tireid fleet") and given != _FORMAT:
         raise StoreError(
-            f"{path}: is of another version's store ({given}, not {FORMAT}): learn its logs again, "
-            "into a new store"
+            f"{path}: is of another version's store ({given}, not {_FORMAT}): learn its logs "
+            "again, into a new store"
         )
-    if given != FORMAT or found.names != list(COLUMNS):
+    if given != _FORMAT or found.names != list(COLUMNS):
         raise StoreError(f"{path}: is not of this version's store ({given or 'no format'})")
     for name in COLUMNS:
         kind = schema().field(name).type
@@ -467,7 +483,7 @@ def _order(row: LogRow) -> tuple[str, ...]:
 
 def _named_in(where: str) -> list[str]:
     """Return the columns that a condition may ask for: what is heavy only where it names it."""
-    return [name for name in COLUMNS if name not in HEAVY or name in where.lower()]
+    return [name for name in COLUMNS if name not in _HEAVY or name in where.lower()]
 
 
 def _answered(table: Any, taken: Array, where: str, source: str) -> Array:
@@ -496,20 +512,19 @@ def _rows_of(table: Any) -> Iterator[LogRow]:
 
 def _plain(row: Mapping[str, Any]) -> dict[str, Any]:
     """Return a row of Arrow as the arguments of `LogRow`."""
-    empty = {**dict.fromkeys((*LISTS, "findings"), ()), **dict.fromkeys(WORDS, "")}
+    empty = {**dict.fromkeys((*_LISTS, "findings"), ()), **dict.fromkeys(_WORDS, "")}
     return {name: empty.get(name) if value is None else value for name, value in row.items()}
 
 
 def schema() -> Any:
-    """Return the columns of a store with their types."""
     pyarrow = needed("pyarrow")
     kinds = {
         "size": pyarrow.int64(),
         "estimated_v_y": pyarrow.bool_(),
         "valid": pyarrow.bool_(),
         "findings": pyarrow.list_(pyarrow.string()),
-        **{name: pyarrow.list_(pyarrow.float64()) for name in LISTS},
+        **{name: pyarrow.list_(pyarrow.float64()) for name in _LISTS},
     }
-    kinds |= {name: pyarrow.string() for name in WORDS}
+    kinds |= {name: pyarrow.string() for name in _WORDS}
     listed = [pyarrow.field(name, kinds.get(name, pyarrow.float64())) for name in COLUMNS]
-    return pyarrow.schema(listed, metadata={"format": FORMAT})
+    return pyarrow.schema(listed, metadata={"format": _FORMAT})

@@ -2,7 +2,7 @@
 
 The parts of a car's logs stand in the order of time. The first of them are its baseline, one merged
 model; of each later part z = [ln C front, ln C rear, ln of the friction] says how its tires differ
-from it, errors of its sensors left out (`change_from`). Under no change z ~ N(0, S + T): S is what
+from it, errors of its sensors left out (`_change_from`). Under no change z ~ N(0, S + T): S is what
 the part leaves open, T how parts of an unchanged car differ (roads, speeds, curves that are not the
 tire's): the median of squared deviations in the car's own baseline, held by the fleet's.
 
@@ -13,7 +13,7 @@ A change by δ is looked for by a cumulative sum of log-likelihood ratios (E. S.
 
 and ends where g is back at zero. Between false alarms lie at least exp(h) parts on average (G.
 Lorden, Annals of Mathematical Statistics 42, 1971), so that h follows from how many are accepted.
-A part adds at most its share of `LEAST` of driving: no sensor that fails for a few minutes alarms.
+A part adds at most its share of `_LEAST` of driving: no sensor that fails for a few minutes alarms.
 """
 
 import math
@@ -32,14 +32,14 @@ from models.vehicle import Vehicle
 from tireid.fleet.merge import day_of, errors_of, grouped
 from tireid.fleet.store import LogRow
 
-LEAST = 600.0  # s of driving that an alarm takes at least
-SHORTEST = 5.0  # s of learning, below which a part says nothing
-FLOOR = 0.01  # standard deviation of ln C that roads make at least
+_LEAST = 600.0  # s of driving that an alarm takes at least
+_SHORTEST = 5.0  # s of learning, below which a part says nothing
+_FLOOR = 0.01  # standard deviation of ln C that roads make at least
 _FLOOR_FRICTION = 0.05  # and of ln μ
-HELD = 10.0  # parts that the fleet's scatter counts as
+_HELD = 10.0  # parts that the fleet's scatter counts as
 _NORMAL = 1.4826  # standard deviation of normal errors over their median absolute deviation
 _CHANGED = [INDEX[name] for name in ("ln_stiffness_f", "ln_stiffness_r", "ln_road")]
-LARGEST = 0.5  # standard deviation of ln C and ln μ that is believed before
+_LARGEST = 0.5  # standard deviation of ln C and ln μ that is believed before
 TITLES = ("stiffness of the front axle", "stiffness of the rear axle", "friction of both axles")
 
 
@@ -73,8 +73,8 @@ class Watching:
         return math.log(max(statistics * parts, math.e))
 
 
-class Part(NamedTuple):
-    """A part of a log that tells of the tires: its log, when it began, what it tells."""
+class _Part(NamedTuple):
+    """A part of a log: its log, when it began, and its information on the tires."""
 
     log: str
     date: str
@@ -90,7 +90,7 @@ class Seen(NamedTuple):
     sums (k, 2, 3) : g of a rise and of a fall.   h : the threshold.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[_Part, ...]
     z: Array
     variance: Array
     driven: Array
@@ -125,7 +125,6 @@ class Alarm:
 
     @property
     def cause(self) -> str:
-        """What it is likely due to, in words."""
         front, rear, friction = self.change
         clear = [abs(value) > 3.0 * sd for value, sd in zip(self.change, self.sd, strict=True)]
         softer = min(front, rear)
@@ -141,7 +140,6 @@ class Alarm:
 
     @property
     def line(self) -> str:
-        """The alarm as a line of text."""
         percent = 100.0 * math.expm1(self.change[self.statistic])
         sd = 100.0 * self.sd[self.statistic]
         when = f"; over since {self.ended}" if self.ended else ""
@@ -190,14 +188,14 @@ class Watch:
 def watch(rows: Iterable[LogRow], by: Sequence[str], watching: Watching) -> Watch:
     """Return which cars' tires changed.
 
-    by : what tells cars, or their sets of tires, apart.
+    by : what keeps cars, or their sets of tires, apart.
     """
     cars: dict[str, Vehicle] = {}
-    parts: dict[str, list[Part]] = {}
+    parts: dict[str, list[_Part]] = {}
     for key, row in grouped(rows, by):
         name = " ".join(value or "-" for _, value in key) or "all"
         cars.setdefault(name, row.declared_car)
-        parts.setdefault(name, []).extend(parts_of(row))
+        parts.setdefault(name, []).extend(_parts_of(row))
     compared = {
         name: _against_baseline(sorted(some, key=_when), cars[name], watching)
         for name, some in sorted(parts.items())
@@ -217,7 +215,7 @@ def watch(rows: Iterable[LogRow], by: Sequence[str], watching: Watching) -> Watc
 class _Compared(NamedTuple):
     """Parts of a car against its baseline: z and S (k, 3), which of them are the baseline."""
 
-    parts: tuple[Part, ...]
+    parts: tuple[_Part, ...]
     z: Array
     S: Array
     baseline: list[int]
@@ -229,22 +227,21 @@ class _Compared(NamedTuple):
         return np.asarray((_NORMAL * np.median(np.abs(z - np.median(z, axis=0)), axis=0)) ** 2)
 
 
-def parts_of(row: LogRow) -> list[Part]:
-    """Return the parts of a log that tell of the tires."""
+def _parts_of(row: LogRow) -> list[_Part]:
     day_of(row)
     return [
-        Part(row.name, row.date, begin, given)
+        _Part(row.name, row.date, begin, given)
         for begin, given in zip(row.part_begin, row.parts, strict=True)
-        if given.seconds >= SHORTEST
+        if given.seconds >= _SHORTEST
     ]
 
 
-def _when(part: Part) -> tuple[str, str, float]:
+def _when(part: _Part) -> tuple[str, str, float]:
     return part.date, part.log, part.begin
 
 
 def _against_baseline(
-    parts: Sequence[Part], vehicle: Vehicle, watching: Watching
+    parts: Sequence[_Part], vehicle: Vehicle, watching: Watching
 ) -> _Compared | None:
     """Return the parts of a car against its baseline; None where there are none after it."""
     learnt = np.cumsum([one.information.seconds for one in parts])
@@ -255,12 +252,12 @@ def _against_baseline(
     for one in parts[:count]:
         given += one.information.loosened(*errors_of(beliefs))
     p, _ = settled(beliefs.after(given), beliefs.mean)
-    changes = [change_from(one.information, p, beliefs) for one in parts]
+    changes = [_change_from(one.information, p, beliefs) for one in parts]
     z, S = (np.array(each) for each in zip(*changes, strict=True))
     return _Compared(tuple(parts), z, S, list(range(count)))
 
 
-def change_from(given: Information, p: Array, beliefs: Priors) -> tuple[Array, Array]:
+def _change_from(given: Information, p: Array, beliefs: Priors) -> tuple[Array, Array]:
     """Return ln of both stiffnesses and of the friction over a car's, and variances, (3,) each.
 
     Sensors may be off otherwise than when the car was learnt: that is estimated beside it.
@@ -271,7 +268,7 @@ def change_from(given: Information, p: Array, beliefs: Priors) -> tuple[Array, A
     sensors = np.zeros((SIZE, len(SENSORS)))
     sensors[[PLACE[name] for name in SENSORS], np.arange(len(SENSORS))] = 1.0
     along = np.hstack([slopes[:, _CHANGED], sensors])
-    sd = np.array([*(LARGEST for _ in _CHANGED), *(beliefs.sd[INDEX[name]] for name in SENSORS)])
+    sd = np.array([*(_LARGEST for _ in _CHANGED), *(beliefs.sd[INDEX[name]] for name in SENSORS)])
     P = np.linalg.inv(along.T @ given.matrix @ along + np.diag(sd**-2.0))
     value = P @ (along.T @ (given.vector - given.matrix @ u))
     return value[: len(_CHANGED)], np.diag(P)[: len(_CHANGED)]
@@ -280,8 +277,8 @@ def change_from(given: Information, p: Array, beliefs: Priors) -> tuple[Array, A
 def _summed(one: _Compared, fleet: Array, watching: Watching) -> Seen:
     """Return the cumulative sums of a car's parts after its baseline."""
     count = len(one.baseline)
-    floor = np.array([FLOOR, FLOOR, _FLOOR_FRICTION]) ** 2
-    T = np.maximum((HELD * fleet + count * one.scatter) / (HELD + count), floor)
+    floor = np.array([_FLOOR, _FLOOR, _FLOOR_FRICTION]) ** 2
+    T = np.maximum((_HELD * fleet + count * one.scatter) / (_HELD + count), floor)
     usual = np.median(one.z[one.baseline], axis=0)
     z, variance = one.z[count:] - usual, one.S[count:] + T
     seconds = np.array([part.information.seconds for part in one.parts[count:]])
@@ -289,7 +286,7 @@ def _summed(one: _Compared, fleet: Array, watching: Watching) -> Seen:
     delta = np.array([watching.stiffness, watching.stiffness, watching.friction])
     sums, g = np.zeros((len(z), 2, 3)), np.zeros((2, 3))
     for k in range(len(z)):
-        most = h * seconds[k] / LEAST
+        most = h * seconds[k] / _LEAST
         ratio = (
             np.stack([delta * (z[k] - 0.5 * delta), -delta * (z[k] + 0.5 * delta)]) / variance[k]
         )
@@ -314,7 +311,6 @@ def _alarms(car: str, seen: Seen) -> list[Alarm]:
 
 
 def _lasts(g: Array, first: int, k: int, h: float) -> bool:
-    """Return whether the alarm was there before."""
     return bool((g[first:k] >= h * (1.0 - 1e-12)).any())
 
 

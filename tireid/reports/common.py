@@ -35,7 +35,7 @@ def drawings(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list
     return [drawing(figures[n], text, READ[n]) for n, text in captions.items() if n in figures]
 
 
-def recording_digest(recording: Recording) -> str:
+def _recording_digest(recording: Recording) -> str:
     """Return twelve characters that stand for the signals of a recording and its true forces.
 
     Of more than `LONG` samples bytes are counted, of fewer their decimals.
@@ -66,7 +66,7 @@ def origin(
             [
                 "recording",
                 f"{one.name}: {len(one)} samples, {one.duration:.4g} s, hash "
-                f"{recording_digest(one)}",
+                f"{_recording_digest(one)}",
             ]
             for one in given
         ),

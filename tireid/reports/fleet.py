@@ -15,10 +15,10 @@ from tireid.fleet.watch import Alarm, Watch
 from tireid.report import Block, Headline, Paragraph, Report, Section, Table, write_report
 from tireid.reports.common import REPORT, drawing
 
-LISTED = 200  # rows of a table
+_LISTED = 200  # rows of a table
 COLUMNS = (*INDEX, "vehicle", "date", "seconds", "valid", "findings", "stiffness_front",
            "stiffness_rear")  # fmt: skip
-DRAWN = 6  # cars with an alarm that are drawn
+_DRAWN = 6  # cars with an alarm that are drawn
 
 _READ_STIFFNESS = (
     "Dots of a car lie on a level line; a step or a slope is a change of its tires, its load or a "
@@ -40,7 +40,6 @@ def write_fleet_report(
     *,
     command: str,
 ) -> None:
-    """Write what a store holds."""
     learnt = [row for row in rows if not row.error]
     refused = [row for row in learnt if row.valid is False]
     hours = sum(row.seconds or 0.0 for row in learnt) / 3600.0
@@ -74,7 +73,7 @@ def write_fleet_report(
         table = Table(
             caption=f"Logs that were left out{_first(len(listed))}.",
             header=["log", "why"],
-            rows=listed[:LISTED],
+            rows=listed[:_LISTED],
             verbatim=True,
         )
         sections.append(Section(heading="Logs left out", blocks=[table], folded=True))
@@ -89,7 +88,6 @@ def write_fleet_report(
 
 
 def write_watch_report(folder: Path, store: str, watched: Watch, *, command: str) -> None:
-    """Write whose tires changed."""
     lasting = [alarm for alarm in watched.alarms if not alarm.ended]
     report = Report(
         title=f"Changes in the fleet of {store}",
@@ -109,7 +107,6 @@ def write_watch_report(folder: Path, store: str, watched: Watch, *, command: str
 
 
 def _watch_blocks(watched: Watch) -> list[Block]:
-    """Return what was seen over time, as table and figures."""
     driven = f"{len(watched.seen)} cars were driven beyond their baseline"
     short = f"; {len(watched.short)} were not, and are not watched yet" if watched.short else ""
     blocks: list[Block] = [Paragraph(text=f"{driven}{short}.")]
@@ -120,11 +117,11 @@ def _watch_blocks(watched: Watch) -> list[Block]:
         Table(
             caption=f"Changes from the baseline{_first(len(rows))}.",
             header=["car", "what", "change [%]", "sd [%]", "began", "noticed", "likely"],
-            rows=rows[:LISTED],
+            rows=rows[:_LISTED],
         )
     )
     cars = list(dict.fromkeys(alarm.car for alarm in watched.alarms))
-    for car in cars[:DRAWN]:
+    for car in cars[:_DRAWN]:
         mine = [alarm for alarm in watched.alarms if alarm.car == car]
         figure = watch_figure(car, watched.seen[car], mine)
         blocks.append(drawing(figure, f"{car} against its baseline.", _READ_WATCH))
@@ -149,12 +146,12 @@ def _groups_table(groups: Sequence[Merged]) -> Table:
         caption=f"Merged models{_first(len(rows))}.",
         header=["group", "logs", "learning [min]", "stiffness front [kN/rad]", "rear [kN/rad]",
                 "known to, front [deg]", "rear [deg]"],
-        rows=rows[:LISTED],
+        rows=rows[:_LISTED],
     )  # fmt: skip
 
 
 def _first(count: int) -> str:
-    return f", the first {LISTED} of {count}" if count > LISTED else ""
+    return f", the first {_LISTED} of {count}" if count > _LISTED else ""
 
 
 def _origin(command: str, store: str, rows: Sequence[LogRow]) -> Section:

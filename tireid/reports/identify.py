@@ -26,6 +26,7 @@ from models.recordings import Recording
 from tireid import report as page
 from tireid import verdicts
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
+from tireid.identified import Results
 from tireid.reports.common import READ, REPORT, drawing, drawings, origin
 
 _EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
@@ -33,66 +34,57 @@ _EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth
 
 def write_identify_report(
     folder: Path,
-    law: str,
-    model: TireModel,
-    runs: Sequence[History],
-    frozen: Mapping[str, Mapping[str, Replay]],
+    found: Results,
     figures: Mapping[str, Figure],
-    verdict: Verdict,
-    parts: Sequence[History] = (),
-    *,
     diagnosis: Diagnosis,
     command: str,
-    asked: Mapping[str, Verdict],
 ) -> None:
     """Write the report of what was learnt, or of a network that was judged."""
-    learnt, last = runs[0], list(frozen.values())[-1]
-    sections = [
-        verdicts.verdict_section(verdict),
-        page.Section(heading="Identified tires", blocks=learnt_blocks(law, model, figures)),
-        page.Section(
-            heading="How well it predicts",
-            blocks=[*_asked(asked), *_errors([runs[0], *parts, *runs[1:]], frozen, figures)],
-        ),
-        page.Section(
-            heading="What went in",
-            blocks=drawings(figures, {"inputs": f"Signals of {learnt.recording.name}."}),
-        ),
-        diagnosis_section(diagnosis),
-        origin(
-            command,
-            learnt.vehicle,
-            [run.recording for run in runs],
-            method=f"{law}, hash {digest(learnt.design.numbers())}",
-        ),
+    learnt, model, verdict, asked = found.runs[0], found.model, found.verdict, found.asked
+    notes = [*diagnosis_warnings(diagnosis), *identify_warnings(model, found.runs)]
+    numbers = [
+        *verdicts.missed_headline(verdict),
+        *_asked_headlines(asked),
+        *verdicts.number_headlines(verdict),
+        *identify_headlines(found),
     ]
-    notes = [*diagnosis_warnings(diagnosis), *identify_warnings(model, runs)]
     report = page.Report(
         title=f"Tires of {learnt.vehicle.name}, identified on {learnt.recording.name}",
         summary=_how_learnt(learnt),
         numbers=[
             verdicts.verdict_headline(verdict, notes),
-            *verdicts.of_answer(
-                verdict,
-                [
-                    *verdicts.missed_headline(verdict),
-                    *_asked_headlines(asked),
-                    *verdicts.number_headlines(verdict),
-                    *identify_headlines(model, runs, last),
-                ],
-            ),
+            *verdicts.of_answer(verdict, numbers),
         ],
         lead=[curve_drawing(figures, verdict)],
         warnings=[
             *verdicts.verdict_warnings(verdict),
             *(
                 one
-                for name, found in asked.items()
-                for one in verdicts.verdict_warnings(found, f"{name}, replayed: ")
+                for name, other in asked.items()
+                for one in verdicts.verdict_warnings(other, f"{name}, replayed: ")
             ),
             *notes,
         ],
-        sections=sections,
+        sections=[
+            verdicts.verdict_section(verdict),
+            page.Section(
+                heading="Identified tires", blocks=learnt_blocks(found.method, model, figures)
+            ),
+            page.Section(
+                heading="How well it predicts", blocks=[*_asked(asked), *_errors(found, figures)]
+            ),
+            page.Section(
+                heading="What went in",
+                blocks=drawings(figures, {"inputs": f"Signals of {learnt.recording.name}."}),
+            ),
+            diagnosis_section(diagnosis),
+            origin(
+                command,
+                learnt.vehicle,
+                [run.recording for run in found.runs],
+                method=f"{found.method}, hash {digest(learnt.design.numbers())}",
+            ),
+        ],
     )
     page.write_report(folder / REPORT, report)
 
@@ -110,7 +102,7 @@ def _how_learnt(learnt: History) -> str:
 
 
 def side_slip_text(learnt: History) -> str:
-    """Return how well a run knew side slip, where it tells it; else nothing."""
+    """Return how well a run knew side slip, where it estimated it; else nothing."""
     if not {"v_y_sd", "side_slip_observable"} <= set(learnt.outputs):
         return ""
     moves = learnt.recording.v_x >= learnt.design.min_speed
@@ -123,17 +115,15 @@ def side_slip_text(learnt: History) -> str:
     )
 
 
-def identify_headlines(
-    model: TireModel, runs: Sequence[History], replays: Mapping[str, Replay]
-) -> list[page.Headline]:
+def identify_headlines(found: Results) -> list[page.Headline]:
     """Return the errors of a frozen model, other drives first, and up to which slip it knows."""
-    numbers = []
+    numbers, runs = [], found.runs
     for kind, some in (("of validation", runs[1:]), ("of identification", runs[:1])):
-        shares = [share for run in some if (share := _share(run, replays)) is not None]
+        shares = [share for run in some if (share := _share(run, found.replays)) is not None]
         if shares:
             meaning = f"of the rms force: error on drives {kind}, frozen"
             numbers.append(page.Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
-    return [*numbers, *verdicts.known_headline(model)]
+    return [*numbers, *verdicts.known_headline(found.model)]
 
 
 def _asked_headlines(asked: Mapping[str, Verdict]) -> list[page.Headline]:
@@ -200,7 +190,6 @@ def _extrapolated(model: TireModel, recording: Recording) -> list[str]:
 
 
 def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> list[page.Block]:
-    """Return the numbers and the figures of a frozen model."""
     facts = [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
     blocks: list[page.Block] = [
         page.Paragraph(
@@ -261,8 +250,14 @@ def guaranteed_sentence(model: TireModel) -> str:
     )
 
 
+def guaranteed_text(model: TireModel) -> str:
+    return guaranteed_sentence(model) or (
+        "no guaranteed band: it takes --method axle, a lateral velocity that was measured, and "
+        "enough driving"
+    )
+
+
 def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
-    """Return the verdicts on a model over drives that it was of validation, as a table."""
     rows: list[list[page.Cell]] = []
     for name, verdict in asked.items():
         missed = verdict.force_missed or (None, None)
@@ -280,17 +275,14 @@ def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
     ]
 
 
-def _errors(
-    runs: Sequence[History],
-    frozen: Mapping[str, Mapping[str, Replay]],
-    figures: Mapping[str, Figure],
-) -> list[page.Block]:
-    rows, online = [], runs[0].online
-    for run in runs:
+def _errors(found: Results, figures: Mapping[str, Figure]) -> list[page.Block]:
+    learnt, *others = found.runs
+    rows, online = [], learnt.online
+    for run in (learnt, *found.parts, *others):
         name, size = run.recording.name, force_rms(run)
         if online:
             rows.append([name, "online", *_cells(online_error(run), size)])
-        for when, replays in frozen.items():
+        for when, replays in found.by_label.items():
             error = replays[name].against_truth or replays[name].against_online
             rows.append([name, f"frozen, {when}", *_cells(error, size)])
     blocks: list[page.Block] = [

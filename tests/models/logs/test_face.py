@@ -12,7 +12,7 @@ import tireid as ti
 
 ROOM = Path(__file__).resolve().parents[3] / "models" / "logs"
 BESIDE = {
-    *("codegen.arrays", "codegen.errors", "codegen.escape"),
+    *("codegen.arrays", "codegen.errors", "codegen.escape", "codegen.face"),
     *("models.extras", "models.limits", "models.schema"),
 }
 OPTIONAL = {"h5py", "pyarrow", "asammdf", "rosbags", "cantools", "can"}

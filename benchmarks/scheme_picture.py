@@ -1,4 +1,6 @@
-"""The identifier as a block diagram, as in the paper's Fig. 1: who tells whom, by which equation.
+"""Draws the identifier as a block diagram, as in the paper's Fig. 1, for tireid/figures.
+
+`python -m benchmarks.scheme_picture` writes fig1_scheme.png and fig1_scheme.svg there.
 
 Orange is what the two laws of the paper differ in, the error filter, and where a freeze cuts. The
 network reads the measured state, which is the default here; the paper prints the estimated one.
@@ -13,7 +15,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch
 
-from tireid.figures.style import BLACK, GREY, ORANGE, PAGE, new_figure, styled
+from tireid.figures import style
+from tireid.figures.paper import SCHEME
+from tireid.figures.style import (
+    BLACK,
+    GREY,
+    ORANGE,
+    PAGE,
+    new_figure,
+    styled,
+)
 
 WIDTH, _HEIGHT = 100.0, 46.0  # of the drawing, in its own unit
 _JOINT, SUM = 0.45, 1.6  # radii of a joint of two lines and of the sum
@@ -99,3 +110,15 @@ def _draw_signal(axes: Axes, signal: Signal) -> None:
         axes.add_patch(Circle(signal.points[0], _JOINT, facecolor=GREY, edgecolor="none", zorder=3))
     if signal.label:
         axes.text(*signal.place, signal.label, ha="center", va="center", color=signal.color)
+
+
+def main() -> None:
+    """Draw both files."""
+    figure = scheme_figure()
+    SCHEME.with_suffix(".svg").write_bytes(style.figure_svg(figure))
+    SCHEME.write_bytes(style.figure_png(figure))
+    print(f"wrote {SCHEME} and .svg")
+
+
+if __name__ == "__main__":
+    main()

@@ -8,14 +8,13 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.arrays import Array, blocks, thinning
 from codegen.escape import visible
-from identifier.axle.guarantee import ForceBound
 from identifier.compare.course import side_slip
 from identifier.frozen import vehicle_numbers
 from identifier.methods import certify
@@ -32,52 +31,29 @@ from identifier.reproducibility import (
 from identifier.run import History
 from identifier.setup import Block
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, calibrated, guaranteed
+from identifier.verdict import Verdict
 from models.recordings import Recording
 from tireid import __version__
 from tireid.figures.forces import force_figure, inputs_figure, prediction_figure
 from tireid.figures.paper import error_figure, weights_figure
 from tireid.figures.side_slip import side_slip_figure
 from tireid.figures.style import save_figures
-from tireid.figures.thinned import DrawnRun
-from tireid.figures.tires import drawn_tracks, learnt_axles_figure, slip_figure
+from tireid.figures.tires import learnt_axles_figure, slip_figure
 from tireid.output import axle_columns, text_table, write_csv, write_json, write_table
 from tireid.progress import Progress, say
-from tireid.reports.identify import guaranteed_sentence
 
-NETWORK = "network"
-OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
-ESTIMATED = {  # columns of forces.csv by the outputs of methods that estimate v_y
+_NETWORK = "network"
+_OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
+_ESTIMATED = {  # columns of forces.csv by the outputs of methods that estimate v_y
     "v_y_estimated_m_s": "v_y",
     "v_y_sd_m_s": "v_y_sd",
     "side_slip_observable": "side_slip_observable",
 }
-WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
+_WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
 _OWN_PAST = "  its past, against online"
 _WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
 _CURVE_POINTS = 201
 _FARTHER = 1.25  # than the slip that was driven, or is known
-
-
-class AskedBound(NamedTuple):
-    """A request for a guaranteed band; given: its bound, None estimates it."""
-
-    given: ForceBound | None
-
-    @classmethod
-    def of(cls, numbers: Sequence[float]) -> "AskedBound":
-        """Return what words of the command ask.
-
-        numbers : error [static axle loads] and lateness [s], or the first of them, or none.
-        """
-        if len(numbers) > 2:
-            raise ValueError(
-                f"--bound takes an error and a lateness, it was given {len(numbers)} numbers"
-            )
-        if not numbers:
-            return cls(None)
-        error, late = (*numbers, 0.0)[:2]
-        return cls(ForceBound(error=(error, error), lateness=(late, late)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +61,7 @@ class Results:
     """Models that were frozen, or a network, over recordings.
 
     runs : of the method, over the recording that was learnt and over others.
-    models, frozen : by freeze time as text [s], or `NETWORK`, models and their replays by
+    models, frozen : by freeze time as text [s], or `_NETWORK`, models and their replays by
         recording; the last counts.
     verdict : on the last.   asked : on it over the others, by name.
     parts : of the first run, where it is over several logs.   about : a network, its file.
@@ -106,20 +82,18 @@ class Results:
         method: str,
         runs: Sequence[History],
         times: Sequence[float],
+        tire: TireModel,
         verdict: Verdict,
         asked: Mapping[str, Verdict],
         parts: Sequence[History] = (),
-        bound: AskedBound | None = None,
     ) -> "Results":
         """Return what the first run learnt.
 
-        times : of freezes, rising [s].   bound : of the guaranteed band of the last, where asked.
+        times : of freezes, rising [s].   tire : that of the last.
         """
-        learnt, last, others = runs[0], times[-1], [*parts, *runs[1:]]
-        tire = calibrated(learnt, last, verdict)
-        if bound is not None:
-            tire = guaranteed(learnt, bound.given, last, tire)
-        models = {freeze_key(t): learnt.freeze(t) for t in times[:-1]} | {freeze_key(last): tire}
+        learnt, others = runs[0], [*parts, *runs[1:]]
+        models = {freeze_key(t): learnt.freeze(t) for t in times[:-1]}
+        models[freeze_key(times[-1])] = tire
         frozen = {
             key: {learnt.recording.name: reproduce(learnt, t)} | _replays(model, others)
             for t, (key, model) in zip(times, models.items(), strict=True)
@@ -137,7 +111,7 @@ class Results:
         verdict: Verdict,
         asked: Mapping[str, Verdict],
     ) -> "Results":
-        found: Any = {"models": {NETWORK: model}, "frozen": {NETWORK: _replays(model, runs)}}
+        found: Any = {"models": {_NETWORK: model}, "frozen": {_NETWORK: _replays(model, runs)}}
         about = {"inputs": list(model.signals), "slip_sign": model.slip_sign}
         found["about"] = {"file": source, **about}
         return cls(method=method, runs=runs, verdict=verdict, asked=asked, **found)
@@ -155,7 +129,7 @@ class Results:
     @property
     def by_label(self) -> dict[str, Mapping[str, Replay]]:
         """The replays by what a table calls their model."""
-        return {k if k == NETWORK else f"{k} s": replays for k, replays in self.frozen.items()}
+        return {k if k == _NETWORK else f"{k} s": replays for k, replays in self.frozen.items()}
 
     def table(self) -> str:
         """Return a table of the errors per axle, and as a share of the force where there is truth.
@@ -169,7 +143,7 @@ class Results:
             for name, result in replays.items():
                 size, sides = force_rms(runs[name]), result.reproduction
                 errors = {(label, visible(name)): result.against_truth or result.against_online}
-                if label == NETWORK:
+                if label == _NETWORK:
                     words = f"{self.method}, learning online", visible(name)
                     errors[words] = online_error(runs[name])
                 elif sides is not None:
@@ -219,7 +193,7 @@ class Results:
             "vehicle": vehicle_numbers(learnt.vehicle),
             "diverged_at_s": learnt.diverged_at,
             "version": __version__,
-            **({NETWORK: dict(self.about)} if self.about else {}),
+            **({_NETWORK: dict(self.about)} if self.about else {}),
         }
 
     def write(
@@ -237,37 +211,34 @@ class Results:
             model.save(folder / f"weights{end}.json", valid=valid)
             columns = _curve_columns(model, [run.recording for run in self.runs])
             write_csv(folder / f"curve{end}.csv", columns)
-        tracks = None if NETWORK in self.models else drawn_tracks(self.runs[0])
-        self._write_curves(folder, curves, progress or Progress("curves"), tracks)
+        self._write_curves(folder, curves, progress or Progress("curves"))
         say("drawing figures")
-        return save_figures(folder, self._figures(tracks))
+        return save_figures(folder, self._figures())
 
-    def _write_curves(
-        self, folder: Path, curves: str, progress: Progress, tracks: DrawnRun | None
-    ) -> None:
+    def _write_curves(self, folder: Path, curves: str, progress: Progress) -> None:
         learnt, count = self.runs[0], len(self.runs)
         for k, run in enumerate(self.runs):
             replays = {
-                key if key == NETWORK else f"frozen_{key}s": by_name[run.recording.name]
+                key if key == _NETWORK else f"frozen_{key}s": by_name[run.recording.name]
                 for key, by_name in self.frozen.items()
             }
             end = "" if run is learnt else f"_{file_name(run.recording)}"
             share = progress.within(_WRITING * k / count, _WRITING * (k + 1) / count)
             write_table(folder / f"forces{end}.{curves}", _force_columns(run, replays, share))
-        if NETWORK in self.models:
+        if _NETWORK in self.models:
             return
-        if OBSERVED in learnt.outputs:
+        if _OBSERVED in learnt.outputs:
             found = (_error_columns(learnt, one) for one in learnt.blocks())
             write_table(folder / f"errors.{curves}", found)
         if learnt.online:
-            write_table(folder / f"weights.{curves}", _weight_columns(learnt, tracks))
+            write_table(folder / f"weights.{curves}", _weight_columns(learnt))
 
-    def _figures(self, tracks: DrawnRun | None) -> dict[str, Figure]:
+    def _figures(self) -> dict[str, Figure]:
         learnt, model = self.runs[0], self.model
         recording, name = learnt.recording, learnt.recording.name
         figures = {"inputs": inputs_figure(recording)}
         asked = self.runs[1:]
-        if NETWORK in self.models:
+        if _NETWORK in self.models:
             asked = self.runs
             for run in self.runs:
                 end = "" if run is learnt else f"_{file_name(run.recording)}"
@@ -277,13 +248,13 @@ class Results:
             figures["slip"] = slip_figure(model, recording, _beside(learnt))
             figures["forces"] = force_figure(learnt, own)
             slip = side_slip(learnt, learnt.design.min_speed, recording.logged_v_y)
-            if OBSERVED in learnt.outputs:
+            if _OBSERVED in learnt.outputs:
                 figures["error"] = error_figure(learnt, freeze_times=list(own))
                 figures["weights"] = weights_figure(learnt, list(own))
             if slip is not None:
                 figures["side_slip"] = side_slip_figure([recording], {"estimate": {name: slip}})
-            if tracks is not None:
-                figures["learnt"] = learnt_axles_figure(learnt, list(own), tracks)
+            if learnt.tracks_over(next(learnt.blocks())):
+                figures["learnt"] = learnt_axles_figure(learnt, list(own))
         for run in asked:
             drawn = prediction_figure(self.replays[run.recording.name], _beside(run))
             figures[f"replay_{file_name(run.recording)}"] = drawn
@@ -301,14 +272,6 @@ def _numbers(error: AxleRmse | None) -> dict[str, float] | None:
 def _beside(run: History) -> History | None:
     """Return a run where it has forces of its own to compare with."""
     return run if run.online else None
-
-
-def guaranteed_text(model: TireModel) -> str:
-    sentence = guaranteed_sentence(model)
-    return sentence or (
-        "no guaranteed band: it takes --method axle, a lateral velocity that "
-        "was measured, and enough driving"
-    )
 
 
 def file_name(recording: Recording) -> str:
@@ -343,20 +306,18 @@ def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str
 def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
     return {
         "t_s": learnt.recording.t[block.part],
-        **axle_columns("xi_tilde_{}_Us", block.outputs[OBSERVED]),
+        **axle_columns("xi_tilde_{}_Us", block.outputs[_OBSERVED]),
         **axle_columns("z_{}_Us2", block.before["z"]),
     }
 
 
-def _weight_columns(learnt: History, tracks: DrawnRun | None) -> Iterator[dict[str, Array]]:
+def _weight_columns(learnt: History) -> Iterator[dict[str, Array]]:
     """Yield the columns of weights.csv: of a long run a row for each of at most `LONG` samples."""
     each = thinning(len(learnt.recording))
     for block in learnt.blocks():
-        if tracks is not None:  # beside it: a long run is computed again for each look at it
-            tracks.take(block)
         rows = slice(-block.part.start % each, None, each)
         weights = {"t_s": learnt.recording.t[block.part][rows]}
-        for matrix in [name for name in WEIGHTS if name in block.state]:
+        for matrix in [name for name in _WEIGHTS if name in block.state]:
             values = block.before[matrix][rows]
             for place in np.ndindex(values.shape[1:]):
                 weights["_".join([matrix, *(str(k + 1) for k in place)])] = values[:, *place]
@@ -372,7 +333,9 @@ def _force_columns(
     """
     recording, car, n = run.recording, run.vehicle, len(run.recording)
     outputs = run.outputs
-    given = {column: outputs[port].ravel() for column, port in ESTIMATED.items() if port in outputs}
+    given = {
+        column: outputs[port].ravel() for column, port in _ESTIMATED.items() if port in outputs
+    }
     curves = {} if recording.axle_force is None else {"true": recording.axle_force}
     curves |= {"online": run.axle_force} if run.online else {}
     curves |= {label: replay.axle_force for label, replay in replays.items()}

@@ -1,0 +1,397 @@
+"""The files of `tireid drive`: numbers as JSON, every signal as CSV, figures as PNG, the film."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from codegen.arrays import Array
+from identifier.frozen import vehicle_numbers
+from identifier.tire_model import TireModel
+from models.files import digest
+from models.vehicle import Vehicle
+from mpc.handover.rules import Verdict
+from mpc.loop.record import Drive, estimate_scores
+from mpc.tires import CurveFitError, prediction_tire
+from tireid import __version__
+from tireid.animation import write_film
+from tireid.animation.known import known_over_time, steady_curve
+from tireid.driving.runs import (
+    FROZEN,
+    FULL,
+    IMU,
+    LEARNING,
+    LINEAR,
+    ORACLE,
+    WIDEST,
+    Conditions,
+    Run,
+    run_drive,
+)
+from tireid.driving.setup import PERIOD, PLANT, Setup
+from tireid.figures.drive import (
+    AT_THE_END,
+    drive_errors_figure,
+    drive_path_figure,
+    drive_solve_figure,
+    drive_steering_figure,
+)
+from tireid.figures.side_slip import drive_lateral_figure
+from tireid.figures.style import save_figures
+from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
+from tireid.output import axle_columns, finite, text_table, write_csv, write_json
+from tireid.progress import say
+from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report
+from tireid.reports.common import READ, REPORT, drawings, origin
+
+NO_FILM = "none"
+
+
+def headline(conditions: Conditions) -> str:
+    """Return a case in one line."""
+    setup = conditions.setup
+    v = setup.speeds()
+    speed = f"{v.min():.1f} m/s" if np.ptp(v) < 0.05 else f"{v.min():.1f} to {v.max():.1f} m/s"
+    wish = setup.wish.share
+    share = "" if wish is None else f", {100.0 * wish:.0f} % of a grip of {setup.grip:.1f} m/s²"
+    drops = "".join(f", {mu:g} from {s:g} m on" for s, mu in setup.drops)
+    noise = "sensor noise" if conditions.noise else "no noise"
+    noise += f", caution {conditions.caution:g}" if conditions.caution > 0.0 else ""
+    noise += ", no v_y" if conditions.kind == IMU else ""
+    noise += "".join(f", {fault}" for fault in conditions.faults)
+    return (
+        f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
+        f"{PLANT} {setup.vehicle.name}, {1e3 * PERIOD * conditions.delay:g} ms delay, "
+        f"{noise}, seed {conditions.seed}"
+    )
+
+
+def inputs_of(
+    conditions: Conditions, labels: Sequence[str], source: str, learnt: TireModel | None
+) -> dict[str, Any]:
+    """Return all that goes into drives, ready for JSON."""
+    setup = conditions.setup
+    v = setup.speeds()
+    return {
+        "path": setup.path.name,
+        "path_hash": digest([setup.path.X.tolist(), setup.path.Y.tolist()]),
+        "length_m": setup.path.length,
+        "closed": setup.path.closed,
+        "laps": conditions.laps,
+        "speed": {"share": setup.wish.share, "m_s": setup.wish.speed},
+        "speed_m_s": {"min": float(v.min()), "max": float(v.max())},
+        "grip_m_s2": setup.grip,
+        "mu": setup.mu,
+        "mu_drops": [{"s_m": s, "mu": mu} for s, mu in setup.drops],
+        "tires": list(labels),
+        "frozen": source,
+        "weights_hash": None if learnt is None else digest(learnt.to_dict()),
+        "plant": PLANT,
+        "vehicle": vehicle_numbers(setup.vehicle),
+        "chassis": _chassis(setup.vehicle),
+        "delay_ms": 1e3 * PERIOD * conditions.delay,
+        "period_ms": 1e3 * PERIOD,
+        "noise": conditions.noise,
+        **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
+        **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
+        "faults": [finite(asdict(fault)) for fault in conditions.faults],
+        "seed": conditions.seed,
+    }
+
+
+def _chassis(vehicle: Vehicle) -> dict[str, Any]:
+    """Return the chassis, with a hash in place of the file of its tire."""
+    chassis = vehicle.require_chassis()
+    path = None if chassis.tire is None else Path(chassis.tire)
+    tire = None if path is None else digest(path.read_text(errors="replace", encoding="utf-8"))
+    return {**asdict(chassis), "tire": tire}
+
+
+class Drives(NamedTuple):
+    """Drives along one path on several tires, the first of which leads.
+
+    learnt : the frozen tires, None where none drives on them.   source : where they are from.
+    """
+
+    conditions: Conditions
+    runs: Sequence[Run]
+    learnt: TireModel | None
+    source: str
+
+    @classmethod
+    def driven(
+        cls, conditions: Conditions, labels: Sequence[str], learnt: TireModel | None, source: str
+    ) -> "Drives":
+        """Drive once on each tire."""
+        runs = [run_drive(label, conditions, learnt) for label in labels]
+        return cls(conditions, runs, learnt, source)
+
+    @property
+    def inputs(self) -> dict[str, Any]:
+        labels = [run.label for run in self.runs]
+        return inputs_of(self.conditions, labels, self.source, self.learnt)
+
+    def write(self, folder: Path, film: str) -> dict[str, Figure]:
+        """Write everything about the drives; return the figures by the name of their file.
+
+        film : webp, gif, mp4 or none.
+        """
+        first, setup, faults = self.runs[0], self.conditions.setup, self.conditions.faults
+        curves = _known_curves(self.runs, setup, self.learnt)
+        write_json(folder / "summary.json", _summarize_drives(self.runs, self.inputs))
+        for run in self.runs:
+            name = "drive.csv" if run is first else f"drive_{run.label}.csv"
+            write_csv(folder / name, _drive_columns(run.drive))
+        say("drawing figures")
+        drives = {run.label: run.drive for run in self.runs}
+        on_the_way: dict[str, Any] = {"drops": setup.drops, "faults": faults}
+        limits = first.problem.limits
+        figures = {
+            "path": drive_path_figure(drives),
+            "errors": drive_errors_figure(drives, off_path=WIDEST, **on_the_way),
+            "steering": drive_steering_figure(
+                drives, angle_limit=limits.steering, rate_limit=limits.steering_rate, **on_the_way
+            ),
+            "tires": drive_tires_figure(first.drive, curves),
+            "solve_times": drive_solve_figure(first.drive),
+        }
+        if first.drive.estimates:
+            figures["lateral"] = drive_lateral_figure(first.drive)
+        save_figures(folder, figures)
+        if film != NO_FILM:
+            title, v_x = f"{first.drive.path.name}: {first.label} tires", first.drive.v_x.mean()
+            known = known_over_time(first.known, first.model, float(v_x))
+            path = folder / f"drive.{film}"
+            write_film(path, drives, curves, drops=setup.drops, title=title, known=known)
+        return figures
+
+    def text(self) -> str:
+        lines = [headline(self.conditions), text_table([SCORES, *score_rows(self.runs)], "<>><>>")]
+        lines += [
+            f"{run.label}: {_estimate_words(run)}" for run in self.runs if run.drive.estimates
+        ]
+        for run in self.runs:
+            lines += [f"{run.label} at {t:.2f} s: {note}" for t, note in run.drive.notes]
+        return "\n".join(lines)
+
+
+SCORES = ("tires", "rms e_y", "peak e_y", "completed", "failures", "wall time: median / p99 / max")
+
+
+def score_rows(runs: Sequence[Run]) -> list[list[str]]:
+    rows = []
+    for run in runs:
+        score, end = run.scores, f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"
+        failures = ", ".join(f"{n} {name}" for name, n in score.failures.items()) or "0"
+        times = " / ".join(f"{score.solve_ms[key]:.3f}" for key in ("median", "p99", "max"))
+        off = [f"{score.rms_e_y_m:.3f} m", f"{score.peak_e_y_m:.3f} m"]
+        completed = "yes" if score.completed else end
+        rows.append([run.label, *off, completed, failures, f"{times} ms"])
+    return rows
+
+
+def _summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what summary.json holds: scores of the first drive and of each, and what went in."""
+    by_label = {run.label: _scores(run) for run in runs}
+    return {
+        **by_label[runs[0].label],
+        "tires": runs[0].label,
+        "drives": by_label,
+        "inputs": dict(inputs),
+        "hash": digest(inputs),
+        "version": __version__,
+    }
+
+
+def _scores(run: Run) -> dict[str, Any]:
+    notes = [{"t_s": t, "note": text} for t, text in run.drive.notes]
+    given = estimate_scores(run.drive)
+    lateral = {} if given is None else {"lateral_velocity": given._asdict()}
+    return {**run.scores.to_dict(), **lateral, "ending": run.drive.ending, "notes": notes}
+
+
+_COLUMNS_ESTIMATED = {
+    "v_y": "v_y_estimated_m_s",
+    "v_y_sd": "v_y_estimated_sd_m_s",
+    "observable": "side_slip_observable",
+    "a_y": "a_y_level_m_s2",
+    "inertial_v_y": "v_y_inertial_m_s",
+    "inertial_v_y_sd": "v_y_inertial_sd_m_s",
+}
+_UNITS = {  # of signals of a drive, by their name
+    **dict.fromkeys(("s", "X", "Y", "e_y"), "m"),
+    **dict.fromkeys(("psi", "delta", "command", "e_psi"), "rad"),
+    **dict.fromkeys(("v_x", "v_y", "v_ref"), "m_s"),
+    **dict.fromkeys(("a_x", "a_y"), "m_s2"),
+    **{"t": "s", "r": "rad_s", "kappa": "1_m"},
+}
+_SIGNALS = (
+    *("t", "s", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "command"),
+    *("e_y", "e_psi", "kappa", "v_ref"),
+)
+
+
+def _drive_columns(drive: Drive) -> dict[str, Array]:
+    """Return every signal of a drive by the name of its column, with its unit."""
+    slip, measured = axle_slip(drive), [(name, drive.measured[name]) for name in drive.measured]
+    return {
+        **{f"{name}_{_UNITS[name]}": getattr(drive, name) for name in _SIGNALS},
+        **axle_columns("alpha_{}_rad", slip),
+        **axle_columns("Fy{}_N", drive.axle_force),
+        "status": drive.status.astype(np.float64),
+        "solve_time_s": drive.solve_time,
+        **{f"{name}_measured_{_UNITS[name]}": values for name, values in measured if name != "t"},
+        **{_COLUMNS_ESTIMATED[name]: values for name, values in drive.estimates.items()},
+    }
+
+
+def _known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
+    """Return the tires of the trackers, and the linear and the true tire beside it."""
+    models = {LINEAR: prediction_tire(setup.vehicle)}
+    if learnt is not None:
+        models[FROZEN] = prediction_tire(learnt, setup.vehicle)
+    for run in runs:
+        if run.label != LEARNING:
+            models[run.label] = run.model
+        if run.label != ORACLE and run.final is not run.model:
+            models[run.label + AT_THE_END] = run.final
+    with suppress(CurveFitError):  # a true tire that no curve can follow is not drawn
+        models[ORACLE] = setup.oracle()
+        if setup.drops:
+            models[ORACLE + AT_THE_END] = setup.oracle(setup.drops[-1][1])
+    v_x = float(setup.speeds().mean())
+    return [steady_curve(label, model, v_x) for label, model in models.items()]
+
+
+def _estimate_words(run: Run) -> str:
+    got = estimate_scores(run.drive)
+    assert got is not None
+    return (
+        f"v_y estimated to {got.rms_error_m_s:.3f} m/s, side slip to {got.rms_error_deg:.2f} of "
+        f"{got.rms_deg:.2f} degrees rms; {100.0 * got.within_two_sd:.0f} % of the errors within "
+        f"two standard deviations"
+    )
+
+
+def write_drive_report(
+    folder: Path, drives: Drives, figures: Mapping[str, Figure], film: Path | None, command: str
+) -> None:
+    """Write the report of drives along one path."""
+    runs = drives.runs
+    first = runs[0]
+    report = Report(
+        title=f"{first.drive.path.name} on {first.label} tires",
+        summary=f"{headline(drives.conditions)}.",
+        numbers=_drive_headlines(runs),
+        warnings=_drive_warnings(runs),
+        sections=[
+            Section(heading="How the car drove", blocks=_drive_blocks(runs, figures, film)),
+            Section(heading="The tracker's tires", blocks=known_blocks(runs, figures)),
+            Section(
+                heading="Timing",
+                blocks=drawings(figures, {"solve_times": "How long a step took."}),
+            ),
+            origin(
+                command,
+                first.drive.vehicle,
+                (),
+                tires=drives.source,
+                all_inputs=f"hash {digest(drives.inputs)}, listed in summary.json",
+            ),
+        ],
+    )
+    write_report(folder / REPORT, report)
+
+
+def _drive_headlines(runs: Sequence[Run]) -> list[Headline]:
+    first = runs[0].scores
+    numbers = [
+        Headline(
+            f"{first.rms_e_y_m:.3f} m",
+            f"rms deviation from the path, {runs[0].label}{_end(runs[0])}",
+            "" if first.completed else "bad",
+        ),
+        Headline(f"{first.peak_e_y_m:.3f} m", f"largest deviation, {runs[0].label}"),
+    ]
+    numbers += [
+        Headline(
+            f"{run.scores.rms_e_y_m:.3f} m",
+            f"rms deviation, {run.label}{_end(run)}",
+            "" if run.scores.completed else "bad",
+        )
+        for run in runs[1:]
+    ]
+    given = estimate_scores(runs[0].drive)
+    if given is not None:
+        numbers.append(
+            Headline(
+                f"{given.rms_error_deg:.2f}°",
+                f"rms error of the estimated side slip, of {given.rms_deg:.2f}°",
+            )
+        )
+    median, p99 = first.solve_ms["median"], first.solve_ms["p99"]
+    numbers.append(Headline(f"{median:.2g} / {p99:.2g} ms", "a step: median / 99 of 100"))
+    return numbers
+
+
+def _end(run: Run) -> str:
+    return "" if run.scores.completed else f", who {run.drive.ending}"
+
+
+def _drive_warnings(runs: Sequence[Run]) -> list[str]:
+    said = []
+    for run in runs:
+        scores = run.scores
+        if not scores.completed:
+            where = float(run.drive.s[-1])
+            said.append(f"{run.label}: {run.drive.ending} at {where:.0f} m; its numbers end there.")
+        if scores.failures:
+            counted = ", ".join(f"{n} {name}" for name, n in scores.failures.items())
+            said.append(f"{run.label}: steps of the tracker failed: {counted}.")
+        if scores.solve_ms["p99"] > 1e3 * PERIOD:
+            said.append(f"{run.label}: one step in a hundred takes longer than the period.")
+        said += [
+            f"{run.label} at {t:.2f} s: {printed(text)}."
+            for t, text in run.drive.notes
+            if _bad(text)
+        ]
+    return said
+
+
+def _bad(text: str) -> bool:
+    return text.startswith(Verdict.FAULT.value) or "dead reckoning" in text
+
+
+def _drive_blocks(
+    runs: Sequence[Run], figures: Mapping[str, Figure], film: Path | None
+) -> list[Block]:
+    blocks: list[Block] = [
+        Table(caption="Scores of the drives.", header=SCORES, rows=score_rows(runs))
+    ]
+    if film is not None:
+        caption = f"The drive on {runs[0].label} tires; outlines are the other cars."
+        blocks.append(Picture(image=film, caption=caption, read=READ["film"]))
+    captions = {
+        "path": "The path from above.",
+        "errors": "Deviation, heading, acceleration and speed along the path.",
+        "steering": "Steering command.",
+    }
+    return [*blocks, *drawings(figures, captions)]
+
+
+def known_blocks(runs: Sequence[Run], figures: Mapping[str, Figure]) -> list[Block]:
+    """Return what trackers believed of the tires, and what they were given on the way."""
+    captions = {
+        "tires": "Forces of the first drive, and the tire models of the trackers.",
+        "lateral": "Lateral velocity, which no sensor measured: the truth and the estimate.",
+    }
+    blocks: list[Block] = [*drawings(figures, captions)]
+    notes = [[run.label, f"{t:.2f}", printed(text)] for run in runs for t, text in run.drive.notes]
+    if notes:
+        header = ["tires", "time [s]", "what"]
+        blocks.append(Table(caption="Decisions along the way.", header=header, rows=notes))
+    return blocks
