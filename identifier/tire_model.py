@@ -8,10 +8,10 @@ import importlib
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import casadi as ca
 import numpy as np
@@ -19,6 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
 from codegen.escape import shown
+from identifier.band import AXLES as AXLES
+from identifier.band import Axle as Axle
+from identifier.band import Band, of_axle
 from identifier.frozen import FORMAT, FrozenModelError, require_alive
 from identifier.measured import NOT_IDENTIFIABLE, printed_unit, printed_value
 from identifier.setup import Setup
@@ -28,15 +31,11 @@ from models.schema import Table, read_json
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
-    from identifier.axle.band import BandCalibration, SpreadByRange
     from identifier.axle.guarantee import Guarantee
     from identifier.estimate.latent import LateralVelocity
 
-Axle = Literal["front", "rear"]
-AXLES: tuple[Axle, ...] = ("front", "rear")
 # As summaries and verdicts name what is learnt of an axle.
 STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
-UNCALIBRATED = "of the identifier, not calibrated; run.tire calibrates it on the drive"
 
 
 class _TireFunctions(NamedTuple):
@@ -286,17 +285,13 @@ class TireModel(ABC):
         v_x : speed [m/s]; None takes `curve_speed`. A curve of slip does not look at it, but where
             the car has downforce.
         """
-        if axle is not None and axle not in AXLES:
-            raise ValueError(f"axle must be front or rear, it is {axle!r}")
         slip = np.asarray(alpha, dtype=np.float64)
         pairs = np.tile(slip.ravel(), (2, 1))
         speed = self.curve_speed if v_x is None else v_x
         found = self._force_curve()(pairs, speed) if slip.size else pairs
         both: Array = np.array(found, dtype=np.float64).T.reshape(*slip.shape, 2)
-        if axle is None:
-            return both
-        one: Array = both[..., AXLES.index(axle)]
-        return float(one) if slip.ndim == 0 else one
+        one = of_axle(both, axle)
+        return float(one) if one.ndim == 0 else one
 
     def force_at(self, alpha: Array) -> Array:
         """Return the steady axle forces at slip angles, (k, 2) [N].
@@ -345,29 +340,6 @@ class TireModel(ABC):
         """Return the estimates at active bounds."""
         return ()
 
-    def relative_sd(self, alpha: Array) -> Array | None:
-        """Return how unsure the forces at slip angles still are, (k, 2); None: it cannot tell.
-
-        Standard deviation of the force over that before learning: 1 is the prior.
-
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,), not zero.
-        """
-        del alpha
-        return None
-
-    def slope_over(self, recording: Recording) -> Array:
-        """Return the slope of the force curves over the slip of a drive [static loads/rad], (n, 2).
-
-        Raises
-        ------
-        ValueError
-            Where forces are no curves of slip.
-        """
-        del recording
-        raise ValueError(f"forces of a {type(self).__name__} are no curves of slip")
-
     @property
     def force_missed(self) -> Array | None:
         """Error of the model over the force in the motion of the identification drive [-], rms,
@@ -376,128 +348,9 @@ class TireModel(ABC):
         return None
 
     @property
-    def has_band(self) -> bool:
-        """Whether the model can tell how sure it is."""
-        return False
-
-    @property
-    def band_origin(self) -> str:
-        """Where the width of the band comes from, in words."""
-        return "calibrated on the drive" if self.band_calibrated else UNCALIBRATED
-
-    @property
-    def band_calibrated(self) -> bool:
-        """Whether the width of `band` was found on parts of the drive that did not teach.
-
-        As of `Run.tire`, where enough was driven; else that of the identifier.
-        """
-        return False
-
-    def with_calibration(
-        self, calibration: "BandCalibration | None", force_missed: Array | None = None
-    ) -> "TireModel":
-        """Return the model, its band calibrated; as it is where it has none.
-
-        Parameters
-        ----------
-        calibration : None assumes the declared errors.
-        force_missed : of the identification drive, (2,); None where not computed.
-        """
-        del calibration, force_missed
-        return self
-
-    def spread_by_range(
-        self, recording: Recording, mean: Callable[[Array], Array]
-    ) -> "SpreadByRange":
-        """Return the variances that a band is made of, by range of slip and window of a drive.
-
-        Parameters
-        ----------
-        mean : over the windows: signals (n, ...) -> (m, ...).
-        """
-        del recording, mean
-        raise ValueError(f"a {type(self).__name__} cannot tell how sure it is: it has no band")
-
-    def half_band_of_curves(self, recording: Recording, level: float = 0.9) -> Array | None:
-        """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N].
-
-        Of the steady forces, without noise of the drive's sensors. None where unknown.
-        """
-        del recording, level
+    def band(self) -> Band[Any] | None:
+        """How unsure the forces are; None where the model does not know."""
         return None
-
-    def half_band(
-        self, alpha: Array, level: float = 0.9, *, v_x: float | Array | None = None
-    ) -> Array | None:
-        """Return half the width of `band`, (k, 2) [N]; None where unknown.
-
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,).
-        v_x : speed [m/s], a number or (k,), positive; None takes that of the identification drive.
-        """
-        del alpha, level, v_x
-        return None
-
-    def half_band_over(self, recording: Recording, level: float = 0.9) -> Array | None:
-        """Return half the width of the band around `axle_force` of a drive, (n, 2) [N].
-
-        None where unknown.
-
-        Parameters
-        ----------
-        level : share of samples that the band shall hold, above 0 and below 1.
-        """
-        del recording, level
-        return None
-
-    @overload
-    def band(
-        self, alpha: float, axle: Axle, level: float = ..., *, v_x: float | None = ...
-    ) -> tuple[float, float] | None: ...
-    @overload
-    def band(
-        self,
-        alpha: ArrayLike,
-        axle: Axle | None = None,
-        level: float = ...,
-        *,
-        v_x: float | None = ...,
-    ) -> tuple[Array, Array] | None: ...
-
-    def band(
-        self,
-        alpha: ArrayLike,
-        axle: Axle | None = None,
-        level: float = 0.9,
-        *,
-        v_x: float | None = None,
-    ) -> tuple[float, float] | tuple[Array, Array] | None:
-        """Return between which forces the true one lies [N]: (low, high), each as of `force`.
-
-        None where the model has no band; `band_calibrated` says whether that share was calibrated.
-
-        Parameters
-        ----------
-        alpha, axle : as of `force`.
-        level : in which share of cases it shall, above 0 and below 1.
-        v_x : speed [m/s], positive; None takes that of the identification drive.
-
-        Raises
-        ------
-        ValueError
-            Where the axle has another name, or level or speed are impossible.
-        """
-        slip = np.asarray(alpha, dtype=np.float64)
-        center = np.asarray(self.force(slip, axle))
-        half = self.half_band(slip.ravel(), level, v_x=v_x)
-        if half is None:
-            return None
-        half = half.reshape(*slip.shape, 2)
-        half = half if axle is None else half[..., AXLES.index(axle)]
-        if center.ndim == 0:
-            return float(center - half), float(center + half)
-        return center - half, center + half
 
     @property
     def guarantee(self) -> "Guarantee | None":
@@ -556,13 +409,6 @@ class TireModel(ABC):
         low, high = (side[..., AXLES.index(axle)] for side in (low, high))
         return (float(low), float(high)) if slip.ndim == 0 else (low, high)
 
-    def samples(self, n: int, rng: np.random.Generator) -> "tuple[TireModel, ...]":
-        """Return models drawn from what is not known of the tires."""
-        del n, rng
-        raise ValueError(
-            f"a {type(self).__name__} cannot tell how sure it is: nothing to draw from"
-        )
-
     def estimates(self) -> tuple[Estimate, ...]:
         """Return what a verdict tells of each axle: stiffness, without a doubt that is known."""
         declared = self.vehicle.bicycle[4:]
@@ -601,9 +447,8 @@ class TireModel(ABC):
         for row in rows:
             cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
             lines.append("  ".join(cells).rstrip())
-        if self.has_band:
-            how = self.band_origin
-            lines.append(f"band: {how}")
+        if self.band is not None:
+            lines.append(f"band: {self.band.origin}")
         if self.vehicle.estimates:
             lines.append(self.vehicle.estimates)
         return "\n".join(lines)
@@ -695,6 +540,13 @@ class StaticModel(TireModel):
     ) -> tuple[Any, Any]:
         del slip, least_lag
         return self.static_force(x, delta, v_x), ca.MX(0, 1)
+
+
+def require_band(model: TireModel) -> Band[Any]:
+    """Return the band of a model; refuse one that has none."""
+    if model.band is None:
+        raise ValueError(f"a {type(model).__name__} cannot tell how sure it is: it has no band")
+    return model.band
 
 
 def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:

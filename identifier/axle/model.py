@@ -1,6 +1,5 @@
 """The axle model, frozen: force curves of slip, their lag and sway, and where they are known."""
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from typing import Any
@@ -13,16 +12,11 @@ from codegen import Scan
 from codegen.arrays import Array, blocks
 from codegen.escape import shown
 from identifier.axle.band import (
-    CENTERS,
-    LEVEL,
     RELATIVE,
     BandCalibration,
-    BandSpread,
-    SpreadByRange,
     colored,
     colored_variance,
-    normal_quantile,
-    ranges_of,
+    declared_spread,
     root,
     sensor_noise,
 )
@@ -39,9 +33,18 @@ from identifier.axle.guarantee import (
     grip_lost,
     slip_beyond,
 )
-from identifier.axle.prior import SD_FRICTION, friction_direction
+from identifier.axle.prior import friction_direction
 from identifier.axle.slip import SHORTEST, Sensors, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
+from identifier.band import (
+    LEVEL,
+    SD_FRICTION,
+    Band,
+    BandSpread,
+    normal_quantile,
+    require_count,
+    require_friction_sd,
+)
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
 from identifier.setup import Setup
 from identifier.tire_model import AXLES, GRIP, RELAXATION, STIFFNESS, Estimate, Fact, TireModel
@@ -54,7 +57,6 @@ ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")
 LARGEST = 1e9  # of the numbers in a file, SI and static axle loads
 LARGEST_WEIGHT = 100.0  # static axle loads: no unit of a tire carries more
 ROUNDING = 1e-6  # of correlations, as learning in float leaves them
-LARGEST_SD = 0.25  # standard deviation over the prior's, above which a slip is not known
 DECIDED = 0.5  # standard deviation over the prior's, up to which a drive decided a number
 DRAWS = 1000  # of weights, before a possible tire must have been among them
 EXACT = Sensors()
@@ -179,116 +181,15 @@ class AxleModel(TireModel):
         force: Array = unit_matrix(alpha, self.ladder) @ self.W.T * self._loads
         return force
 
-    def relative_sd(self, alpha: Array) -> Array:
-        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
-
-        Standard deviation of the force over that of the prior.
-        """
-        T, n = unit_matrix(alpha, self.ladder), len(self.ladder)
-        ratio = [
-            np.einsum("ki,ij,kj->k", T, now[:n, :n], T)
-            / np.einsum("ki,ij,kj->k", T, before[:n, :n], T)
-            for now, before in zip(self.covariance, self.prior_covariance, strict=True)
-        ]
-        relative_sd: Array = np.sqrt(np.maximum(np.stack(ratio, axis=1), 0.0))
-        return relative_sd
-
     @property
-    def has_band(self) -> bool:
-        """Whether the model can tell how sure it is: by its covariance."""
-        return True
-
-    @property
-    def band_calibrated(self) -> bool:
-        """Whether the width of its band was found on parts of the drive that did not teach."""
-        return self.calibration is not None
-
-    def with_calibration(
-        self, calibration: BandCalibration | None, force_missed: Array | None = None
-    ) -> "AxleModel":
-        """Return the model, its band calibrated."""
-        return replace(self, calibration=calibration, force_missed=force_missed)
+    def band(self) -> "AxleBand":
+        """How unsure it is, by its covariance."""
+        return AxleBand(self)
 
     @property
     def known_slip(self) -> Array:
         """Largest slip [rad] that was seen while learning and where the doubt is small, (2,)."""
-        grid = np.linspace(0.0, 1.0, 201)[1:]
-        known = np.zeros(2)
-        for i, largest in enumerate(self.excitation[:, 0]):
-            if largest > 0.0:
-                sure = self.relative_sd(largest * grid)[:, i] <= LARGEST_SD
-                count = sure.size if sure.all() else int(np.argmin(sure))
-                known[i] = largest * count / grid.size
-        return known
-
-    def half_band(
-        self, alpha: Array, level: float = LEVEL, *, v_x: float | Array | None = None
-    ) -> Array:
-        """Return half the width of the band around the steady forces, (k, 2) [N].
-
-        Without a calibration errors are taken to be as declared.
-
-        Raises
-        ------
-        ValueError
-            Where the level is impossible, or a speed is not positive.
-        """
-        speed = np.broadcast_to(
-            self.effective_calibration.speed if v_x is None else v_x, np.shape(alpha)
-        )
-        if not (speed > 0.0).all():
-            raise ValueError(f"v_x of a band must be positive, it is {speed.min()}")
-        factor = self.effective_calibration.factor(alpha, speed / self.vehicle.froude_speed)
-        pressed = self.vehicle.load_ratio(0.0 if v_x is None else speed)
-        return self.band_spread(alpha, speed, pressed).half_width(factor, level) * self._loads
-
-    def half_band_over(self, recording: Recording, level: float = LEVEL) -> Array:
-        """Return half the width of the band around `axle_force` of a drive, (n, 2) [N].
-
-        White noise of the drive's own sensors is in it, as far as the lag lets it pass; it is zero
-        where the forces read zero.
-        """
-        slip, noise = self.lagged_slip(recording), sensor_noise(recording, self.vehicle)
-        half = np.zeros_like(slip)
-        for part in blocks(len(slip)):
-            v_x = np.maximum(recording.v_x[part], self.min_speed)
-            curve = self.half_band_along(slip[part], v_x, level)
-            passed = self._noise_passed(slip[part], v_x[:, None], noise, recording.dt)
-            wide = np.hypot(curve, normal_quantile(level) * passed * self._loads)
-            half[part] = np.where(recording.v_x[part, None] >= self.min_speed, wide, 0.0)
-        return half
-
-    def half_band_along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
-        """Return half the width of the band where each axle has its own slip, (n, 2) [N].
-
-        Parameters
-        ----------
-        slip : of front and rear axle [rad], (n, 2).
-        v_x : speeds [m/s], positive, (n,).
-        """
-        both = [self.half_band(slip[:, i], level, v_x=v_x)[:, i] for i in range(2)]
-        return np.column_stack(both)
-
-    def half_band_of_curves(self, recording: Recording, level: float = LEVEL) -> Array:
-        """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N].
-
-        Of the steady forces, without noise of the drive's sensors.
-        """
-        speed = np.maximum(recording.v_x, self.min_speed)
-        return self.half_band_along(self.lagged_slip(recording), speed, level)
-
-    def _noise_passed(self, slip: Array, v_x: Array, noise: Array, dt: float) -> Array:
-        """Return what noise of sensors makes of the forces, through the lag [static loads], (n, 2).
-
-        White noise through a lag of first order leaves (1 - e)/(1 + e) of its variance.
-        """
-        sideways, steering = noise[:2] / v_x, np.array([noise[2], 0.0])
-        pressed = self.vehicle.load_ratio(v_x[:, 0])
-        slope = self.slope_at(slip) * pressed
-        slopes = np.maximum(slope, 0.02 * self.slope_at(np.zeros((1, 2))) * pressed)
-        e = np.exp(-v_x * dt / (self.own[:, 0] * slopes + SHORTEST * self.vehicle.wheelbase))
-        passed: Array = slope * np.hypot(sideways, steering) * np.sqrt((1.0 - e) / (1.0 + e))
-        return passed
+        return self.band.known_slip(self.excitation[:, 0], 200)
 
     def slope_at(self, slip: Array) -> Array:
         """Return the slope of the curves under static loads at slips [static loads/rad], (n, 2).
@@ -302,78 +203,10 @@ class AxleModel(TireModel):
         slope: Array = ((1.0 - units**2) * self.W / scales).sum(axis=-1)
         return slope
 
-    def slope_over(self, recording: Recording) -> Array:
-        """Return the slope of the curves over the slip of a drive [static loads/rad], (n, 2)."""
-        return self.slope_at(self.lagged_slip(recording)) * self.vehicle.load_ratio(recording.v_x)
-
     @property
     def effective_calibration(self) -> BandCalibration:
         """Calibration of the band; where there is none, of the declared errors."""
         return self.calibration or BandCalibration.declared(self.reference_speed)
-
-    def band_spread(self, alpha: Array, v_x: Array, pressed: Array | float = 1.0) -> BandSpread:
-        """Return the variances of the steady forces that a band is made of, (k, 2).
-
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,).
-        v_x : speeds [m/s], positive, (k,).
-        pressed : loads of the axles over the static ones, (k, 2), or one for all [-].
-        """
-        T = unit_matrix(alpha, self.ladder)
-        scales, n = np.array(self.ladder), len(self.ladder)
-        slope = (1.0 - T * T) @ (self.W / scales).T
-        zero = slope * np.column_stack([np.ones_like(v_x), 1.0 / v_x])  # of slip, by its offset
-        h = np.zeros((2, len(T), n + 3))
-        h[:, :, :n], h[:, :, -1] = T, zero.T
-        load = np.broadcast_to(pressed, (len(T), 2))
-        h *= load.T[:, :, None]
-        left, before = (
-            np.einsum("aki,aij,akj->ka", h, both, h)
-            for both in (self.covariance, self.prior_covariance)
-        )
-        calibration = self.effective_calibration
-        left = colored_variance(left, before, calibration.color)
-        force = T @ self.W.T * load
-        return BandSpread.of(force, left, before, calibration.stretch(v_x)[:, None])
-
-    def spread_by_range(
-        self, recording: Recording, mean: Callable[[Array], Array]
-    ) -> SpreadByRange:
-        """Return the variances that a band is made of, by range of slip and window of a drive.
-
-        Parameters
-        ----------
-        mean : over the windows: signals (n, ...) -> (m, ...).
-        """
-        size, count = np.abs(self.lagged_slip(recording)), len(CENTERS)
-        within, v_x = ranges_of(size), np.tile(mean(recording.v_x), count)
-        share = np.array([mean(1.0 * (within == k)) for k in range(count)])
-        total = np.array([mean(size * (within == k)) for k in range(count)])
-        slip = np.divide(total, share, out=np.zeros_like(total), where=share > 0.0)
-        spread = BandSpread(np.empty_like(slip), np.empty_like(slip))
-        pressed = self.vehicle.load_ratio(v_x)
-        for axle in range(2):
-            at = self.band_spread(slip[..., axle].ravel(), v_x, pressed)
-            for into, values in zip(spread, at, strict=True):
-                into[..., axle] = values[:, axle].reshape(slip.shape[:2])
-        return SpreadByRange(share, *spread)
-
-    def on_another_road(self, sd_friction: float = SD_FRICTION) -> "AxleModel":
-        """Return the model for a road whose friction is not that of the drive that taught.
-
-        Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
-
-        Parameters
-        ----------
-        sd_friction : standard deviation of ln μ between the roads [-], as of `Prior`.
-        """
-        if not 0.0 <= sd_friction < np.inf:
-            raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
-        n, wider = len(self.ladder), self.covariance.copy()
-        change = sd_friction * self.W @ friction_direction(self.ladder).T
-        wider[:, :n, :n] += change[:, :, None] * change[:, None, :]
-        return replace(self, covariance=wider, guarantee=None)
 
     def guaranteed_at(self, alpha: Array, rate: Array) -> tuple[Array, Array] | None:
         """Return least and largest steady force at slip angles under static loads, (k, 2) [N].
@@ -440,55 +273,6 @@ class AxleModel(TireModel):
         driven: Array = np.maximum(self.excitation[:, 0], self.ladder[0])
         return driven
 
-    def _posterior(self, factors: Array | None = None) -> Array:
-        """Return the covariance of both axles, its noise as colored as it was."""
-        color = self.effective_calibration.color
-        size = np.ones(2) if factors is None else factors
-        both = zip(self.covariance, self.prior_covariance, color, size, strict=True)
-        return np.array([colored(P, prior, float(c), float(f)) for P, prior, c, f in both])
-
-    def samples(self, n: int, rng: np.random.Generator) -> tuple["AxleModel", ...]:
-        """Return models drawn from what learning left open, and from the errors of a model.
-
-        Raises
-        ------
-        ValueError
-            Where n is negative, or no tire is among what was drawn.
-        """
-        if n < 0:
-            raise ValueError(f"n must not be negative, it is {n}")
-        factors = self.effective_calibration.factors
-        size = np.sqrt(np.mean(factors**2, axis=1))
-        roots = [root(P) for P in self._posterior(size)]
-        drawn: list[AxleModel] = []
-        for _ in range(DRAWS * n):
-            if len(drawn) == n:
-                break
-            one = self._drawn(roots, 1.0 + RELATIVE * size * rng.standard_normal(2), rng)
-            if one is not None:
-                drawn.append(one)
-        if len(drawn) < n:
-            raise ValueError(
-                "no tire is among what the covariance leaves open: it knows too little"
-            )
-        return tuple(drawn)
-
-    def _drawn(
-        self, roots: list[Array], scale: Array, rng: np.random.Generator
-    ) -> "AxleModel | None":
-        """Return a model drawn, offsets and lags within what is possible; None: no tire."""
-        n, car, at_most = len(self.ladder), self.vehicle, self.plausibility
-        away = np.array([root @ rng.standard_normal(len(root)) for root in roots])
-        W = (self.W + away[:, :n]) * scale[:, None]
-        slope = (W / np.array(self.ladder)).sum(axis=1)
-        if not ((W.sum(axis=1) > 0.0) & (slope > 0.0)).all() or np.abs(W).max() > LARGEST_WEIGHT:
-            return None
-        zeros = np.array([at_most.max_steering, at_most.slow])
-        low = np.column_stack([np.zeros((2, 2)), -zeros])
-        high = np.column_stack([np.full(2, car.wheelbase), np.ones(2), zeros])
-        own = np.clip(self.own + away[:, n:], low, high)
-        return replace(self, W=W, own=own, force_missed=None)
-
     def estimates(self) -> tuple[Estimate, ...]:
         """Return stiffness, grip, relaxation length and offset of each axle, with their doubt.
 
@@ -535,7 +319,7 @@ class AxleModel(TireModel):
         known = self.known_slip
         lines = list(TireModel.facts(self))
         if (known > 0.0).all():
-            unsure = 100.0 * np.diag(self.relative_sd(known))
+            unsure = 100.0 * np.diag(self.band.relative_sd(known))
             lines.append(Fact("standard deviation there over the prior's", unsure, "%"))
         lines.append(Fact("time of learning", self.learning_time.sum(axis=1), "s"))
         if self.vehicle.has_downforce:
@@ -712,6 +496,134 @@ class AxleModel(TireModel):
             raise FrozenModelError(f"{source}: key {error} is missing") from error
         except (TypeError, ValueError) as error:
             raise FrozenModelError(f"{source}: {error}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class AxleBand(Band[AxleModel]):
+    """How unsure an axle model is: by its covariance, and errors that no curve can explain."""
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether its width was found on parts of the drive that did not teach."""
+        return self.model.calibration is not None
+
+    @property
+    def speed(self) -> float:
+        """Speed [m/s] at which it is given where none is asked for."""
+        return self.model.effective_calibration.speed
+
+    def factor(self, slip: Array, v_x: Array) -> Array:
+        """Return the factors of the calibration, (n, 2)."""
+        relative = v_x / self.model.vehicle.froude_speed
+        return self.model.effective_calibration.factor(slip, relative)
+
+    def spread(self, slip: Array, v_x: Array, pressed: Array) -> BandSpread:
+        """Return the variances of the steady forces that it is made of, (n, 2)."""
+        model, n = self.model, len(self.model.ladder)
+        T = np.stack([unit_matrix(slip[:, i], model.ladder) for i in range(2)])
+        zero = model.slope_at(slip) * np.column_stack([np.ones_like(v_x), 1.0 / v_x])
+        h = np.zeros((2, len(slip), n + 3))
+        h[:, :, :n], h[:, :, -1] = T, zero.T  # the slip by its offset, too
+        h *= pressed.T[:, :, None]
+        left, before = (
+            np.einsum("aki,aij,akj->ka", h, both, h)
+            for both in (model.covariance, model.prior_covariance)
+        )
+        calibration = model.effective_calibration
+        left = colored_variance(left, before, calibration.color)
+        force = np.einsum("aki,ai->ka", T, model.W) * pressed
+        return declared_spread(force, left, before, calibration.stretch(v_x)[:, None])
+
+    def relative_sd(self, alpha: Array) -> Array:
+        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning."""
+        T, n = unit_matrix(alpha, self.model.ladder), len(self.model.ladder)
+        ratio = [
+            np.einsum("ki,ij,kj->k", T, now[:n, :n], T)
+            / np.einsum("ki,ij,kj->k", T, before[:n, :n], T)
+            for now, before in zip(self.model.covariance, self.model.prior_covariance, strict=True)
+        ]
+        relative_sd: Array = np.sqrt(np.maximum(np.stack(ratio, axis=1), 0.0))
+        return relative_sd
+
+    def over(self, recording: Recording, level: float = LEVEL) -> Array:
+        """Return half its width around the predicted forces of a drive, (n, 2) [N].
+
+        White noise of the drive's own sensors is in it, as far as the lag lets it pass.
+        """
+        model = self.model
+        slip, noise = model.lagged_slip(recording), sensor_noise(recording, model.vehicle)
+        half = np.zeros_like(slip)
+        for part in blocks(len(slip)):
+            v_x = np.maximum(recording.v_x[part], model.min_speed)
+            passed = self._noise_passed(slip[part], v_x[:, None], noise, recording.dt)
+            passed *= normal_quantile(level) * np.array(model.vehicle.axle_loads)
+            wide = np.hypot(self.along(slip[part], v_x, level), passed)
+            half[part] = np.where(recording.v_x[part, None] >= model.min_speed, wide, 0.0)
+        return half
+
+    def _noise_passed(self, slip: Array, v_x: Array, noise: Array, dt: float) -> Array:
+        """Return what noise of sensors makes of the forces, through the lag [static loads], (n, 2).
+
+        White noise through a lag of first order leaves (1 - e)/(1 + e) of its variance.
+        """
+        model, car = self.model, self.model.vehicle
+        sideways, steering = noise[:2] / v_x, np.array([noise[2], 0.0])
+        pressed = car.load_ratio(v_x[:, 0])
+        slope = model.slope_at(slip) * pressed
+        slopes = np.maximum(slope, 0.02 * model.slope_at(np.zeros((1, 2))) * pressed)
+        e = np.exp(-v_x * dt / (model.own[:, 0] * slopes + SHORTEST * car.wheelbase))
+        passed: Array = slope * np.hypot(sideways, steering) * np.sqrt((1.0 - e) / (1.0 + e))
+        return passed
+
+    def calibrated_by(
+        self, calibration: BandCalibration | None, force_missed: Array | None = None
+    ) -> AxleModel:
+        """Return the model, its band calibrated."""
+        return replace(self.model, calibration=calibration, force_missed=force_missed)
+
+    def on_another_road(self, sd_friction: float = SD_FRICTION) -> AxleModel:
+        """Return the model for a road whose friction is not that of the drive that taught."""
+        model, n = self.model, len(self.model.ladder)
+        change = require_friction_sd(sd_friction) * model.W @ friction_direction(model.ladder).T
+        wider = model.covariance.copy()
+        wider[:, :n, :n] += change[:, :, None] * change[:, None, :]
+        return replace(model, covariance=wider, guarantee=None)
+
+    def samples(self, n: int, rng: np.random.Generator) -> tuple[AxleModel, ...]:
+        """Return models drawn from what learning left open, and from the errors of a model."""
+        require_count(n)
+        model, calibration = self.model, self.model.effective_calibration
+        size = np.sqrt(np.mean(calibration.factors**2, axis=1))
+        both = zip(model.covariance, model.prior_covariance, calibration.color, size, strict=True)
+        roots = [root(colored(P, prior, float(c), float(f))) for P, prior, c, f in both]
+        drawn: list[AxleModel] = []
+        for _ in range(DRAWS * n):
+            if len(drawn) == n:
+                break
+            one = self._drawn(roots, 1.0 + RELATIVE * size * rng.standard_normal(2), rng)
+            if one is not None:
+                drawn.append(one)
+        if len(drawn) < n:
+            raise ValueError(
+                "no tire is among what the covariance leaves open: it knows too little"
+            )
+        return tuple(drawn)
+
+    def _drawn(
+        self, roots: list[Array], scale: Array, rng: np.random.Generator
+    ) -> AxleModel | None:
+        """Return a model drawn, offsets and lags within what is possible; None: no tire."""
+        model, n, at_most = self.model, len(self.model.ladder), self.model.plausibility
+        away = np.array([root @ rng.standard_normal(len(root)) for root in roots])
+        W = (model.W + away[:, :n]) * scale[:, None]
+        slope = (W / np.array(model.ladder)).sum(axis=1)
+        if not ((W.sum(axis=1) > 0.0) & (slope > 0.0)).all() or np.abs(W).max() > LARGEST_WEIGHT:
+            return None
+        zeros = np.array([at_most.max_steering, at_most.slow])
+        low = np.column_stack([np.zeros((2, 2)), -zeros])
+        high = np.column_stack([np.full(2, model.vehicle.wheelbase), np.ones(2), zeros])
+        own = np.clip(model.own + away[:, n:], low, high)
+        return replace(model, W=W, own=own, force_missed=None)
 
 
 def _require_plausible(data: dict[str, Any], source: str) -> None:

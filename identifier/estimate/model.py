@@ -11,12 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array, blocks, large
-from identifier.axle.band import LEVEL, BandCalibration, normal_quantile
 from identifier.axle.curve import EDGES, LADDER, unit_matrix
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
-from identifier.axle.prior import SD_FRICTION
 from identifier.axle.slip import SHORTEST, Sensors, Sway
+from identifier.band import (
+    SD_FRICTION,
+    Band,
+    BandSpread,
+    require_count,
+    require_friction_sd,
+)
 from identifier.estimate.drive import Drive
 from identifier.estimate.latent import TRUST, LateralVelocity, estimate_v_y
 from identifier.estimate.priors import Priors
@@ -54,7 +59,6 @@ WIDEST = 0.6  # rad, as far as it is fitted
 LEAST_VARIANCE = 1e-10  # of weights, lag and zeros, so that no covariance is singular
 BEYOND = 0.3  # weight of a slip that no drive reached, in that fit
 DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided a number
-LARGEST_SD = 0.25  # of the force over the prior's, above which a slip is not known
 BOUNDED = (("ln_stiffness", "cornering stiffness", True), ("ln_grip", "grip", True))
 ELSEWHERE = 2.25
 # times what the drives that taught miss, on others; chosen on recordings of three real cars and two
@@ -329,10 +333,9 @@ class FittedModel(TireModel):
                 slip[kept] = out["slip"][part.start - first :]
         return force, slip
 
-    def slope_over(self, recording: Recording) -> Array:
-        """Return the slope of the force curves over the slip of a drive [static loads/rad]."""
-        _, slope, _ = self.curve_at(self.lagged_slip(recording))
-        return slope * self.vehicle.load_ratio(recording.v_x)
+    def slope_at(self, slip: Array) -> Array:
+        """Return the slope of the curves under static loads at slips [static loads/rad], (n, 2)."""
+        return self.curve_at(slip)[1]
 
     @property
     def known_speeds(self) -> Array:
@@ -416,179 +419,15 @@ class FittedModel(TireModel):
         beyond: NDArray[np.bool_] = np.abs(self.lagged_slip(recording)) > self.known_slip
         return beyond
 
-    # How sure.
-
-    def _curve_sd(self, alpha: Array) -> tuple[Array, Array]:
-        """Return the standard deviation of φ at slips, and that before learning, (k, 2) each."""
-        _, _, J = self.curve_at(alpha)
-        sd = []
-        for P in (self.covariance, _covariance_before(self)):
-            found = [
-                np.einsum("ki,ij,kj->k", J[i], P[np.ix_(index, index)], J[i])
-                for i, index in enumerate(map(curve_index, "fr"))
-            ]
-            sd.append(np.sqrt(np.maximum(np.column_stack(found), 0.0)))
-        return sd[0], sd[1]
-
-    def relative_sd(self, alpha: Array) -> Array:
-        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
-
-        Parameters
-        ----------
-        alpha : [rad], (k,).
-        """
-        return self._relative_sd(np.column_stack([alpha, alpha]))
-
-    def _relative_sd(self, alpha: Array) -> Array:
-        """Return the same at slips of each axle, (k, 2)."""
-        sd, prior = self._curve_sd(alpha)
-        ratio: Array = sd / np.maximum(prior, 1e-12)
-        return ratio
+    @property
+    def band(self) -> "FittedBand":
+        """How unsure it is, by its covariance and its error on the drives that taught."""
+        return FittedBand(self)
 
     @property
     def known_slip(self) -> Array:
         """Largest slip [rad] that the drives reached and where the doubt is small, (2,)."""
         return _known_slip(self).copy()
-
-    @property
-    def has_band(self) -> bool:
-        """Whether the model can tell how sure it is: by its covariance."""
-        return True
-
-    @property
-    def band_origin(self) -> str:
-        """Where the width of the band comes from, in words."""
-        front, rear = 100.0 * np.hypot(self.error_share, self.error_floor / TYPICAL)
-        return (
-            f"what the drives leave open, and an error of the model of {front:.0f} / {rear:.0f} % "
-            f"at {TYPICAL:g} static loads, from its error on them and a mass known to "
-            f"{100.0 * SURE_MASS:.0f} %"
-        )
-
-    @property
-    def load_doubt(self) -> Array:
-        """Relative standard deviation of the static loads: mass and center of gravity, (2,)."""
-        car = self.vehicle
-        arms = np.array([car.l_r, car.l_f])
-        doubt: Array = np.hypot(SURE_MASS, SURE_CENTER * car.wheelbase / arms)
-        return doubt
-
-    @property
-    def error_share(self) -> Array:
-        """Standard deviation of the model's own error, the part that goes with the force, (2,)."""
-        return np.hypot(self.load_doubt, ELSEWHERE * ERROR_SIZE[1] * self.unexplained)
-
-    @property
-    def error_floor(self) -> Array:
-        """The part of it that is there without a force [static loads], (2,)."""
-        floor: Array = ELSEWHERE * ERROR_SIZE[0] * self.unexplained
-        return floor
-
-    @property
-    def band_calibrated(self) -> bool:
-        """Whether the width of its band is more than noise of the sensors: always."""
-        return True
-
-    def with_calibration(
-        self, calibration: BandCalibration | None, force_missed: Array | None = None
-    ) -> "FittedModel":
-        """Return the model with what it misses of the drives that taught.
-
-        Parameters
-        ----------
-        force_missed : share of the force [-], (2,).
-        """
-        del calibration
-        return replace(self, force_missed=force_missed)
-
-    def half_band(
-        self, alpha: Array, level: float = LEVEL, *, v_x: float | Array | None = None
-    ) -> Array:
-        """Return half the width of the band around the steady forces, (k, 2) [N].
-
-        It has the doubt of the curve and of the sensors' zeros, and the model's own error.
-
-        Parameters
-        ----------
-        alpha : [rad], (k,).
-        v_x : [m/s].
-
-        Raises
-        ------
-        ValueError
-            Where the level is impossible, or a speed is not positive.
-        """
-        speed = np.broadcast_to(self.reference_speed if v_x is None else v_x, np.shape(alpha))
-        if not (speed > 0.0).all():
-            raise ValueError(f"v_x of a band must be positive, it is {speed.min()}")
-        both = np.column_stack([alpha, alpha])
-        wide = self._sd_along(both, speed)
-        return normal_quantile(level) * wide * self._loads * self._pressed(v_x, speed)
-
-    def _pressed(self, v_x: float | Array | None, speed: Array) -> Array:
-        return self.vehicle.load_ratio(np.zeros_like(speed) if v_x is None else speed)
-
-    def half_band_along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
-        """Return half the width of the band where each axle has its own slip, (n, 2) [N].
-
-        Parameters
-        ----------
-        slip : [rad], (n, 2).
-        v_x : [m/s], (n,).
-        """
-        pressed = self.vehicle.load_ratio(v_x)
-        return normal_quantile(level) * self._sd_along(slip, v_x) * self._loads * pressed
-
-    def _sd_along(self, slip: Array, v_x: Array) -> Array:
-        """Return the standard deviation of the forces over static loads, (k, 2)."""
-        phi, slope, J = self.curve_at(slip)
-        variance = np.empty_like(phi)
-        for i, axle in enumerate("fr"):
-            index = [*curve_index(axle), *_OFFSETS]
-            zero = slope[:, i, None] * np.column_stack(
-                [
-                    np.full(len(phi), 1.0 if i == 0 else 0.0),
-                    1.0 / v_x,
-                    np.ones(len(phi)),
-                ]
-            )
-            h = np.hstack([J[i], zero])
-            variance[:, i] = np.einsum("ki,ij,kj->k", h, self.covariance[np.ix_(index, index)], h)
-        own = self.error_floor**2 + (self.error_share * phi) ** 2
-        return np.sqrt(np.maximum(variance, 0.0) + own)
-
-    def half_band_of_curves(self, recording: Recording, level: float = LEVEL) -> Array:
-        """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N]."""
-        speed = np.maximum(recording.v_x, self.min_speed)
-        return self.half_band_along(self.lagged_slip(recording), speed, level)
-
-    def half_band_over(self, recording: Recording, level: float = LEVEL) -> Array:
-        """Return half the width of the band around `axle_force` of a drive, (n, 2) [N]."""
-        half = self.half_band_of_curves(recording, level)
-        return np.where(recording.v_x[:, None] >= self.min_speed, half, 0.0)
-
-    def samples(self, n: int, rng: np.random.Generator) -> "tuple[FittedModel, ...]":
-        """Return models drawn from what the drives left open.
-
-        Raises
-        ------
-        ValueError
-            Where n is negative.
-        """
-        if n < 0:
-            raise ValueError(f"n must not be negative, it is {n}")
-        priors = Priors.of(self.vehicle)
-        share = np.hypot(self.error_share, self.error_floor / TYPICAL)
-        values, vectors = np.linalg.eigh(self.covariance)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        drawn = []
-        for _ in range(n):
-            p = self.p + root @ rng.standard_normal(len(self.p))
-            for i, axle in enumerate("fr"):
-                p[INDEX[f"ln_stiffness_{axle}"]] += share[i] * rng.standard_normal()
-                p[INDEX[f"ln_grip_{axle}"]] += share[i] * rng.standard_normal()
-            drawn.append(replace(self, p=np.clip(p, priors.low, priors.high)))
-        return tuple(drawn)
 
     # What it says of itself.
 
@@ -612,18 +451,19 @@ class FittedModel(TireModel):
         before = _covariance_before(self)
         given = self.vehicle.bicycle[4:]
         zero = np.zeros((1, 2))
-        stiff = [sd[0] / SMALL for sd in self._curve_sd(np.full((1, 2), SMALL))]
+        band = self.band
+        stiff = [sd[0] / SMALL for sd in band.of_phi(np.full((1, 2), SMALL))]
         peak = np.maximum(self.known_slip, 1e-3)[None]
         top, at_known, _ = self.curve_at(peak)
         _, at_zero, _ = self.curve_at(zero)
-        wide = self._curve_sd(peak)
+        wide = band.of_phi(peak)
         listed = []
         for i, (axle, short) in enumerate(zip(AXLES, "fr", strict=True)):
             load, s = float(self._loads[i]), INDEX[f"compliance_{short}"]
             lag = float(self.relaxation_length[i])
             C = float(at_zero[0, i])
             sd = stiff[0][i]
-            whole = math.hypot(sd, C * float(self.load_doubt[i]))
+            whole = math.hypot(sd, C * float(band.load_doubt[i]))
             listed.append(
                 Estimate(
                     STIFFNESS, axle, C * load, whole * load, "N/rad", given[i],
@@ -686,21 +526,6 @@ class FittedModel(TireModel):
         p[INDEX["ln_road"]] += math.log(ratio)
         driven = ratio * self.driven
         return replace(self, p=p, driven=driven, segments=(), force_missed=None)
-
-    def on_another_road(self, sd_friction: float = SD_FRICTION) -> "FittedModel":
-        """Return the model for a road whose friction is not that of the drive that taught.
-
-        Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
-
-        Parameters
-        ----------
-        sd_friction : standard deviation of ln μ between the roads [-].
-        """
-        if not 0.0 <= sd_friction < math.inf:
-            raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
-        covariance, k = self.covariance.copy(), INDEX["ln_road"]
-        covariance[k, k] += sd_friction**2
-        return replace(self, covariance=covariance)
 
     def as_prior(self, vehicle: Vehicle) -> Priors:
         """Return what it leaves to believe of a car: its numbers, as sure as they are."""
@@ -863,6 +688,114 @@ class FittedModel(TireModel):
             raise FrozenModelError(f"{source}: {error}") from error
 
 
+@dataclass(frozen=True, slots=True)
+class FittedBand(Band[FittedModel]):
+    """How unsure a fit is: by its covariance, and its error on the drives that taught."""
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether its width is more than noise of the sensors: always."""
+        return True
+
+    @property
+    def origin(self) -> str:
+        """Where its width comes from, in words."""
+        front, rear = 100.0 * self._error_at(TYPICAL)
+        return (
+            f"what the drives leave open, and an error of the model of {front:.0f} / {rear:.0f} % "
+            f"at {TYPICAL:g} static loads, from its error on them and a mass known to "
+            f"{100.0 * SURE_MASS:.0f} %"
+        )
+
+    @property
+    def speed(self) -> float:
+        """Speed [m/s] at which it is given where none is asked for."""
+        return self.model.reference_speed
+
+    @property
+    def load_doubt(self) -> Array:
+        """Relative standard deviation of the static loads: mass and center of gravity, (2,)."""
+        car = self.model.vehicle
+        arms = np.array([car.l_r, car.l_f])
+        doubt: Array = np.hypot(SURE_MASS, SURE_CENTER * car.wheelbase / arms)
+        return doubt
+
+    @property
+    def error_share(self) -> Array:
+        """Standard deviation of the model's own error, the part that goes with the force, (2,)."""
+        return np.hypot(self.load_doubt, ELSEWHERE * ERROR_SIZE[1] * self.model.unexplained)
+
+    @property
+    def error_floor(self) -> Array:
+        """The part of it that is there without a force [static loads], (2,)."""
+        floor: Array = ELSEWHERE * ERROR_SIZE[0] * self.model.unexplained
+        return floor
+
+    def _error_at(self, force: float) -> Array:
+        """Return that error over a force [static loads], (2,)."""
+        return np.hypot(self.error_share, self.error_floor / force)
+
+    def spread(self, slip: Array, v_x: Array, pressed: Array) -> BandSpread:
+        """Return the variances of the steady forces, (n, 2): of curve, zeros and the own error."""
+        phi, slope, J = self.model.curve_at(slip)
+        variance = np.empty_like(phi)
+        for i, axle in enumerate("fr"):
+            index = [*curve_index(axle), *_OFFSETS]
+            steered = np.full(len(phi), 1.0 if i == 0 else 0.0)
+            zeros = np.column_stack([steered, 1.0 / v_x, np.ones(len(phi))])
+            h = np.hstack([J[i], slope[:, i, None] * zeros])
+            P = self.model.covariance[np.ix_(index, index)]
+            variance[:, i] = np.einsum("ki,ij,kj->k", h, P, h)
+        own = self.error_floor**2 + (self.error_share * phi) ** 2
+        total = (np.maximum(variance, 0.0) + own) * pressed**2
+        return BandSpread(total, np.zeros_like(total))
+
+    def of_phi(self, slip: Array) -> tuple[Array, Array]:
+        """Return the standard deviation of φ at slips (n, 2), and that before learning."""
+        _, _, J = self.model.curve_at(slip)
+        sd = []
+        for P in (self.model.covariance, _covariance_before(self.model)):
+            found = [
+                np.einsum("ki,ij,kj->k", J[i], P[np.ix_(index, index)], J[i])
+                for i, index in enumerate(map(curve_index, "fr"))
+            ]
+            sd.append(np.sqrt(np.maximum(np.column_stack(found), 0.0)))
+        return sd[0], sd[1]
+
+    def relative_sd(self, alpha: Array) -> Array:
+        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning."""
+        sd, prior = self.of_phi(np.column_stack([alpha, alpha]))
+        ratio: Array = sd / np.maximum(prior, 1e-12)
+        return ratio
+
+    def calibrated_by(self, calibration: Any, force_missed: Array | None = None) -> FittedModel:
+        """Return the model with what it misses of the drives that taught."""
+        del calibration
+        return replace(self.model, force_missed=force_missed)
+
+    def on_another_road(self, sd_friction: float = SD_FRICTION) -> FittedModel:
+        """Return the model for a road whose friction is not that of the drive that taught."""
+        covariance, k = self.model.covariance.copy(), INDEX["ln_road"]
+        covariance[k, k] += require_friction_sd(sd_friction) ** 2
+        return replace(self.model, covariance=covariance)
+
+    def samples(self, n: int, rng: np.random.Generator) -> tuple[FittedModel, ...]:
+        """Return models drawn from what the drives left open."""
+        require_count(n)
+        model, priors = self.model, Priors.of(self.model.vehicle)
+        share = self._error_at(TYPICAL)
+        values, vectors = np.linalg.eigh(model.covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        drawn = []
+        for _ in range(n):
+            p = model.p + root @ rng.standard_normal(len(model.p))
+            for i, axle in enumerate("fr"):
+                p[INDEX[f"ln_stiffness_{axle}"]] += share[i] * rng.standard_normal()
+                p[INDEX[f"ln_grip_{axle}"]] += share[i] * rng.standard_normal()
+            drawn.append(replace(model, p=np.clip(p, priors.low, priors.high)))
+        return tuple(drawn)
+
+
 # A run, its verdict and its report ask about the same drive: the last few answers are kept.
 _LAST: deque[tuple[tuple[Any, ...], tuple[int, ...], LateralVelocity]] = deque(maxlen=4)
 _OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
@@ -890,11 +823,7 @@ def _curve_expression(slip: Any, numbers: Array) -> tuple[Any, Any]:
 @lru_cache(maxsize=4)
 def _known_slip(model: FittedModel) -> Array:
     """Return `FittedModel.known_slip`, which a verdict asks for many times."""
-    grid = np.linspace(0.0, 1.0, 101)[1:]
-    sure = model._relative_sd(np.outer(grid, model.driven)) <= LARGEST_SD
-    count = np.where(sure.all(axis=0), grid.size, np.argmin(sure, axis=0))
-    known: Array = model.driven * count / grid.size
-    return known
+    return model.band.known_slip(model.driven, 100)
 
 
 @lru_cache(maxsize=4)

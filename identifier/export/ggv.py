@@ -11,16 +11,16 @@ which that diamond lies within the diagram: min over f of g f/(1 - a_y(f)/a_y(0)
 ends of theirs that leave less. Each is right or too low in 95 % of cases.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from codegen.arrays import Array
 from codegen.escape import visible
-from identifier.axle.band import LEVEL, normal_quantile
+from identifier.band import LEVEL, Band, normal_quantile
 from identifier.estimate.priors import Priors
 from identifier.motion.parameters import INDEX
-from identifier.tire_model import AXLES, TireModel
+from identifier.tire_model import AXLES, TireModel, require_band
 from models.vehicle import GRAVITY, LIGHTEST
 
 SPEEDS, PUSHES, SLIPS = 13, 200, 200  # of the table, of a diagram, of a curve
@@ -42,10 +42,14 @@ def limits(model: TireModel) -> Limits:
     Load transfer and ellipse of a model that has none are what is believed of its car. A model
     that cannot tell how sure it is, or is sure at no slip of an axle, is refused.
     """
-    car, known, own = model.vehicle, model.known_slip, model.lengthwise
-    if known is None or not model.has_band:
-        raise ValueError(f"a {type(model).__name__} cannot tell how sure it is: no proven limits")
-    grip = np.array([_lowest_grip(model, i, float(known[i])) for i in range(2)])
+    band, car, known, own = (
+        require_band(model),
+        model.vehicle,
+        model.known_slip,
+        model.lengthwise,
+    )
+    assert known is not None
+    grip = np.array([_lowest_grip(band, i, float(known[i])) for i in range(2)])
     priors, index = Priors.of(car), [INDEX[name] for name in NUMBERS]
     mean, covariance = (priors.mean, priors.covariance) if own is None else own
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -62,11 +66,11 @@ def limits(model: TireModel) -> Limits:
     return Limits(v_x, *(GRAVITY * np.array([a_y, *sides])))
 
 
-def _lowest_grip(model: TireModel, i: int, known: float) -> float:
+def _lowest_grip(band: Band[Any], i: int, known: float) -> float:
     """Return the largest force of the lower end of an axle's band, in static loads."""
     alpha = np.linspace(0.0, known, SLIPS + 1)[1:]
-    half = model.half_band(alpha, LEVEL)
-    low = 0.0 if half is None else float((model.force_at(alpha) - half)[:, i].max())
+    half, model = band.half(alpha), band.model
+    low = float((model.force_at(alpha) - half)[:, i].max())
     if known <= 0.0 or low <= 0.0:
         raise ValueError(f"the force of the {AXLES[i]} axle is not known at any slip: drive harder")
     return low / model.vehicle.axle_loads[i]

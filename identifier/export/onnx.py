@@ -16,14 +16,13 @@ from identifier.axle.band import (
     AT_SPEEDS,
     CENTERS,
     FLOOR,
-    LEVEL,
     RELATIVE,
     UNKNOWN,
-    normal_quantile,
     root,
 )
 from identifier.axle.band_step import LEAST_BEFORE, hinges
 from identifier.axle.model import AxleModel
+from identifier.band import LEVEL, normal_quantile
 from identifier.estimate.model import FittedModel
 from identifier.export.specialize import INPUTS, Signal
 from identifier.own_network import OnnxModel
@@ -279,8 +278,8 @@ def _band_of_fit(source: FittedModel, graph: Graph, axle: int, units: str, force
     load = model.vehicle.axle_loads[axle]
     h = nodes.sensitivity(model, axle, units, float(source.speeds.mean()))
     left = nodes.variance(h, _of_curve(model, model.covariance, axle))
-    share = nodes.node("Mul", force, nodes.number(source.error_share[axle] / load))
-    own = nodes.node("Add", nodes.square(share), nodes.number(source.error_floor[axle] ** 2))
+    share = nodes.node("Mul", force, nodes.number(source.band.error_share[axle] / load))
+    own = nodes.node("Add", nodes.square(share), nodes.number(source.band.error_floor[axle] ** 2))
     nodes.finish(nodes.node("Add", left, own), load * normal_quantile(LEVEL))
 
 

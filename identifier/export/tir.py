@@ -96,9 +96,9 @@ def tire_properties(model: TireModel, axle: Axle) -> str:
     K, mu, C, E = (float(one) for one in found.numbers)
     load, u = 0.5 * model.vehicle.axle_loads[i], 1.0 / PROPORTIONAL
     slips = found.reach * np.array([0.25, 0.5, 0.75, 1.0])
-    half, force = model.half_band(slips), model.force_at(slips)
-    band = "the model cannot tell how sure it is"
-    if half is not None:
+    force, band = model.force_at(slips), "the model cannot tell how sure it is"
+    if model.band is not None:
+        half = model.band.half(slips)
         band = ", ".join(
             f"{F:.4g} +- {h:.3g} N at {a:.3g} deg"
             for a, F, h in zip(np.degrees(slips), 0.5 * force[:, i], 0.5 * half[:, i], strict=True)

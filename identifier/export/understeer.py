@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.tire_model import TireModel
+from identifier.tire_model import TireModel, require_band
 from models.vehicle import GRAVITY
 
 STEP = 1.0  # m/s², of the lateral acceleration
@@ -47,7 +47,7 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
     Its standard deviation is half of what lies between the 16 % and 84 % points of models drawn
     from what the drives left open. A model that cannot tell how sure it is is refused.
     """
-    drawn = model.samples(DRAWN, rng)
+    drawn = require_band(model).samples(DRAWN, rng)
     known, speeds, car = model.known_slip, model.known_speeds, model.vehicle
     if known is None or not known.min() > 0.0:
         raise ValueError("the force of an axle is not known at any slip: drive harder")

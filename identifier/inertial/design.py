@@ -138,7 +138,7 @@ class InertialIdentifier(Method):
             held=True,
             prior=replace(usual.prior, sway_share=share),
             roll_frequency=tires.sway.frequency * vehicle.froude_time,
-            doubt=(float(model.error_floor[1]), float(model.error_share[1])),
+            doubt=(float(model.band.error_floor[1]), float(model.band.error_share[1])),
             a_y_late=model.a_y_late,
             along=Along(
                 load_f=-model["load_transfer"] * vehicle.wheelbase / vehicle.l_r,

@@ -96,7 +96,7 @@ class PlausibleTires:
         cls, model: AxleModel, rng: np.random.Generator, *, steering_lag: float | None = None
     ) -> Self:
         """Return the tires that a car may have of which a model was learnt."""
-        drawn = model.samples(DRAWN, rng)
+        drawn = model.band.samples(DRAWN, rng)
         late = 1.0 + SPREAD * np.array([0.0, *np.resize([-1.0, 1.0], DRAWN)])
         return cls(
             vehicle=model.vehicle,

@@ -230,14 +230,12 @@ def _left_out(asked: Asked) -> Iterator[Objection]:
 
 
 def _unsure(asked: Asked) -> Iterator[Objection]:
-    if not asked.own:
+    if not asked.own or (band := asked.model.band) is None:
         return
     car, windows = asked.model.vehicle, asked.found.windows
     slip = np.abs(windows.mean(np.asarray(asked.recording.alpha(car.l_f, car.l_r))))
     for i, axle in enumerate(AXLES):
-        doubt = asked.model.relative_sd(np.maximum(slip[:, i], 1e-4))
-        if doubt is None:
-            return
+        doubt = band.relative_sd(np.maximum(slip[:, i], 1e-4))
         power = asked.found.measured[:, i] ** 2
         mean = float(np.sqrt(np.sum(power * doubt[:, i] ** 2) / max(float(power.sum()), 1e-12)))
         if not (mean <= RULES.doubt or asked.forceless[i]):

@@ -163,7 +163,7 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     mounted = any((model.sensors.v_y_angle, model.sensors.steering_gain))
     if mounted:
         weights = np.append(weights, [model.sensors.v_y_angle, model.sensors.steering_gain])
-    doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
+    doubt = model.band.half(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
     pressed = model.vehicle.has_downforce
     structure = LadderAxles(units=ladder.size, pressed=pressed, mounted=mounted)
     return PredictionTire(structure, weights, model.vehicle, doubt)
@@ -173,7 +173,7 @@ def fit_tire(model: FittedModel) -> PredictionTire:
     """Return the prediction tire of a fit: its curves in hidden units, read by its sensors.
     model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out.
     """
-    doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
+    doubt = model.band.half(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
     return axle_tire(model.in_units())._replace(doubt=doubt)
 
 

@@ -362,7 +362,7 @@ def test_the_band_is_drawn_around_the_curve_of_each_axle() -> None:
         (band,) = [one for one in axes.collections if one.get_label() == "band of 90 %"]
         corners = np.array(band.get_paths()[0].vertices)
         slip = np.radians(np.unique(corners[:, 0])[20:-20:10])
-        sides = [f[:, axle] / 1e3 for f in model.band(slip) or ()]
+        sides = [f[:, axle] / 1e3 for f in model.band.at(slip)]
         for at, low, high in zip(slip, *sides, strict=True):
             drawn = corners[np.isclose(np.radians(corners[:, 0]), at), 1]
             assert drawn.min() == pytest.approx(low) and drawn.max() == pytest.approx(high)

@@ -127,11 +127,11 @@ def unknown_of(learner: LearningTires | None) -> Callable[[], float] | None:
         nonlocal last, calls
         if calls % round(ASKED / PERIOD) == 0:
             try:
-                sd = learner.supervisor.identifier.model().relative_sd(np.array([PROBED]))
+                band = learner.supervisor.identifier.model().band
             except (DivergedError, CannotFreezeError, ValueError):  # no model now
-                sd = None
-            if sd is not None:
-                unsure = float(sd.max())
+                band = None
+            if band is not None:
+                unsure = float(band.relative_sd(np.array([PROBED])).max())
                 last = min(max((unsure - SURE) / (UNSURE - SURE), 0.0), 1.0)
         calls += 1
         return last

@@ -100,10 +100,9 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
     """Draw the steady curve of an axle, in its band where it has one."""
     degrees = np.linspace(float(ends[0]), float(ends[1]), 200)
     slip = np.deg2rad(degrees)
-    band = model.band(slip)
-    if band is not None:  # under the points, which it would make grey
+    if model.band is not None:  # under the points, which it would make grey
         edge: Mapping[str, Any] = {"edgecolor": style.BLUE, "linewidth": 0.4, "zorder": 1.5}
-        low, high = (force[:, axle] / newtons for force in band)
+        low, high = (force[:, axle] / newtons for force in model.band.at(slip))
         axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=BAND, **edge)
     look: Mapping[str, Any] = {"color": style.PURPLE, "linewidth": 0.9, "linestyle": "--"}
     for side in model.guaranteed_band(slip) or ():

@@ -226,16 +226,15 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
 
 def band_sentence(model: TireModel) -> str:
     """Return how wide the band is where slip is known, in words; empty where there is none."""
-    known = model.known_slip
-    half = None if known is None else model.half_band(known)
-    if known is None or half is None or not (known > 0.0).all():
+    known, band = model.known_slip, model.band
+    if known is None or band is None or not (known > 0.0).all():
         return ""
-    at = model.force(known)
+    at, half = model.force(known), band.half(known)
     shares = [100.0 * float(half[i, i]) / max(abs(float(at[i, i])), 1.0) for i in range(2)]
     return (
         "The band is where nine of ten forces of other drives are to be expected: at the end of "
         f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear). Its "
-        f"width: {model.band_origin}. Where slip is not known it widens to the prior."
+        f"width: {band.origin}. Where slip is not known it widens to the prior."
     )
 
 

@@ -62,11 +62,11 @@ def test_it_knows_where_it_has_been(car, drive):
     assert expert.outside(hard).mean() < 0.05
     slip = np.abs(gentle.alpha(car.l_f, car.l_r)).max(axis=0)
     np.testing.assert_allclose(model.known_slip, slip, rtol=0.2)
-    relative_sd = model.relative_sd(np.array([0.01, 0.1]))
+    relative_sd = model.band.relative_sd(np.array([0.01, 0.1]))
     assert (relative_sd[0] < 0.15).all()
     assert (relative_sd[1] > 2 * relative_sd[0]).all()
     new = AxleIdentifier.for_vehicle(car).frozen(car, learnt(gentle, car).state_at(0.0))
-    np.testing.assert_allclose(new.relative_sd(np.array([0.01, 0.1])), 1.0)
+    np.testing.assert_allclose(new.band.relative_sd(np.array([0.01, 0.1])), 1.0)
     np.testing.assert_array_equal(new.known_slip, 0.0)
     assert new.outside(gentle)[100:].any(axis=1).mean() > 0.9
     assert 10.0 < model.learning_time.sum(axis=1).min() <= 14.6
@@ -81,7 +81,7 @@ def test_slip_is_known_up_to_where_a_quarter_of_the_doubt_is_left(car):
     seen = np.array([[0.2], [0.1]]) * np.eye(1, 9)
     for share, known in ((0.24, [0.2, 0.1]), (0.26, [0.0, 0.0]), (0.35, [0.0, 0.0])):
         model = replace(new, excitation=seen, covariance=share**2 * new.prior_covariance)
-        np.testing.assert_allclose(model.relative_sd(np.array([0.05])), share, rtol=1e-9)
+        np.testing.assert_allclose(model.band.relative_sd(np.array([0.05])), share, rtol=1e-9)
         np.testing.assert_allclose(model.known_slip, known)
     shares = np.array([0.3, 0.2])[:, None, None]
     uneven = replace(new, excitation=seen, covariance=shares**2 * new.prior_covariance)

@@ -174,14 +174,14 @@ def _slip_rate(model):
 
 def test_bands_hold_at_every_speed(run, drive):
     model, other = calibrated(run), race(phase=2.0)
-    half = model.half_band_over(other)
+    half = model.band.over(other)
     inside = np.abs(model.axle_force(other) - other.axle_force) <= half
     fast = other.v_x > 45.0
     assert (inside[fast].mean(axis=0) > 0.85).all() and (inside[~fast].mean(axis=0) > 0.85).all()
     # The factors of a band are of ranges of speed: those of one range are compared.
-    wide = model.half_band(SLIPS, v_x=60.0) / model.half_band(SLIPS, v_x=45.0)
+    wide = model.band.half(SLIPS, v_x=60.0) / model.band.half(SLIPS, v_x=45.0)
     assert (wide > 1.05).all() and (wide < 1.8).all()
-    told = model.slope_over(other) / model.slope_at(model.lagged_slip(other))
+    told = model.band.slope_over(other) / model.slope_at(model.lagged_slip(other))
     np.testing.assert_allclose(told, pressed(other.v_x), rtol=1e-12)
 
 

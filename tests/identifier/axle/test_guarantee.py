@@ -243,7 +243,7 @@ def test_what_has_no_set_of_weights_has_no_guarantee(run):
 def test_a_guarantee_is_of_the_car_and_the_road_that_taught_it(model):
     heavier = replace(sedan(), mass=1.2 * sedan().mass)
     assert model.mounted_on(heavier).guaranteed_band(0.1) is None
-    assert model.on_another_road().guaranteed_band(0.1) is None
+    assert model.band.on_another_road().guaranteed_band(0.1) is None
 
 
 def test_without_a_measured_v_y_nothing_is_guaranteed(run):

@@ -367,7 +367,7 @@ def test_what_is_learnt_does_not_depend_on_the_rate(car, drive):
     }
     models = [identify(one, car, designs[one.dt]).freeze(15.0) for one in (slow, fast)]
     slips = np.array([0.01, 0.03, 0.05])
-    sds = [model.relative_sd(slips) for model in models]
+    sds = [model.band.relative_sd(slips) for model in models]
     np.testing.assert_allclose(sds[0], sds[1], rtol=0.15)
     curves = [model.force_at(slips) for model in models]
     np.testing.assert_allclose(curves[0], curves[1], rtol=0.03)

@@ -110,8 +110,8 @@ def test_the_axle_identifier_goes_on_from_a_fit_with_its_doubt(fitted):
     np.testing.assert_allclose(begun.W, units.W)
     np.testing.assert_allclose(begun.own, units.own)
     slips = np.array([0.02, 0.1])
-    assert (begun.relative_sd(slips) < 0.5 * design.frozen(CAR, design.setup(CAR).carry)
-            .relative_sd(slips)).all()  # fmt: skip
+    assert (begun.band.relative_sd(slips) < 0.5 * design.frozen(CAR, design.setup(CAR).carry)
+            .band.relative_sd(slips)).all()  # fmt: skip
 
 
 def test_going_on_from_a_fit_begins_with_its_forces(fitted, drive):
@@ -168,7 +168,7 @@ def test_a_network_file_tells_curves_and_band_of_a_fit(fitted):
     out = session.run(None, {"alpha_f": alpha[:, None], "alpha_r": alpha[:, None]})
     loads = np.array(CAR.axle_loads)
     assert (np.abs(np.hstack(out[:2]) - fitted.force_at(alpha)) < 0.01 * loads).all()
-    band = fitted.half_band(alpha, v_x=float(fitted.speeds.mean()))
+    band = fitted.band.half(alpha, v_x=float(fitted.speeds.mean()))
     np.testing.assert_allclose(np.hstack(out[2:]), band, rtol=0.02, atol=0.001 * loads.min())
 
 
@@ -184,7 +184,7 @@ def test_a_tracker_takes_the_errors_of_the_sensors_off():
     )
     np.testing.assert_allclose([float(x) for x in tire.structure.slip(at)], expected)
     slips = DOUBT_STEP * np.arange(26)
-    np.testing.assert_allclose(tire.doubt.T, model.half_band(slips))
+    np.testing.assert_allclose(tire.doubt.T, model.band.half(slips))
 
 
 def test_a_tracker_of_a_fit_lags_and_pushes_as_the_fit_does():

@@ -41,7 +41,7 @@ def test_planted_errors_of_sensors_are_found_within_their_doubt(planted):
 def test_the_curve_predicts_a_drive_that_did_not_teach(learnt):
     other = driven(5)
     assert share_missed(learnt.model, other).max() < 0.08
-    half = learnt.model.half_band_over(other)
+    half = learnt.model.band.over(other)
     held = np.mean(np.abs(learnt.model.axle_force(other) - other.axle_force) <= half, axis=0)
     assert held.min() > 0.8
 
@@ -84,7 +84,9 @@ def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt, monkeypatch):
     monkeypatch.setattr(fitting, "BLOCK", 8.0)
     blocks = fit([driven(3)], sedan()).model
     np.testing.assert_allclose(blocks.force_at(GRID), learnt.model.force_at(GRID), rtol=0.05)
-    np.testing.assert_allclose(blocks.relative_sd(GRID), learnt.model.relative_sd(GRID), rtol=0.7)
+    np.testing.assert_allclose(
+        blocks.band.relative_sd(GRID), learnt.model.band.relative_sd(GRID), rtol=0.7
+    )
 
 
 def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):

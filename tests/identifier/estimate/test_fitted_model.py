@@ -13,14 +13,14 @@ from tests.identifier.estimate.conftest import driven
 
 
 def test_a_saved_model_is_the_same(learnt, tmp_path):
-    model = learnt.model.with_calibration(None, np.array([0.02, 0.03]))
+    model = learnt.model.band.calibrated_by(None, np.array([0.02, 0.03]))
     model.save(tmp_path / "tires.json")
     loaded = load_model(tmp_path / "tires.json")
     assert isinstance(loaded, FittedModel)
     assert loaded.to_dict() == model.to_dict()
     drive = driven(5)
     np.testing.assert_array_equal(loaded.axle_force(drive), model.axle_force(drive))
-    np.testing.assert_array_equal(loaded.half_band_over(drive), model.half_band_over(drive))
+    np.testing.assert_array_equal(loaded.band.over(drive), model.band.over(drive))
 
 
 def without_grip(data):
@@ -106,12 +106,12 @@ def test_braking_takes_of_the_lateral_force_and_shifts_load(learnt):
 def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):
     model = learnt.model
     slip = np.array([0.0005, 0.05])
-    own, other = model.half_band(slip), model.on_another_road().half_band(slip)
+    own, other = model.band.half(slip), model.band.on_another_road().band.half(slip)
     np.testing.assert_allclose(other[0], own[0], rtol=0.05)  # the stiffness stays
     assert (other[1] > 2.0 * own[1]).all()
-    np.testing.assert_array_equal(model.on_another_road().force_at(slip), model.force_at(slip))
+    np.testing.assert_array_equal(model.band.on_another_road().force_at(slip), model.force_at(slip))
     with pytest.raises(ValueError, match="sd_friction"):
-        model.on_another_road(-0.1)
+        model.band.on_another_road(-0.1)
 
 
 def test_on_half_the_friction_its_stiffness_stays(learnt):

@@ -151,7 +151,7 @@ def test_it_freezes_to_the_kind_of_model_that_an_axle_identifier_learns(history,
     again = AxleModel.load(tmp_path / "weights.json")
     np.testing.assert_array_equal(again.W, model.W)
     alpha = np.array([0.01, 0.03, 0.06])
-    assert (model.relative_sd(alpha) < 0.7).all()  # and knows that it learnt
+    assert (model.band.relative_sd(alpha) < 0.7).all()  # and knows that it learnt
 
 
 def test_its_own_bounds_hold_and_its_own_ladder_is_used(banked):

@@ -68,8 +68,8 @@ def test_the_road_that_taught_is_told_as_such(tires, same):
 
 
 def test_a_band_that_nobody_calibrated_tells_no_friction(tires, wetter):
-    unchecked = tires.with_calibration(None)
-    assert tires.band_calibrated and not unchecked.band_calibrated
+    unchecked = tires.band.calibrated_by(None)
+    assert tires.band.calibrated and not unchecked.band.calibrated
     assert "band: calibrated on the drive" in tires.summary()
     assert "not calibrated; run.tire" in unchecked.summary()
     with pytest.raises(ValueError, match=r"friction\(\) wants a calibrated band"):

@@ -82,7 +82,7 @@ def test_a_car_that_weaves_learns_more_and_keeps_within_it():
     begun = ti.identify(log.between(0.0, 2.0), CAR, check=False).freeze()
     runs = [ti.drive(road, CAR, begun, speed=18.0, learning=True, dither=one) for one in (0.0, 0.3)]
     models = [one.learner.supervisor.identifier.model() for one in runs]
-    unsure = [model.relative_sd(np.array([0.03])).max() for model in models]
+    unsure = [model.band.relative_sd(np.array([0.03])).max() for model in models]
     assert unsure[1] < 0.8 * unsure[0]
     off = [np.abs(one.drive.e_y).max() for one in runs]
     assert off[0] < 0.1 < off[1] < 0.3
