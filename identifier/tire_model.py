@@ -354,60 +354,8 @@ class TireModel(ABC):
 
     @property
     def guarantee(self) -> "Guarantee | None":
-        """Weights that the drive left possible; None where nobody asked, or none are of curves."""
+        """Between which forces the true ones lie under a bound; None where nobody asked for it."""
         return None
-
-    def guaranteed_at(self, alpha: Array, rate: Array) -> tuple[Array, Array] | None:
-        """Return `guaranteed_band` of both axles, (k, 2) each [N]; None where none is stated.
-
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,).
-        rate : of the force, static axle loads per second (k,).
-        """
-        del alpha, rate
-        return None
-
-    def guaranteed_force(self, recording: Recording) -> tuple[Array, Array] | None:
-        """Return least and largest axle force over a drive, (n, 2) [N]; None: none is stated."""
-        del recording
-        return None
-
-    @overload
-    def guaranteed_band(
-        self, alpha: float, axle: Axle, rate: float = ...
-    ) -> tuple[float, float] | None: ...
-    @overload
-    def guaranteed_band(
-        self, alpha: ArrayLike, axle: Axle | None = None, rate: ArrayLike = ...
-    ) -> tuple[Array, Array] | None: ...
-
-    def guaranteed_band(
-        self, alpha: ArrayLike, axle: Axle | None = None, rate: ArrayLike = 0.0
-    ) -> tuple[float, float] | tuple[Array, Array] | None:
-        """Return between which forces [N] the true one lies, if the bound of `History.guaranteed`
-        holds: (low, high), each as of `force`.
-
-        None where no guarantee is stated.
-
-        Parameters
-        ----------
-        alpha, axle : as of `force`.
-        rate : how fast the force changes, static axle loads per second, of the shape of `alpha` or
-            one number: a force may be late. 0 is steady.
-        """
-        if axle is not None and axle not in AXLES:
-            raise ValueError(f"axle must be front or rear, it is {axle!r}")
-        slip = np.asarray(alpha, dtype=np.float64)
-        rates = np.broadcast_to(np.asarray(rate, dtype=np.float64), slip.shape)
-        found = self.guaranteed_at(slip.ravel(), rates.ravel())
-        if found is None:
-            return None
-        low, high = (side.reshape(*slip.shape, 2) for side in found)
-        if axle is None:
-            return low, high
-        low, high = (side[..., AXLES.index(axle)] for side in (low, high))
-        return (float(low), float(high)) if slip.ndim == 0 else (low, high)
 
     def estimates(self) -> tuple[Estimate, ...]:
         """Return what a verdict tells of each axle: stiffness, without a doubt that is known."""

@@ -18,16 +18,18 @@ SciPy is imported where a band is asked for: that takes longer than to learn fro
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
 from identifier.axle.learning import Bounds
+from identifier.band import Axle, ends, of_axle
+from models.recordings import Recording
 
 MEMORY = 0.3  # s: of the rate, and of slip that was beyond
 SECANTS = tuple(0.004 * 2.0**k for k in np.arange(0.0, 7.5, 0.5))  # rad, where a curve bends down
@@ -259,8 +261,8 @@ def possible_weights(strips: Strips, axle: int, bound: ForceBound, box: HalfSpac
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Guarantee:
-    """What a drive leaves possible of both axles, under a bound of the errors.
+class PossibleWeights:
+    """What a drive leaves possible of the curves of both axles, under a bound of the errors.
 
     Parameters
     ----------
@@ -338,7 +340,7 @@ class Guarantee:
         return outside
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the guarantee as plain numbers, ready for JSON."""
+        """Return them as plain numbers, ready for JSON."""
         return {
             "error_static_axle_loads": list(self.bound.error),
             "lateness_s": list(self.bound.lateness),
@@ -350,7 +352,12 @@ class Guarantee:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], n: int) -> Self:
-        """Return the guarantee that `to_dict` describes."""
+        """Return those that `to_dict` describes.
+
+        Parameters
+        ----------
+        n : weights of each.
+        """
         pairs = []
         for name in (*PAIRS, "corners"):
             if not isinstance(data[name], list) or len(data[name]) != 2:
@@ -374,6 +381,56 @@ class Guarantee:
             speed=float(data["speed_m_s"]),
             fastest=(float(fastest[0]), float(fastest[1])),
         )
+
+
+class Guarantee(NamedTuple):
+    """Between which forces the true ones lie, if the bound holds of which weights are possible.
+
+    possible : weights that the drive left.   ladder : slip scales of the units [rad].   driven :
+    largest slip of the drive [rad] (2,).   loads : of the axles, static [N] (2,).   min_speed :
+    below which forces read zero [m/s].   signals : over a drive units times load and cos δ (n, 2,
+    ladder), and what opens the band.
+    """
+
+    possible: PossibleWeights
+    ladder: tuple[float, ...]
+    driven: Array
+    loads: Array
+    min_speed: float
+    signals: Callable[[Recording], tuple[Array, Doubt]]
+
+    @overload
+    def at(self, alpha: float, axle: Axle, rate: float = ...) -> tuple[float, float]: ...
+    @overload
+    def at(
+        self, alpha: ArrayLike, axle: Axle | None = None, rate: ArrayLike = ...
+    ) -> tuple[Array, Array]: ...
+
+    def at(
+        self, alpha: ArrayLike, axle: Axle | None = None, rate: ArrayLike = 0.0
+    ) -> tuple[float, float] | tuple[Array, Array]:
+        """Return least and largest steady force under static loads [N], each as of `force`.
+
+        Parameters
+        ----------
+        alpha, axle : as of `TireModel.force`.
+        rate : how fast the force changes, static axle loads per second, of the shape of `alpha` or
+            one number: a force may be late. 0 is steady.
+        """
+        slip = np.asarray(alpha, dtype=np.float64)
+        rates = np.tile(np.broadcast_to(np.abs(rate), slip.shape).ravel(), (2, 1)).T
+        units = np.tile(unit_matrix(slip.ravel(), self.ladder)[:, None], (1, 2, 1))
+        beyond = beyond_driven(slip.reshape(-1, 1), self.driven) + self.possible.too_fast(rates)
+        sides = self.possible.limits(units, Doubt(beyond, rates, np.zeros_like(rates)))
+        low, high = (of_axle((side * self.loads).reshape(*slip.shape, 2), axle) for side in sides)
+        return ends(low, high)
+
+    def over(self, recording: Recording) -> tuple[Array, Array]:
+        """Return least and largest force over a drive, (n, 2) [N]; NaN below the lowest speed."""
+        low, high = self.possible.limits(*self.signals(recording))
+        stands = recording.v_x < self.min_speed
+        low[stands], high[stands] = np.nan, np.nan
+        return low * self.loads, high * self.loads
 
 
 def _extremes(rows: Array, corners: Array) -> tuple[Array, Array]:

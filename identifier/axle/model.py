@@ -27,8 +27,8 @@ from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.guarantee import (
     Doubt,
     Guarantee,
+    PossibleWeights,
     along_acceleration,
-    beyond_driven,
     force_rate,
     grip_lost,
     slip_beyond,
@@ -82,7 +82,7 @@ class AxleModel(TireModel):
     sensors : errors that were known before it learnt, and stay.
     calibration : of the band, by segments that did not teach it; None where nobody calibrated.
     tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
-    guarantee : weights that the drive left possible; None where nobody asked.
+    possible : weights that the drive left; None where nobody asked for a guarantee.
     force_missed : share of the measured force that it misses of the drive that taught, rms, (2,);
         None where nobody looked.
 
@@ -106,7 +106,7 @@ class AxleModel(TireModel):
     sensors: Sensors = EXACT
     calibration: BandCalibration | None = None
     tells_v_y: bool = False
-    guarantee: Guarantee | None = None
+    possible: PossibleWeights | None = None
     force_missed: Array | None = None
 
     def __post_init__(self) -> None:
@@ -208,31 +208,13 @@ class AxleModel(TireModel):
         """Calibration of the band; where there is none, of the declared errors."""
         return self.calibration or BandCalibration.declared(self.reference_speed)
 
-    def guaranteed_at(self, alpha: Array, rate: Array) -> tuple[Array, Array] | None:
-        """Return least and largest steady force at slip angles under static loads, (k, 2) [N].
-
-        None: none is stated.
-        """
-        if self.guarantee is None:
+    @property
+    def guarantee(self) -> Guarantee | None:
+        """Between which forces the true ones lie, if the bound holds; None where nobody asked."""
+        if self.possible is None:
             return None
-        units = np.repeat(unit_matrix(alpha, self.ladder)[:, None], 2, axis=1)
-        beyond = beyond_driven(alpha[:, None], self.driven_slip)
-        rates = np.repeat(np.abs(rate)[:, None], 2, axis=1)
-        beyond = beyond + self.guarantee.too_fast(rates)
-        low, high = self.guarantee.limits(units, Doubt(beyond, rates, np.zeros_like(rates)))
-        return low * self._loads, high * self._loads
-
-    def guaranteed_force(self, recording: Recording) -> tuple[Array, Array] | None:
-        """Return least and largest axle force over a drive, (n, 2) [N], as `axle_force`.
-
-        NaN below the lowest speed; None where no guarantee is stated.
-        """
-        if self.guarantee is None:
-            return None
-        low, high = self.guarantee.limits(*self.signals_of(recording))
-        stands = recording.v_x < self.min_speed
-        low[stands], high[stands] = np.nan, np.nan
-        return low * self._loads, high * self._loads
+        at = (self.ladder, self.driven_slip, self._loads, self.min_speed)
+        return Guarantee(self.possible, *at, self.signals_of)
 
     def signals_of(self, recording: Recording) -> tuple[Array, Doubt]:
         """Return units times load and cos δ over a drive, (n, 2, ladder), and what opens a band.
@@ -246,13 +228,13 @@ class AxleModel(TireModel):
         pressed = self.vehicle.load_ratio(recording.v_x)
         T *= pressed[..., None]
         beyond = slip_beyond(slip, self.driven_slip, dt, segments)
-        if self.guarantee is None:
+        if self.possible is None:
             rate = force_rate(T, (self.W[:1], self.W[1:]), dt, segments)
         else:
-            rate = force_rate(T, self.guarantee.corners, dt, segments)
+            rate = force_rate(T, self.possible.corners, dt, segments)
             v_x = np.maximum(recording.v_x, self.min_speed)
-            rate *= np.maximum(self.guarantee.speed / v_x, 1.0)[:, None]
-            beyond += self.guarantee.too_fast(rate)
+            rate *= np.maximum(self.possible.speed / v_x, 1.0)[:, None]
+            beyond += self.possible.too_fast(rate)
         v_y = 0.0 if recording.v_y is None else recording.v_y
         along = along_acceleration(recording.v_x, v_y * recording.r, dt, segments)
         carried = (unit_matrix(self.driven_slip, self.ladder) * self.W).sum(axis=1) * pressed
@@ -335,7 +317,7 @@ class AxleModel(TireModel):
     def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
         # Both were shown of this car alone.
-        return replace(self, vehicle=vehicle, guarantee=None, force_missed=None)
+        return replace(self, vehicle=vehicle, possible=None, force_missed=None)
 
     def beside_v_y(self) -> "AxleModel":
         """Return the model as one that the axle identifier goes on learning, which is given v_y."""
@@ -355,7 +337,7 @@ class AxleModel(TireModel):
             covariance=self.covariance * np.outer(unit, unit),
             prior_covariance=self.prior_covariance * np.outer(unit, unit),
             excitation=excitation,
-            guarantee=None,  # of the road that taught, as is what is missed
+            possible=None,  # of the road that taught, as is what is missed
             force_missed=None,
         )
 
@@ -459,7 +441,7 @@ class AxleModel(TireModel):
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
             **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
-            **({} if self.guarantee is None else {"guarantee": self.guarantee.to_dict()}),
+            **({} if self.possible is None else {"guarantee": self.possible.to_dict()}),
             **({"sensors": self.sensors._asdict()} if any(self.sensors) else {}),
             **({"tells_v_y": True} if self.tells_v_y else {}),
             **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
@@ -480,8 +462,8 @@ class AxleModel(TireModel):
                 **{name: np.array(data[name], dtype=np.float64) for name in ARRAYS},
                 sensors=Sensors(**data.get("sensors", {})),
                 calibration=BandCalibration.from_dict(data["band"]) if "band" in data else None,
-                guarantee=(
-                    Guarantee.from_dict(data["guarantee"], len(data["ladder"]))
+                possible=(
+                    PossibleWeights.from_dict(data["guarantee"], len(data["ladder"]))
                     if "guarantee" in data
                     else None
                 ),
@@ -587,7 +569,7 @@ class AxleBand(Band[AxleModel]):
         change = require_friction_sd(sd_friction) * model.W @ friction_direction(model.ladder).T
         wider = model.covariance.copy()
         wider[:, :n, :n] += change[:, :, None] * change[:, None, :]
-        return replace(model, covariance=wider, guarantee=None)
+        return replace(model, covariance=wider, possible=None)
 
     def samples(self, n: int, rng: np.random.Generator) -> tuple[AxleModel, ...]:
         """Return models drawn from what learning left open, and from the errors of a model."""

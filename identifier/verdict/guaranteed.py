@@ -18,8 +18,8 @@ from codegen.arrays import Array
 from codegen.errors import TireidError
 from identifier.axle.guarantee import (
     ForceBound,
-    Guarantee,
     HalfSpaces,
+    PossibleWeights,
     Strips,
     least_bound,
     possible_weights,
@@ -119,14 +119,14 @@ def guaranteed(
         if found is None:
             raise _violated(strips, axle, chosen, box)
         corners.append(found)
-    guarantee = Guarantee(
+    possible = PossibleWeights(
         bound=chosen,
         given=given is not None,
         corners=(corners[0], corners[1]),
         speed=float(strips.v_x.mean()),
         fastest=fastest(strips),
     )
-    return replace(carries, guarantee=guarantee)
+    return replace(carries, possible=possible)
 
 
 def fastest(strips: Strips) -> tuple[float, float]:
@@ -176,4 +176,4 @@ def contradictions(
     strips = strips_of(model, recording, road)
     if strips is None:
         return None
-    return strips.t, model.guarantee.contradicted(strips)
+    return strips.t, model.guarantee.possible.contradicted(strips)

@@ -105,7 +105,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
         low, high = (force[:, axle] / newtons for force in model.band.at(slip))
         axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=BAND, **edge)
     look: Mapping[str, Any] = {"color": style.PURPLE, "linewidth": 0.9, "linestyle": "--"}
-    for side in model.guaranteed_band(slip) or ():
+    for side in () if model.guarantee is None else model.guarantee.at(slip):
         axes.plot(degrees, side[:, axle] / newtons, label=_GUARANTEED, **look)
     label = f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}"
     look = {"color": style.BLUE, "linewidth": 1.2, "zorder": 4, "label": label}

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from identifier.axle.guarantee import Guarantee
 from identifier.doctor import Diagnosis
 from identifier.measured import with_doubt
 from identifier.reproducibility import (
@@ -240,12 +239,12 @@ def band_sentence(model: TireModel) -> str:
 
 def guaranteed_sentence(model: TireModel) -> str:
     """Return which forces are guaranteed where slip is known, in words; empty where none are."""
-    known, given = model.known_slip, getattr(model, "guarantee", None)
-    limits = None if known is None else model.guaranteed_band(known)
-    if known is None or not isinstance(given, Guarantee) or limits is None:
+    known, guarantee = model.known_slip, model.guarantee
+    if known is None or guarantee is None:
         return ""
-    low, high = (np.diag(side) / model.vehicle.axle_loads for side in limits)
+    low, high = (np.diag(side) / model.vehicle.axle_loads for side in guarantee.at(known))
     ends = [f"{least:.2f} to {most:.2f}" for least, most in zip(low, high, strict=True)]
+    given = guarantee.possible
     front, rear = given.bound.error
     late_front, late_rear = (1e3 * tau for tau in given.bound.lateness)
     fast_front, fast_rear = given.fastest

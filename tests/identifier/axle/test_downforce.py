@@ -187,14 +187,14 @@ def test_bands_hold_at_every_speed(run, drive):
 
 def test_a_guarantee_holds_and_a_car_that_was_told_without_contradicts_itself(run, drive):
     model, other = guaranteed(run), race(phase=2.0)
-    low, high = model.guaranteed_force(other)
+    low, high = model.guarantee.over(other)
     driven = np.isfinite(low).all(axis=1)
     assert (low[driven] <= other.axle_force[driven]).all()
     assert (other.axle_force[driven] <= high[driven]).all()
     _, against = contradictions(model, other)
     assert not against.any()
     untold = guaranteed(learnt(drive, UNTOLD))
-    assert untold.guarantee.bound.error[0] > 2.0 * model.guarantee.bound.error[0]
+    assert untold.guarantee.possible.bound.error[0] > 2.0 * model.guarantee.possible.bound.error[0]
 
 
 def test_what_is_proven_along_a_drive_is_proven_of_the_car_that_drove(run):
