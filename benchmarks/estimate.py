@@ -313,7 +313,7 @@ def judge_place(
     print(f"{place}: {len(tasks)} drives teach; mean, median and worst [% of rms force]")
     means: dict[str, float] = {}
     for name in names:
-        if not make_method(name, tasks[0].car).needs_v_y:
+        if "v_y" not in make_method(name, tasks[0].car).needs:
             continue  # it tells v_y: `without_v_y`
         try:
             errors = [error for one in tasks for error in errors_of(one, name)]

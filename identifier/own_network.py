@@ -25,7 +25,7 @@ from identifier.frozen import (
     vehicle_from,
     vehicle_numbers,
 )
-from identifier.method import Method
+from identifier.method import Method, require_fresh
 from identifier.paper.network import SIGNALS, network_signals
 from identifier.setup import Setup
 from identifier.tire_model import StaticModel, TireModel
@@ -351,8 +351,7 @@ class FrozenMethod(Method):
         start : None; there is nothing that a stored model could begin.
         """
         del vehicle
-        if start is not None:
-            raise ValueError("a frozen model learns nothing, it cannot begin with a stored one")
+        require_fresh(start)
         return self.model.setup(self.dt)
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> OnnxModel:

@@ -229,10 +229,6 @@ class TireModel(ABC):
         """
         raise ValueError(f"a {type(self).__name__} cannot be scaled to a friction of {ratio:g}")
 
-    def beside_v_y(self) -> "TireModel":
-        """Return the model as the beginning of a method with a given lateral velocity."""
-        return self
-
     def in_units(self, ladder: tuple[float, ...] | None = None) -> "TireModel":
         """Return the model in the hidden units of the axle identifier where it projects on them.
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -19,7 +20,7 @@ from identifier.axle.certificate import certified
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.gate import GateState, Plausibility
-from identifier.axle.guarantee import HalfSpaces, prior_box
+from identifier.axle.guarantee import prior_box
 from identifier.axle.learning import (
     BoundNumbers,
     Bounds,
@@ -35,7 +36,15 @@ from identifier.axle.slip import SHORTEST, SensitivityState, Sensors, Sway, Sway
 from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
-from identifier.method import OTHER_STRUCTURE, Method, Run, Track, resumed
+from identifier.method import (
+    OTHER_STRUCTURE,
+    Accelerometer,
+    Limits,
+    Method,
+    Run,
+    Track,
+    resumed,
+)
 from identifier.setup import Port, Setup
 from identifier.tire_model import AXLES, Reached, TireModel, brisk_speed
 from models.vehicle import Vehicle
@@ -118,33 +127,33 @@ class AxleIdentifier(Method):
         ----------
         driving : friction and speed of the drop that is followed; None takes `natural_driving`.
         """
-        b, rising = self.bounds, self.rising_until
         return Certificate(
             properties=certified(self, vehicle, driving or natural_driving(vehicle)),
-            limits={
-                "grip_static_axle_loads": [b.least_grip, b.most_grip],
-                "weight_static_axle_loads": [-b.weight, b.weight],
-                **({} if rising is None else {"force_curves_rise_at_slip_rad": rising}),
-                **(
-                    {"stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness]}
-                    if rising == 0.0
-                    else {}
-                ),
-                "compliance_m": [0.0, b.compliance],
-                "sway_share": [0.0, 1.0],
-                "steering_offset_rad": [-b.steering, b.steering],
-                "v_y_offset_m_s": [-b.v_y, b.v_y],
-                "covariance_over_prior": [0.0, self.regression.widest],
-            },
+            limits=self.limits.boxes,
         )
 
     def certify_along(self, history: Run) -> Certificate:
         """Return what is proven of the curves that a run of it taught."""
         return Certificate(properties=certified_along(self, history))
 
-    def possible_tires(self) -> HalfSpaces:
-        """Return the weights that the curve of a tire can have, within the bounds."""
-        return prior_box(self.bounds, self.ladder)
+    @property
+    def accelerometer(self) -> Accelerometer:
+        """What a_y tells of a road that is not level."""
+        return Accelerometer(self._road_push)
+
+    @property
+    def limits(self) -> Limits:
+        """Where its estimates stay after every sample."""
+        b, rising = self.bounds, self.rising_until
+        boxes = curve_boxes(b, stiffness=rising == 0.0)
+        if rising is not None:
+            boxes["force_curves_rise_at_slip_rad"] = rising
+        boxes |= {
+            "sway_share": [0.0, 1.0],
+            "v_y_offset_m_s": [-b.v_y, b.v_y],
+            "covariance_over_prior": [0.0, self.regression.widest],
+        }
+        return Limits(boxes, prior_box(b, self.ladder), self._at_bounds)
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -169,7 +178,12 @@ class AxleIdentifier(Method):
         excitation, sensors = np.zeros((2, 1 + len(EDGES))), Sensors()
         if start is not None:
             stored = self._resumed(start)
-            W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
+            W, own, P, excitation = (
+                stored.W,
+                stored.beside_curve,
+                stored.covariance,
+                stored.excitation,
+            )
             sensors = stored.sensors
             if stored is not start:  # of another form: units can be what no curve of it could
                 P = _within_prior(P, prior_P, n)
@@ -279,24 +293,10 @@ class AxleIdentifier(Method):
         ----------
         state : W (k, 2, n) and own (k, 2, 3) at each of k instants.
         """
-        W, compliance = state["W"], state["own"][:, :, 0]
-        slope = (W / np.array(self.ladder)).sum(axis=2)
-        lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
-        return (
-            Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
-            Track("relaxation length", "m", lag),
-            Track("force at saturation", "static load", W.sum(axis=2)),
-        )
+        return curve_tracks(vehicle, self.ladder, state["W"], state["own"][:, :, 0])
 
-    def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
-        """Return stiffness, grip, lag and offsets that rest at their bounds, to a hundredth.
-
-        Parameters
-        ----------
-        vehicle : not looked at: the bounds are in static axle loads.
-        state : W (2, n) and own (2, 3).
-        """
-        del vehicle
+    def _at_bounds(self, state: Mapping[str, Array]) -> tuple[Reached, ...]:
+        """Return stiffness, grip, lag and offsets that rest at their bounds, to a hundredth."""
         b, W, own = self.bounds, state["W"], state["own"]
         grip, slope = W.sum(axis=1), (W / np.array(self.ladder)).sum(axis=1)
         elsewhere = "a sensor has a larger offset, or another place than declared"
@@ -321,13 +321,8 @@ class AxleIdentifier(Method):
             ]  # fmt: skip
         return tuple(one for rests, one in listed if rests)
 
-    def beside_force(self, state: Mapping[str, Array]) -> Array | None:
-        """Return what a banked road pushed to the left by the accelerometer, (n,) [weights].
-
-        Parameters
-        ----------
-        state : bank (n + 1, 4), of a run.
-        """
+    def _road_push(self, state: Mapping[str, Array]) -> Array:
+        """Return what a banked road pushed to the left, (n,) [car weights]."""
         offsets_alone = UNPROVEN * self.regression.sure * self.regression.error
         before = np.asarray(state["bank"]).reshape(-1, len(SlopeState._fields))[:-1].T
         push = road_push(self.road.at(self.dt), SlopeState(*map(ca.DM, before)), offsets_alone)
@@ -340,18 +335,52 @@ class AxleIdentifier(Method):
         ----------
         state : W (2, n), own (2, 3), UD (2, q (q + 1)/2) and excitation (2, 9).
         """
+        compliance, share, offset = state["own"].T.copy()
         return AxleModel(
             vehicle=vehicle,
             ladder=self.ladder,
             sway=self.sway,
             plausibility=self.plausibility,
             W=state["W"].copy(),
-            own=state["own"].copy(),
+            compliance=compliance,
+            sway_share=share,
+            offset=offset,
             covariance=unpacked(state["UD"], len(self.ladder) + 3),
             prior_covariance=self.prior.covariance(vehicle, self.ladder),
             excitation=state["excitation"].copy(),
             sensors=Sensors(*map(float, np.ravel(state["sensors"]))),
         )
+
+
+def curve_boxes(b: Bounds, *, stiffness: bool) -> dict[str, Any]:
+    """Return least and largest of what curve, lag and steering have, by name and unit."""
+    bounded_slope = {"stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness]}
+    return {
+        "grip_static_axle_loads": [b.least_grip, b.most_grip],
+        "weight_static_axle_loads": [-b.weight, b.weight],
+        **(bounded_slope if stiffness else {}),
+        "compliance_m": [0.0, b.compliance],
+        "steering_offset_rad": [-b.steering, b.steering],
+    }
+
+
+def curve_tracks(
+    vehicle: Vehicle, ladder: tuple[float, ...], W: Array, compliance: Array
+) -> tuple[Track, ...]:
+    """Return cornering stiffness, relaxation length, and the force that curves saturate at.
+
+    Parameters
+    ----------
+    W : weights at each of k instants [static axle loads], (k, 2, n).
+    compliance : [m per load], (k, 2).
+    """
+    slope = (W / np.array(ladder)).sum(axis=2)
+    lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
+    return (
+        Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
+        Track("relaxation length", "m", lag),
+        Track("force at saturation", "static load", W.sum(axis=2)),
+    )
 
 
 def _within_prior(P: Array, prior: Array, n: int) -> Array:

@@ -53,7 +53,8 @@ from models.rules import require_positive
 from models.schema import Table
 from models.vehicle import DOWNFORCE_SPEED, Vehicle
 
-ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")
+BESIDE = ("compliance", "sway_share", "offset")  # the curve
+ARRAYS = ("W", *BESIDE, "covariance", "prior_covariance", "excitation")
 LARGEST = 1e9  # of the numbers in a file, SI and static axle loads
 LARGEST_WEIGHT = 100.0  # static axle loads: no unit of a tire carries more
 ROUNDING = 1e-6  # of correlations, as learning in float leaves them
@@ -75,8 +76,10 @@ class AxleModel(TireModel):
     ----------
     ladder : slip scales α_j of the units [rad].
     W : weights [static axle loads], (2, n).
-    own : [compliance [m per load], sway share [-], offset ([rad] front, [m/s] rear)], (2, 3).
-    covariance : of [W, own], (2, n + 3, n + 3).
+    compliance : deflection of the carcass [m per static axle load], (2,).
+    sway_share : of the sway of the body that the axle follows [-], (2,).
+    offset : zero of the steering in front [rad], bias of v_y at the rear [m/s], (2,).
+    covariance : of [W, compliance, sway_share, offset], (2, n + 3, n + 3).
     prior_covariance : `covariance` before the first sample.
     excitation : largest slip [rad], then time of learning above each of `EDGES` [s], (2, 9).
     sensors : errors that were known before it learnt, and stay.
@@ -99,7 +102,9 @@ class AxleModel(TireModel):
     sway: Sway
     plausibility: Plausibility
     W: Array
-    own: Array
+    compliance: Array
+    sway_share: Array
+    offset: Array
     covariance: Array
     prior_covariance: Array
     excitation: Array
@@ -114,7 +119,7 @@ class AxleModel(TireModel):
         n = len(self.ladder)
         for name, shape in (
             ("W", (2, n)),
-            ("own", (2, 3)),
+            *((name, (2,)) for name in BESIDE),
             ("covariance", (2, n + 3, n + 3)),
             ("prior_covariance", (2, n + 3, n + 3)),
             ("excitation", (2, 1 + len(EDGES))),
@@ -142,10 +147,10 @@ class AxleModel(TireModel):
         """Refuse a lag, a share or an offset that no car has."""
         car, at_most = self.vehicle, self.plausibility
         for name, value, low, high in (
-            ("compliance [m]", self.own[:, 0], 0.0, car.wheelbase),
-            ("sway share", self.own[:, 1], 0.0, 1.0),
-            ("steering offset [rad]", self.own[0, 2], -at_most.max_steering, at_most.max_steering),
-            ("bias of v_y [m/s]", self.own[1, 2], -at_most.slow, at_most.slow),
+            ("compliance [m]", self.compliance, 0.0, car.wheelbase),
+            ("sway share", self.sway_share, 0.0, 1.0),
+            ("steering offset [rad]", self.offset[0], -at_most.max_steering, at_most.max_steering),
+            ("bias of v_y [m/s]", self.offset[1], -at_most.slow, at_most.slow),
         ):
             if not (np.less_equal(low, value).all() and np.less_equal(value, high).all()):
                 raise ValueError(f"{name} must be within {low:g} and {high:g}, it is {value}")
@@ -165,7 +170,12 @@ class AxleModel(TireModel):
     def relaxation_length(self) -> Array:
         """Lag of slip at small slip, under static loads [m], (2,); it goes with the slope."""
         slope: Array = (self.W / np.array(self.ladder)).sum(axis=1)
-        return self.own[:, 0] * np.maximum(slope, 0.0) + SHORTEST * self.vehicle.wheelbase
+        return self.compliance * np.maximum(slope, 0.0) + SHORTEST * self.vehicle.wheelbase
+
+    @property
+    def beside_curve(self) -> Array:
+        """[compliance, sway share, offset] of the axles, as steps carry them, (2, 3)."""
+        return np.column_stack([self.compliance, self.sway_share, self.offset])
 
     @property
     def _loads(self) -> Array:
@@ -277,7 +287,7 @@ class AxleModel(TireModel):
                 (GRIP, level, self.W[i].sum(), 1.0, "static load", None, bends[i]),
                 (RELAXATION, lag, self.relaxation_length[i], max(slope[i], 0.0), "m",
                  None, True),
-                (name, zero, scale * self.own[i, 2], scale, unit, 0.0, True),
+                (name, zero, scale * self.offset[i], scale, unit, 0.0, True),
             )  # fmt: skip
             for title, along, value, per, its_unit, before, seen in rows:
                 now, prior = (
@@ -318,10 +328,6 @@ class AxleModel(TireModel):
         """Return the tires on another car, their forces scaled by its static axle loads."""
         # Both were shown of this car alone.
         return replace(self, vehicle=vehicle, possible=None, force_missed=None)
-
-    def beside_v_y(self) -> "AxleModel":
-        """Return the model as one that the axle identifier goes on learning, which is given v_y."""
-        return replace(self, tells_v_y=False)
 
     def at_friction(self, ratio: float) -> "AxleModel":
         """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays."""
@@ -370,8 +376,8 @@ class AxleModel(TireModel):
         return lagged_force(
             Car(*car_numbers(self.vehicle).T),
             curve_at_speed(slip, v_x, self.W, self.ladder, self.vehicle),
-            series_compliance(self.own, self.sway.frequency),
-            self.own[:, 2],
+            series_compliance(self.compliance, self.sway_share, self.sway.frequency),
+            self.offset,
             slip=slip,
             x=[v_y, x[1]],
             delta=self.sensors.steering(delta),
@@ -407,7 +413,7 @@ class AxleModel(TireModel):
             },
             constants={
                 "W": self.W,
-                "own": self.own,
+                "own": self.beside_curve,
                 "dt": np.array(dt),
                 "car": car_numbers(self.vehicle),
                 "scales": 1.0 / np.array(self.ladder)[None],
@@ -427,7 +433,9 @@ class AxleModel(TireModel):
             "units": {
                 "ladder": "rad",
                 "W": "static axle loads",
-                "own": "m per static axle load, -, rad (front) or m/s (rear)",
+                "compliance": "m per static axle load",
+                "sway_share": "-",
+                "offset": "rad (front), m/s (rear)",
                 "excitation": "rad, then s above the edges",
                 "edges": "rad",
             },
@@ -450,6 +458,9 @@ class AxleModel(TireModel):
     @classmethod
     def from_dict(cls, data: dict[str, Any], source: str) -> "AxleModel":
         """Return the model that `to_dict` describes."""
+        if "own" in data:  # files of earlier versions: the three in one
+            own = Table(data, f"{source}: ", FrozenModelError).array("own").T.tolist()
+            data = {**dict(zip(BESIDE, own, strict=False)), **data}
         _require_plausible(data, source)
         try:
             if list(data["edges"]) != list(EDGES):
@@ -553,7 +564,7 @@ class AxleBand(Band[AxleModel]):
         pressed = car.load_ratio(v_x[:, 0])
         slope = model.slope_at(slip) * pressed
         slopes = np.maximum(slope, 0.02 * model.slope_at(np.zeros((1, 2))) * pressed)
-        e = np.exp(-v_x * dt / (model.own[:, 0] * slopes + SHORTEST * car.wheelbase))
+        e = np.exp(-v_x * dt / (model.compliance * slopes + SHORTEST * car.wheelbase))
         passed: Array = slope * np.hypot(sideways, steering) * np.sqrt((1.0 - e) / (1.0 + e))
         return passed
 
@@ -604,8 +615,9 @@ class AxleBand(Band[AxleModel]):
         zeros = np.array([at_most.max_steering, at_most.slow])
         low = np.column_stack([np.zeros((2, 2)), -zeros])
         high = np.column_stack([np.full(2, model.vehicle.wheelbase), np.ones(2), zeros])
-        own = np.clip(model.own + away[:, n:], low, high)
-        return replace(model, W=W, own=own, force_missed=None)
+        compliance, share, offset = np.clip(model.beside_curve + away[:, n:], low, high).T
+        changed = replace(model, W=W, compliance=compliance, sway_share=share, offset=offset)
+        return replace(changed, force_missed=None)
 
 
 def _require_plausible(data: dict[str, Any], source: str) -> None:

@@ -147,7 +147,9 @@ def cross_replay(
     estimated: dict[str, SideSlip] = {}
     for recording in course.recordings:
         history = identify(
-            recording if method.needs_v_y else replace(recording, v_y=None), course.vehicle, method
+            recording if "v_y" in method.needs else replace(recording, v_y=None),
+            course.vehicle,
+            method,
         )
         end = float(recording.t[-1])
         if seen is not None:

@@ -60,14 +60,9 @@ class FitMethod(Method):
         return PORTS
 
     @property
-    def tells_v_y(self) -> bool:
-        """Whether it estimates the lateral velocity of a log without one: of a whole log."""
-        return True
-
-    @property
-    def whole(self) -> bool:
-        """Whether it learns from a whole log at once."""
-        return True
+    def whole(self) -> "FitMethod":
+        """How it learns from a whole log at once."""
+        return self
 
     def reads(self, recording: Recording, vehicle: Vehicle) -> Recording:
         """Return a log whose v_y is on time, also where it was rare or noisy (`estimate.poor`)."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array, blocks, large
-from identifier.axle.curve import EDGES, LADDER, unit_matrix
+from identifier.axle.curve import EDGES, unit_matrix
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST, Sensors, Sway
@@ -536,10 +536,6 @@ class FittedModel(TireModel):
         information[where] = np.linalg.inv(sure[where])
         return replace(usual, mean=self.p, information=information, typed=())
 
-    def beside_v_y(self) -> AxleModel:
-        """Return the model as the axle identifier goes on learning from it."""
-        return self.in_units(LADDER)
-
     def in_units(self, ladder: tuple[float, ...] | None = None) -> AxleModel:
         """Return the tires in the hidden units of the axle identifier.
 
@@ -559,14 +555,7 @@ class FittedModel(TireModel):
             ]
         )
         limits = Plausibility.for_vehicle(self.vehicle)
-        own = np.array(
-            [
-                [self["compliance_f"], self["sway_share_f"], self["steering_zero"]],
-                [self["compliance_r"], self["sway_share_r"], self["v_y_bias"]],
-            ]
-        )
-        own[0, 2] = np.clip(own[0, 2], -limits.max_steering, limits.max_steering)
-        own[1, 2] = np.clip(own[1, 2], -limits.slow, limits.slow)
+        zeros, most = self.p[_OFFSETS[:2]], np.array([limits.max_steering, limits.slow])
         excitation = np.zeros((2, 1 + len(EDGES)))
         excitation[:, 0] = self.driven
         return AxleModel(
@@ -575,7 +564,9 @@ class FittedModel(TireModel):
             sway=self._sway,
             plausibility=limits,
             W=W,
-            own=own,
+            compliance=np.array([self["compliance_f"], self["compliance_r"]]),
+            sway_share=np.array([self["sway_share_f"], self["sway_share_r"]]),
+            offset=np.clip(zeros, -most, most),
             covariance=self._units_covariance(fits, self.covariance),
             prior_covariance=self._units_covariance(fits, _covariance_before(self)),
             excitation=excitation,
@@ -588,7 +579,7 @@ class FittedModel(TireModel):
         return np.maximum(self.known_slip, LEAST_REACH)
 
     def _units_covariance(self, fits: list[tuple[Array, Array]], covariance: Array) -> Array:
-        """Return the covariance of [W, own] (2, n + 3, n + 3), never singular."""
+        """Return the covariance of weights, lag and zeros (2, n + 3, n + 3), never singular."""
         n = len(fits[0][1])
         found = np.empty((2, n + 3, n + 3))
         for i, (axle, (slip, pseudo)) in enumerate(zip("fr", fits, strict=True)):

@@ -95,7 +95,7 @@ class SpecializedStep(NamedTuple):
     @property
     def tells_v_y(self) -> bool:
         """Whether v_y is an output, so that it may be NaN as an input."""
-        return not self.method.needs_v_y
+        return "v_y" not in self.method.needs
 
     @property
     def side_slip(self) -> tuple[str, ...]:
@@ -130,7 +130,7 @@ def specialize(
         )
     if with_a_y and "a_y" not in setup.scan.over:
         raise ValueError(f"{type(method).__name__} has no use for a_y")
-    with_a_y = with_a_y or method.needs_a_y
+    with_a_y = with_a_y or "a_y" in method.needs
     step, left_out = setup.scan.step, () if with_a_y else setup.only_with_a_y
     carry = {port: one for port, one in setup.carry.items() if port not in left_out}
     parts = _specialized(setup, list(carry), name, with_a_y=with_a_y)
@@ -158,7 +158,7 @@ def specialize(
 
 def _measured(method: Method) -> tuple[Signal, ...]:
     """Return the inputs that every step has; v_y may be missing where the method tells it."""
-    if method.needs_v_y:
+    if "v_y" in method.needs:
         return INPUTS
     absent = "; NaN where there is none"
     return tuple(

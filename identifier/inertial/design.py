@@ -12,15 +12,13 @@ from codegen.arrays import Array
 from identifier.axle.car import car_numbers, downforce_numbers
 from identifier.axle.covariance import packed, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
-from identifier.axle.design import AxleIdentifier
+from identifier.axle.design import AxleIdentifier, curve_boxes, curve_tracks
 from identifier.axle.gate import GateState, Plausibility
-from identifier.axle.guarantee import HalfSpaces, prior_box
+from identifier.axle.guarantee import prior_box
 from identifier.axle.learning import Bounds, inward, rising_shares
 from identifier.axle.model import EXACT, AxleModel
 from identifier.axle.prior import Prior
-from identifier.axle.slip import FASTEST, SHORTEST, Sensors, Sway
-from identifier.certificate import Certificate
-from identifier.driving import Driving
+from identifier.axle.slip import FASTEST, Sensors, Sway
 from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
 from identifier.inertial.motion import CURVES, MOVING, SENSORS, Along, Laws, Learnt
@@ -31,7 +29,15 @@ from identifier.inertial.step import (
     LearntLimits,
     build_step,
 )
-from identifier.method import OTHER_STRUCTURE, Method, Track, fits, resumed
+from identifier.method import (
+    OTHER_STRUCTURE,
+    Accelerometer,
+    Limits,
+    Method,
+    Track,
+    fits,
+    resumed,
+)
 from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
 from models.rules import require_within
@@ -68,6 +74,8 @@ class InertialIdentifier(Method):
     ValueError
         Where the ladder does not rise by powers of two, or a number is none of a car.
     """
+
+    needs = ("a_y",)
 
     prior: Prior
     plausibility: Plausibility
@@ -132,7 +140,7 @@ class InertialIdentifier(Method):
         dt : sampling interval [s].
         """
         usual, tires = cls.for_vehicle(vehicle, dt=dt), model.in_units(LADDER)
-        share = max(float(tires.own[:, 1].mean()), LEAST_SHARE)
+        share = max(float(tires.sway_share.mean()), LEAST_SHARE)
         return replace(
             usual,
             held=True,
@@ -176,45 +184,29 @@ class InertialIdentifier(Method):
         """Below this speed [m/s] forces read zero; learning rests below `learning_speed`."""
         return self.plausibility.min_speed
 
-    @property
-    def needs_v_y(self) -> bool:
-        """Whether it learns nothing without a lateral velocity, which it tells: no."""
-        return False
-
-    @property
-    def needs_a_y(self) -> bool:
-        """Whether it learns nothing from a recording without an accelerometer: so it is."""
-        return True
-
     def resumes(self, model: TireModel) -> bool:
         """Return whether a run can begin with a stored model."""
         return fits(model.in_units(self.ladder), AxleModel, ladder=self.ladder)
 
-    def possible_tires(self) -> HalfSpaces:
-        """Return the weights that the curve of a tire can have, within the bounds."""
-        return prior_box(self.bounds, self.ladder)
+    @property
+    def accelerometer(self) -> Accelerometer:
+        """Bias and roll in a_y, by which it estimates v_y."""
+        return Accelerometer(self._bias_and_roll, self._body)
+
+    @property
+    def limits(self) -> Limits:
+        """Where its estimates stay after every sample."""
+        boxes = curve_boxes(self.bounds, stiffness=True) | {
+            "roll_rad_per_g": [0.0, MOST["roll"]],
+            "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
+            "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
+        }
+        return Limits(boxes, prior_box(self.bounds, self.ladder))
 
     @property
     def ports(self) -> tuple[Port, ...]:
         """Outputs and state of its step, axle_force first."""
         return PORTS
-
-    def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
-        """Return what is proven of it: the boxes of what is learnt hold after every sample."""
-        del vehicle, driving
-        b = self.bounds
-        return Certificate(
-            limits={
-                "grip_static_axle_loads": [b.least_grip, b.most_grip],
-                "weight_static_axle_loads": [-b.weight, b.weight],
-                "stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness],
-                "compliance_m": [0.0, b.compliance],
-                "roll_rad_per_g": [0.0, MOST["roll"]],
-                "steering_offset_rad": [-b.steering, b.steering],
-                "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
-                "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
-            }
-        )
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.
@@ -228,7 +220,8 @@ class InertialIdentifier(Method):
         ValueError
             Where stored weights are those of another structure.
         """
-        W, own = self.prior.means(vehicle, self.ladder)
+        W, beside = self.prior.means(vehicle, self.ladder)
+        compliance = beside[:, 0]
         P = self._prior_covariance(vehicle)
         excitation = np.zeros((2, 1 + len(EDGES)))
         sensors = np.zeros(len(SENSORS))
@@ -237,10 +230,11 @@ class InertialIdentifier(Method):
             stored = resumed(
                 start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder
             )
-            W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
-            sensors[SENSORS.index("steering")] = own[0, 2]
+            W, P, excitation = stored.W, stored.covariance, stored.excitation
+            compliance = stored.compliance
+            sensors[SENSORS.index("steering")] = stored.offset[0]
         trust = self.trust.at(self.dt, vehicle.wheelbase, vehicle.froude_time)
-        curves, compliance = self._directions(W), own[:, 0]
+        curves = self._directions(W)
         known = self._known(vehicle, P, curves, compliance)
         q = len(self._learnt.names)
         rest = len(triangle(MOVING + q)) - len(triangle(q))
@@ -253,7 +247,7 @@ class InertialIdentifier(Method):
             carry={
                 "motion": np.zeros(MOVING),
                 "W": W,
-                "own": own[:, 0],
+                "own": compliance,
                 "sensors": sensors,
                 "UD": packed(known[None]),
                 "motion_UD": np.zeros(rest),  # begins with the first sample
@@ -285,8 +279,8 @@ class InertialIdentifier(Method):
             ends_run=self.plausibility.rest(self.dt),
         )
 
-    def body_prior(self, vehicle: Vehicle) -> Body:
-        """Return how the body rolls: as a chassis tells it, or else as is believed of any."""
+    def _body(self, vehicle: Vehicle) -> Body:
+        """Return how the body rolls: by its chassis, or else as is believed of any."""
         frequency = self.roll_frequency / vehicle.froude_time
         believed = Body(frequency, self.roll_damping, self.beliefs.roll, self.beliefs.sd_roll)
         return Body.of_chassis(vehicle) or believed
@@ -337,7 +331,7 @@ class InertialIdentifier(Method):
         return np.asarray(found.T, np.float64)
 
     def _into(self, curves: Array, compliance: Array) -> Array:
-        """Return what steps of what is learnt move of each axle's [W, own], (2, n + 3, k)."""
+        """Return what steps of what is learnt move of each axle's numbers, (2, n + 3, k)."""
         n, names = len(self.ladder), self._learnt.names
         E = np.zeros((2, n + 3, len(names)))
         for k, name in enumerate(names):
@@ -353,7 +347,7 @@ class InertialIdentifier(Method):
         return E
 
     def _known(self, vehicle: Vehicle, P: Array, curves: Array, compliance: Array) -> Array:
-        """Return the covariance of what is learnt of covariances of both axles' [W, own], (k, k).
+        """Return the covariance of what is learnt of covariances of both axles' numbers, (k, k).
 
         The axles' doubts of their compliance are one.
         """
@@ -388,22 +382,11 @@ class InertialIdentifier(Method):
         ----------
         state : W (k, 2, n) and own (k, 2) at each of k instants.
         """
-        W, compliance = state["W"], state["own"].reshape(-1, 2)
-        slope = (W / np.array(self.ladder)).sum(axis=2)
-        lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
-        return (
-            Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
-            Track("relaxation length", "m", lag),
-            Track("force at saturation", "static load", W.sum(axis=2)),
-        )
+        compliance = state["own"].reshape(-1, 2)
+        return curve_tracks(vehicle, self.ladder, state["W"], compliance)
 
-    def beside_force(self, state: Mapping[str, Array]) -> Array:
-        """Return bias and roll in what the accelerometer showed, (n,) [weights].
-
-        Parameters
-        ----------
-        state : sensors (n + 1, 4) and body (n + 1, 2).
-        """
+    def _bias_and_roll(self, state: Mapping[str, Array]) -> Array:
+        """Return bias and roll in the measured a_y, (n,) [car weights]."""
         sensors = state["sensors"].reshape(-1, len(SENSORS))[1:]
         tilt = state["body"].reshape(-1, 2)[1:, 0]
         bias, roll = (sensors[:, SENSORS.index(name)] for name in ("bias", "roll"))
@@ -418,13 +401,11 @@ class InertialIdentifier(Method):
         state : W (2, n), own (2,), sensors (4,), UD of both and excitation (2, 9).
         """
         prior = self._prior_covariance(vehicle)
-        own = np.zeros((2, 3))
-        own[:, 0] = np.ravel(state["own"])
-        own[0, 2] = np.ravel(state["sensors"])[SENSORS.index("steering")]
-        own[:, 1] = self.prior.sway_share
+        compliance = np.array(state["own"]).ravel()
+        steering = np.ravel(state["sensors"])[SENSORS.index("steering")]
         (P,) = unpacked(state["UD"].reshape(1, -1), len(self._learnt.names))
         after = np.empty_like(prior)
-        into = self._into(self._directions(state["W"]), own[:, 0])
+        into = self._into(self._directions(state["W"]), compliance)
         for one, E, before in zip(after, into, prior, strict=True):
             back = np.linalg.pinv(E)  # what weights tell of what is learnt
             gain = before @ back.T @ np.linalg.pinv(back @ before @ back.T)
@@ -435,7 +416,9 @@ class InertialIdentifier(Method):
             sway=self._sway(vehicle),
             plausibility=self.plausibility,
             W=state["W"].copy(),
-            own=own,
+            compliance=compliance,
+            sway_share=np.full(2, self.prior.sway_share),
+            offset=np.array([steering, 0.0]),
             covariance=after,
             prior_covariance=prior,
             excitation=state["excitation"].copy(),

@@ -104,9 +104,10 @@ def guaranteed(
     """
     given = None if bound is None else ForceBound.of(bound)
     run = asked_run(history, t)
-    carries, box = run.model if model is None else model, history.design.possible_tires()
-    if box is None or not isinstance(carries, AxleModel):
+    carries, limits = run.model if model is None else model, history.design.limits
+    if limits is None or not isinstance(carries, AxleModel):
         return carries
+    box = limits.curves
     strips = strips_of(run.model, run.portion.recording, run.road)
     if strips is not None and run.until is not None:
         strips = strips.until(int(np.searchsorted(strips.t, run.until - WINDOW, side="right")))

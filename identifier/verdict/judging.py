@@ -93,8 +93,8 @@ def judge(history: History, t: float | None = None) -> Verdict:
     """
     model, whole = history.freeze(t), history.recording
     end = float(whole.t[-1]) if t is None else t
-    state = {} if history.design.whole else history.state_at(end)
-    reached = history.design.reached(history.vehicle, state) if state else model.at_bounds()
+    limits = history.design.limits
+    reached = model.at_bounds() if limits is None else limits.active(history.state_at(end))
     return judge_identification(model, whole, state_index(whole, end), reached)
 
 

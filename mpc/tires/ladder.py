@@ -12,13 +12,14 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
+from identifier.axle.dynamics import series_compliance
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
 from identifier.estimate.model import FittedModel
 from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
-from models.vehicle import GRAVITY, Vehicle, load_ratio
+from models.vehicle import Vehicle, load_ratio
 from mpc.tires.tire import DOUBT_STEP, N_DOUBTS, Pair, Point, PredictionTire, TireStructure
 
 _N_COMMON = 3
@@ -149,7 +150,8 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     """
     load, ladder = np.array(model.vehicle.axle_loads), np.array(model.ladder)
     W, shortest = model.W * load[:, None], SHORTEST * model.vehicle.wheelbase
-    compliance = (model.own[:, 0] + GRAVITY / model.sway.frequency**2 * model.own[:, 1]) / load
+    gives = series_compliance(model.compliance, model.sway_share, model.sway.frequency)
+    compliance = gives / load
     slope = np.maximum((model.W / ladder).sum(axis=1), 0.1) * load
     weights = ladder_weights(
         ladder,
@@ -157,7 +159,7 @@ def axle_tire(model: AxleModel) -> PredictionTire:
         compliance=compliance,
         least=compliance * 0.02 * slope + shortest,  # the slope is held up as when it was learnt
         shortest=shortest,
-        offset=(model.own[0, 2], model.own[1, 2]),
+        offset=(model.offset[0], model.offset[1]),
         downforce=_downforce(model.vehicle),
     )
     mounted = any((model.sensors.v_y_angle, model.sensors.steering_gain))

@@ -384,9 +384,7 @@ def test_force_is_what_a_straight_drifting_car_would_be_told(tires, car, name):
     small = name in ("integral", "linear")  # their slip angle is that of (3)
     v_y = -v_x * (alpha if small else np.tan(alpha))
     steering, bias = 0.0, 0.0  # of the sensors, where a model takes them off
-    if name == "axle":
-        steering, bias = tire.own[:, 2]
-    elif isinstance(tire, CurveModel):
+    if name == "axle" or isinstance(tire, CurveModel):
         steering, bias = tire.offset
     v_y += bias
     drifting = ti.Recording(

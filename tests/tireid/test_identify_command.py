@@ -570,7 +570,7 @@ def test_every_method_with_a_model_writes_all_of_its_files(logs, tmp_path, name,
             assert len(columns) == np.size(values) * (values is not None)
         else:
             assert columns == ["own_1", "own_2"]
-            assert [told[one][-1] for one in columns] == pytest.approx(model.own[:, 0], rel=1e-3)
+            assert [told[one][-1] for one in columns] == pytest.approx(model.compliance, rel=1e-3)
 
 
 def verdict_of(out):

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleIdentifier, AxleModel
+from identifier.axle.model import BESIDE
 from identifier.frozen import FrozenModelError
 from identifier.run import identify
 from identifier.tire_model import load_model, stored_verdict
@@ -146,6 +147,11 @@ def test_a_model_survives_its_file_bit_for_bit(car, drive, tmp_path):
     read = load_model(tmp_path / "weights.json")
     assert read.to_dict() == model.to_dict()
     np.testing.assert_array_equal(read.axle_force(recording), model.axle_force(recording))
+    earlier = {key: one for key, one in model.to_dict().items() if key not in BESIDE}
+    earlier["own"] = np.column_stack([model.compliance, model.sway_share, model.offset]).tolist()
+    assert AxleModel.from_dict(earlier, "earlier").to_dict() == model.to_dict()
+    with pytest.raises(FrozenModelError, match="earlier: offset is missing"):
+        AxleModel.from_dict(earlier | {"own": [[0.1, 0.0], [0.1, 0.0]]}, "earlier")
 
 
 def test_a_stored_model_says_whether_it_was_found_valid(car, drive, tmp_path):
@@ -164,11 +170,11 @@ def test_a_stored_model_says_whether_it_was_found_valid(car, drive, tmp_path):
     [
         ("W", None, "W is missing"),
         ("W", [[1.0, 2.0]], r"W must have shape \(2, 4\)"),
-        ("own", [[float("nan"), 0, 0], [0, 0, 0]], "own holds a number that is not finite"),
-        ("own", [[-0.1, 0, 0], [0, 0, 0]], r"compliance \[m\] must be within 0 and"),
-        ("own", [[0.1, 0, 0], [0.1, 1.5, 0]], "sway share must be within 0 and 1"),
-        ("own", [[0.1, 0, 2.5e8], [0.1, 0, 0]], r"steering offset \[rad\] must be within -1.2 and"),
-        ("own", [[0.1, 0, 0], [0.1, 0, -1e3]], r"bias of v_y \[m/s\] must be within"),
+        ("compliance", [float("nan"), 0], "compliance holds a number that is not finite"),
+        ("compliance", [-0.1, 0], r"compliance \[m\] must be within 0 and"),
+        ("sway_share", [0, 1.5], "sway share must be within 0 and 1"),
+        ("offset", [2.5e8, 0], r"steering offset \[rad\] must be within -1.2 and"),
+        ("offset", [0, -1e3], r"bias of v_y \[m/s\] must be within"),
         ("ladder", [0.01, 0.03, 0.1, 0.2], "ladder must rise by powers of two"),
         ("sway", {"frequency": -1.0, "damping": 0.3}, "frequency must lie between 0.1 and 100"),
         ("sway", {"frequency": 546.0, "damping": 0.3}, "frequency must lie between 0.1 and 100"),

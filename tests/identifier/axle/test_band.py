@@ -86,7 +86,7 @@ def test_a_calibrated_band_follows_errors_and_a_told_one_does_not(run, model, sw
 
 def test_calibration_leaves_the_frozen_model_as_it_is(run, model):
     frozen = run.freeze()
-    for name in ("W", "own", "covariance", "prior_covariance", "excitation"):
+    for name in ("W", "compliance", "offset", "covariance", "prior_covariance", "excitation"):
         np.testing.assert_array_equal(getattr(model, name), getattr(frozen, name))
     assert "band" not in frozen.to_dict()
     more = {"band": model.calibration.to_dict(), "force_missed": model.force_missed.tolist()}
@@ -231,7 +231,7 @@ def test_samples_fill_the_band(model):
     away = np.abs(np.array([one.force(slip) for one in drawn]) - model.force(slip))
     share = (away <= model.band.half(slip)).mean(axis=0)
     assert (share > 0.8).all() and (share < 1.0).any()
-    assert not np.allclose(drawn[0].own, drawn[1].own)
+    assert not np.allclose(drawn[0].compliance, drawn[1].compliance)
     assert model.band.samples(0, np.random.default_rng(1)) == ()
     with pytest.raises(ValueError, match="n must not be negative"):
         model.band.samples(-1, np.random.default_rng(1))

@@ -268,7 +268,9 @@ def test_a_stored_covariance_that_is_too_wide_is_narrowed(car, drive):
     wide = replace(
         model,
         W=10.0 * model.W,
-        own=np.minimum(model.own + np.array([0.5, 2.0, 1.0]), [np.inf, 1.0, np.inf]),
+        compliance=model.compliance + 0.5,
+        sway_share=np.ones(2),
+        offset=model.offset + 1.0,
         covariance=300.0 * model.prior_covariance,
     )
     state = identify(recording, car, design, start=wide).state

@@ -145,7 +145,9 @@ def test_curves_with_a_speed_are_those_of_its_load(model):
 
 def test_motion_and_lag_are_those_of_the_replay(model, drive):
     """The replay holds slip by its closed form, the equations of motion are integrated here."""
-    soft = replace(model, own=np.array([[0.02, 0.0, 0.0], [0.03, 0.0, 0.0]]))
+    soft = replace(
+        model, compliance=np.array([0.02, 0.03]), sway_share=np.zeros(2), offset=np.zeros(2)
+    )
     force, slip = soft.axle_force(drive), soft.lagged_slip(drive)
     dynamics = ca.Function("rate", *_slip_rate(soft))
     begin, before, after = ca.SX.sym("x", 2), ca.SX.sym("before", 4), ca.SX.sym("after", 4)

@@ -297,7 +297,9 @@ def assert_by_hand(design, car, recording):
     largest = np.abs(forces).max()
     np.testing.assert_allclose(history.axle_force, forces, rtol=0, atol=1e-6 * largest)
     model = history.freeze(1e9)
-    np.testing.assert_allclose(np.hstack([model.W, model.own]), hand.theta, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(
+        np.hstack([model.W, model.beside_curve]), hand.theta, rtol=1e-4, atol=1e-6
+    )
     np.testing.assert_allclose(model.covariance, hand.P, rtol=1e-4, atol=1e-7)
     np.testing.assert_allclose(model.excitation[:, 0], hand.longest, rtol=1e-5)
     np.testing.assert_allclose(model.excitation[:, 1], hand.time, atol=0.5 * design.dt)
@@ -331,7 +333,7 @@ def test_step_repeats_the_equations_with_an_accelerometer(angle, road, car, driv
     design = replace(design, road=replace(design.road, **road))
     hand = assert_by_hand(design, car, recording)
     without = identify(replace(recording, a_y=None), car, design).freeze(1e9)
-    assert np.abs(hand.theta - np.hstack([without.W, without.own])).max() > 1e-3
+    assert np.abs(hand.theta - np.hstack([without.W, without.beside_curve])).max() > 1e-3
 
 
 def with_a_rest(recording):

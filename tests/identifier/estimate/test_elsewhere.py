@@ -93,7 +93,7 @@ def test_sensors_are_taken_over_and_the_doubt_of_an_angle_is_that_at_the_speed_o
         v_y_bias=0.02, v_y_angle=0.01, steering_zero=0.003, v_y_lever=0.2, steering_gain=0.1
     )
     units = model.in_units()
-    np.testing.assert_allclose(units.own[:, 2], [0.003, 0.02])
+    np.testing.assert_allclose(units.offset, [0.003, 0.02])
     assert units.sensors == (0.01, 0.2, 0.1)
     b, angle = INDEX["v_y_bias"], INDEX["v_y_angle"]
     P = model.covariance
@@ -108,7 +108,7 @@ def test_the_axle_identifier_goes_on_from_a_fit_with_its_doubt(fitted):
     begun = design.frozen(CAR, design.setup(CAR, fitted).carry)
     units = fitted.in_units(LADDER)
     np.testing.assert_allclose(begun.W, units.W)
-    np.testing.assert_allclose(begun.own, units.own)
+    np.testing.assert_allclose(begun.beside_curve, units.beside_curve)
     slips = np.array([0.02, 0.1])
     assert (begun.band.relative_sd(slips) < 0.5 * design.frozen(CAR, design.setup(CAR).carry)
             .band.relative_sd(slips)).all()  # fmt: skip
