@@ -130,7 +130,7 @@ def held(
     loads = np.array(model.vehicle.axle_loads)
     moving = (drive.v_x >= model.min_speed) & (drive.t >= drive.t[0] + lead)
     slips = np.abs(model.lagged_slip(drive))[moving]
-    away = (np.abs(model.axle_force(drive) - force) / loads)[moving]
+    away = (np.abs(model.predict(drive) - force) / loads)[moving]
     wide = (model.band.over(drive) / loads)[moving]
     fast = np.searchsorted(SPEEDS, drive.v_x[moving] / model.vehicle.froude_speed, side="right")
     for i, axle in enumerate(AXLES):

@@ -460,7 +460,7 @@ def held(tire: TireModel, asked: Recording, *, since: float = 0.0, slow: float =
     """
     assert isinstance(tire, FittedModel) and asked.axle_force is not None
     counts = (asked.t >= since) & (asked.v_x >= max(slow, tire.min_speed))
-    away = np.abs(tire.axle_force(asked) - asked.axle_force)
+    away = np.abs(tire.predict(asked) - asked.axle_force)
     return 100.0 * float(np.mean((away <= tire.band.over(asked, LEVEL))[counts]))
 
 

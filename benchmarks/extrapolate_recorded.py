@@ -124,7 +124,7 @@ def _outside(targets: Targets, learnt: Recording, unseen: Recording) -> None:
                 targets.record(f"{key}_linear", one.linear, "%")
     grid = np.linspace(-0.5, 0.5, 201)
     curve = max(
-        float((np.abs(model.force_at(grid)).max(axis=0) / CARMAKER.axle_loads).max())
+        float((np.abs(model.force(grid)).max(axis=0) / CARMAKER.axle_loads).max())
         for model in models
     )
     label = "  largest force up to 29 deg, over the axle's load"
@@ -153,7 +153,7 @@ def _by_slip(model: AxleModel, recording: Recording, axle: int) -> BySlip:
     assert truth is not None
     stiffness = [car.cornering_stiffness_front, car.cornering_stiffness_rear]
     linear = recording.alpha(car.l_f, car.l_r) * stiffness
-    force, outside = model.axle_force(recording), model.outside(recording)[:, axle]
+    force, outside = model.predict(recording), model.outside(recording)[:, axle]
     own, line, right = force[:, axle], linear[:, axle], truth[:, axle]
     inside = _error(own[~outside], right[~outside])
     if not outside.any():

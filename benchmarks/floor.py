@@ -122,7 +122,7 @@ def _errors(model: TireModel, recording: Recording) -> Array:
     counted = counted_samples(recording, model.min_speed)
     size = axle_rms(truth, counted)
     unit = np.array([size.front, size.rear]) * np.sqrt(np.count_nonzero(counted))
-    errors: Array = (model.axle_force(recording) - truth)[counted] / unit
+    errors: Array = (model.predict(recording) - truth)[counted] / unit
     return errors
 
 

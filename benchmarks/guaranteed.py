@@ -87,7 +87,7 @@ def asked(models: dict[str, AxleModel], drive: Recording, lead: float) -> dict[s
     assert force is not None
     counts = (drive.v_x >= model.min_speed) & moving(drive, lead)
     force = force[counts]
-    error = np.abs(model.axle_force(hidden)[counts] - force)
+    error = np.abs(model.predict(hidden)[counts] - force)
     known = np.abs(model.lagged_slip(hidden))[counts] <= model.known_slip
     found = {}
     for kind, one in models.items():

@@ -269,23 +269,6 @@ class Band(ABC, Generic[Model]):
         slope = self.model.slope_at(self.model.lagged_slip(recording))
         return slope * self.model.vehicle.load_ratio(recording.v_x)
 
-    def known_slip(self, driven: Array, steps: int) -> Array:
-        """Return the largest slip [rad] until which the doubt is small, (2,).
-
-        Parameters
-        ----------
-        driven : largest slip of the drives that taught [rad], (2,).
-        steps : in which each is looked at.
-        """
-        grid = np.linspace(0.0, 1.0, steps + 1)[1:]
-        known = np.zeros(2)
-        for i, largest in enumerate(driven):
-            if largest > 0.0:
-                sure = self.relative_sd(largest * grid)[:, i] <= LARGEST_SD
-                count = sure.size if sure.all() else int(np.argmin(sure))
-                known[i] = largest * count / grid.size
-        return known
-
 
 def of_axle(both: Array, axle: Axle | None) -> Array:
     """Return of what both axles have, (..., 2), that of one; of None both."""

@@ -51,7 +51,7 @@ class _SteadyTires(Protocol):
     def vehicle(self) -> Vehicle:
         """The car, with the cornering stiffnesses that are stated of it."""
 
-    def force_at(self, alpha: Array) -> Array:
+    def force(self, alpha: Array) -> Array:
         """Return the steady axle forces at slip angles, (k, 2) [N].
         alpha : slip angles in the paper's sign [rad], (k,).
         """
@@ -59,7 +59,7 @@ class _SteadyTires(Protocol):
 
 def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
     """Refuse tires that no road has: forces that are not finite or too large, or a dead axle."""
-    force = np.asarray(tires.force_at(np.array([-WIDE, -PROBE, PROBE, WIDE])))
+    force = np.asarray(tires.force(np.array([-WIDE, -PROBE, PROBE, WIDE])))
     if not (np.abs(force) <= LARGEST_FORCE).all():
         raise refusal(
             f"axle forces must be finite and below {LARGEST_FORCE:g} N, at {WIDE} rad of slip and "

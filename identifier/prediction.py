@@ -79,7 +79,7 @@ def predict(model: TireModel, recording: Recording, *, since: float | None = Non
     model : the frozen model; samples below its minimum speed do not count.
     since : samples before this time [s] do not count; None counts all.
     """
-    force = model.axle_force(recording)
+    force = model.predict(recording)
     counted = counted_samples(recording, model.min_speed, since)
     truth = recording.axle_force
     return Prediction(

@@ -152,7 +152,7 @@ class History:
         model = self.freeze(t)
         known = whole.reads(recording.as_logged(), self.vehicle)
         recording, outputs = _with_v_y(known, model)
-        force = model.axle_force(recording)
+        force = model.predict(recording)
         return replace(
             self,
             recording=recording,
@@ -229,7 +229,7 @@ def identify(
             vehicle=vehicle,
             design=design,
             recording=recording,
-            axle_force=model.axle_force(recording),
+            axle_force=model.predict(recording),
             state={},
             outputs=outputs,
             start=start,

@@ -109,6 +109,29 @@ class Reached(NamedTuple):
     refuses: bool
 
 
+class Drives(NamedTuple):
+    """What the drives that taught a model were, and what they had beside its tires.
+
+    speeds : least and largest [m/s], (2,); None where unknown.   lengthwise : parameters (p,) with
+    load transfer and ellipse, and covariance (p, p); None where there are none.   elsewhere : from
+    and to [s] of what was driven on another road.   notes : findings, code and one line of each.
+    at_bounds : estimates at active bounds.
+    """
+
+    speeds: Array | None = None
+    lengthwise: tuple[Array, Array] | None = None
+    elsewhere: tuple[tuple[float, float], ...] = ()
+    notes: tuple[tuple[str, str], ...] = ()
+    at_bounds: tuple[Reached, ...] = ()
+
+    def road_differs(self, t: Array) -> NDArray[np.bool_]:
+        """Return at which times `t` [s], (n,), the road was another."""
+        found = np.zeros(t.shape, dtype=bool)
+        for begin, end in self.elsewhere:
+            found |= (t >= begin) & (t <= end)
+        return found
+
+
 class TireModel(ABC):
     """Axle forces from weights that no longer change: the front and the rear tires of one car."""
 
@@ -134,15 +157,6 @@ class TireModel(ABC):
         ----------
         dt : sampling interval of what is replayed [s].
         """
-
-    def axle_force(self, recording: Recording) -> Array:
-        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
-
-        Parameters
-        ----------
-        recording : its signals are the input; its forces are not looked at.
-        """
-        return self.setup(recording.dt).output(recording, "axle_force")
 
     def estimated_v_y(self, recording: Recording) -> "LateralVelocity | None":
         """Return the v_y of a drive whose sensors show none; None of tires that cannot tell it."""
@@ -198,10 +212,8 @@ class TireModel(ABC):
         """Whether the force follows a lagged slip, two more states."""
         return False
 
-    @property
-    def scales_with_load(self) -> bool:
-        """Whether forces are in static axle loads, so that another car's model scales to a car."""
-        return False
+    scales_with_load = False
+    """Whether forces are in static axle loads, so that another car's model scales to a car."""
 
     def mounted_on(self, vehicle: Vehicle) -> "TireModel":
         """Return the tires on another car, their forces scaled by its static axle loads.
@@ -242,23 +254,20 @@ class TireModel(ABC):
         return self
 
     @property
-    def reference_speed(self) -> float:
-        """Speed [m/s] at which a force that depends on it is given, 4 sqrt(g L): brisk driving."""
+    def _curve_speed(self) -> float:
+        """Speed [m/s] of curves that are asked for without one; 0 is under static loads."""
+        if self.scales_with_load and self.vehicle.has_downforce:
+            return 0.0
         return brisk_speed(self.vehicle, self.min_speed)
 
-    @property
-    def curve_speed(self) -> float:
-        """Speed [m/s] at which curves and stiffness are given that are asked for without one."""
-        return self.reference_speed
-
     def predict(self, recording: Recording) -> Array:
-        """Return the axle forces that the model predicts of a drive, (n, 2) [N].
+        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
 
         Parameters
         ----------
         recording : its signals are the input; its forces are not looked at.
         """
-        return self.axle_force(recording)
+        return self.setup(recording.dt).output(recording, "axle_force")
 
     @overload
     def force(self, alpha: float, axle: Axle, *, v_x: float | None = None) -> float: ...
@@ -278,31 +287,25 @@ class TireModel(ABC):
         ----------
         alpha : slip angles in the paper's sign [rad], a number or an array of any shape.
         axle : "front" or "rear", for a result of the shape of `alpha`; None gives both, (..., 2).
-        v_x : speed [m/s]; None takes `curve_speed`. A curve of slip does not look at it, but where
-            the car has downforce.
+        v_x : speed [m/s]; None is brisk driving, 4 sqrt(g L), and where the car has downforce, of a
+            curve of slip, static loads. Else a curve of slip does not look at it.
         """
         slip = np.asarray(alpha, dtype=np.float64)
-        pairs = np.tile(slip.ravel(), (2, 1))
-        speed = self.curve_speed if v_x is None else v_x
-        found = self._force_curve()(pairs, speed) if slip.size else pairs
-        both: Array = np.array(found, dtype=np.float64).T.reshape(*slip.shape, 2)
-        one = of_axle(both, axle)
+        both = self._steady(slip.ravel(), self._curve_speed if v_x is None else v_x)
+        one = of_axle(both.reshape(*slip.shape, 2), axle)
         return float(one) if one.ndim == 0 else one
 
-    def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles, (k, 2) [N].
-
-        Parameters
-        ----------
-        alpha : slip angles in the paper's sign [rad], (k,).
-        """
-        return self.force(alpha)
+    def _steady(self, alpha: Array, v_x: float) -> Array:
+        """Return the steady axle forces at slip angles (k,) [rad] and a speed, (k, 2) [N]."""
+        pairs = np.tile(alpha, (2, 1))
+        found = self._force_curve()(pairs, v_x) if alpha.size else pairs
+        return np.array(found, dtype=np.float64).T
 
     @property
     def stiffness(self) -> Array:
         """Cornering stiffness: slope of the steady force at zero slip [N/rad], (2,)."""
         alpha = ca.MX.sym("alpha", 2)
-        force = self.curve_expression(alpha, self.curve_speed)
+        force = self.curve_expression(alpha, self._curve_speed)
         slope = ca.Function("stiffness", [alpha], [ca.jacobian(force, alpha)])
         both = np.array([1.0, 1.0])  # the axles slip alike
         stiffness: Array = np.array(slope(np.zeros(2))) @ both
@@ -314,27 +317,9 @@ class TireModel(ABC):
         return None
 
     @property
-    def known_speeds(self) -> Array | None:
-        """Least and largest speed [m/s] of the identification drives, (2,); None where unknown."""
-        return None
-
-    @property
-    def lengthwise(self) -> tuple[Array, Array] | None:
-        """Parameters (p,) with load transfer and ellipse, and covariance (p, p); None: none."""
-        return None
-
-    def road_differs(self, t: Array) -> NDArray[np.bool_]:
-        """Return at which times `t` [s], (n,), of the identification drive the road was another."""
-        return np.zeros(t.shape, dtype=bool)
-
-    @property
-    def notes(self) -> tuple[tuple[str, str], ...]:
-        """Findings of the identification drives beside the tires: code and one line of each."""
-        return ()
-
-    def at_bounds(self) -> "tuple[Reached, ...]":
-        """Return the estimates at active bounds."""
-        return ()
+    def drives(self) -> Drives:
+        """What the drives that taught it were, as far as it knows."""
+        return Drives()
 
     @property
     def force_missed(self) -> Array | None:

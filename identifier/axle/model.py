@@ -37,6 +37,7 @@ from identifier.axle.prior import friction_direction
 from identifier.axle.slip import SHORTEST, Sensors, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.band import (
+    LARGEST_SD,
     LEVEL,
     SD_FRICTION,
     Band,
@@ -47,7 +48,16 @@ from identifier.band import (
 )
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
 from identifier.setup import Setup
-from identifier.tire_model import AXLES, GRIP, RELAXATION, STIFFNESS, Estimate, Fact, TireModel
+from identifier.tire_model import (
+    AXLES,
+    GRIP,
+    RELAXATION,
+    STIFFNESS,
+    Estimate,
+    Fact,
+    TireModel,
+    brisk_speed,
+)
 from models.recordings import Recording
 from models.rules import require_positive
 from models.schema import Table
@@ -96,6 +106,7 @@ class AxleModel(TireModel):
     """
 
     kind = "axle"
+    scales_with_load = True
 
     vehicle: Vehicle
     ladder: tuple[float, ...]
@@ -161,7 +172,7 @@ class AxleModel(TireModel):
         return self.plausibility.min_speed
 
     @property
-    def cornering_stiffness(self) -> Array:
+    def stiffness(self) -> Array:
         """Slope of the force curves at zero, under static loads [N/rad], (2,): the linear part."""
         slope: Array = (self.W / np.array(self.ladder)).sum(axis=1)
         return slope * self._loads
@@ -181,15 +192,9 @@ class AxleModel(TireModel):
     def _loads(self) -> Array:
         return np.array(self.vehicle.axle_loads)
 
-    @property
-    def curve_speed(self) -> float:
-        """Speed [m/s] of curves that are asked for without one: with downforce 0, static loads."""
-        return 0.0 if self.vehicle.has_downforce else self.reference_speed
-
-    def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles under static loads, (k, 2) [N]."""
-        force: Array = unit_matrix(alpha, self.ladder) @ self.W.T * self._loads
-        return force
+    def _steady(self, alpha: Array, v_x: float) -> Array:
+        force = unit_matrix(alpha, self.ladder) @ self.W.T * self._loads
+        return force * self.vehicle.load_ratio(v_x)
 
     @property
     def band(self) -> "AxleBand":
@@ -199,7 +204,14 @@ class AxleModel(TireModel):
     @property
     def known_slip(self) -> Array:
         """Largest slip [rad] that was seen while learning and where the doubt is small, (2,)."""
-        return self.band.known_slip(self.excitation[:, 0], 200)
+        grid = np.linspace(0.0, 1.0, 201)[1:]
+        known = np.zeros(2)
+        for i, largest in enumerate(self.excitation[:, 0]):
+            if largest > 0.0:
+                sure = self.band.relative_sd(largest * grid)[:, i] <= LARGEST_SD
+                count = sure.size if sure.all() else int(np.argmin(sure))
+                known[i] = largest * count / grid.size
+        return known
 
     def slope_at(self, slip: Array) -> Array:
         """Return the slope of the curves under static loads at slips [static loads/rad], (n, 2).
@@ -216,7 +228,8 @@ class AxleModel(TireModel):
     @property
     def effective_calibration(self) -> BandCalibration:
         """Calibration of the band; where there is none, of the declared errors."""
-        return self.calibration or BandCalibration.declared(self.reference_speed)
+        brisk = brisk_speed(self.vehicle, self.min_speed)
+        return self.calibration or BandCalibration.declared(brisk)
 
     @property
     def guarantee(self) -> Guarantee | None:
@@ -318,11 +331,6 @@ class AxleModel(TireModel):
             more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
             lines.append(Fact(f"more of all forces at {DOWNFORCE_SPEED:g} m/s", more, "%"))
         return tuple(lines)
-
-    @property
-    def scales_with_load(self) -> bool:
-        """Whether forces are in static axle loads, so that another car's model scales to a car."""
-        return True
 
     def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
@@ -445,7 +453,7 @@ class AxleModel(TireModel):
             "ladder": list(self.ladder),
             "edges": list(EDGES),
             **{name: getattr(self, name).tolist() for name in ARRAYS},
-            "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
+            "cornering_stiffness_N_rad": self.stiffness.tolist(),
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
             **({} if self.calibration is None else {"band": self.calibration.to_dict()}),

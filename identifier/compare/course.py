@@ -98,7 +98,7 @@ class Course:
 
     def replays(self, model: TireModel) -> dict[str, AxleRmse]:
         """Return by recording the error of a frozen model."""
-        return {rec.name: self.error(rec, model.axle_force(rec)) for rec in self.recordings}
+        return {rec.name: self.error(rec, model.predict(rec)) for rec in self.recordings}
 
     def share(self, name: str, error: AxleRmse) -> float:
         """Return an error as a share of the true force, both axles together [%].

@@ -43,10 +43,12 @@ from identifier.tire_model import (
     RELAXATION,
     STIFFNESS,
     Axle,
+    Drives,
     Estimate,
     Fact,
     Reached,
     TireModel,
+    brisk_speed,
 )
 from models.recordings import Recording
 from models.rules import require_positive
@@ -101,6 +103,7 @@ class FittedModel(TireModel):
     """
 
     kind = "fit"
+    scales_with_load = True
 
     vehicle: Vehicle
     p: Array
@@ -172,15 +175,9 @@ class FittedModel(TireModel):
             J.append(values[2].T)
         return np.column_stack(phi), np.column_stack(slope), np.array(J)
 
-    def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles under static loads, (k, 2) [N].
-
-        Parameters
-        ----------
-        alpha : [rad], (k,).
-        """
+    def _steady(self, alpha: Array, v_x: float) -> Array:
         phi, _, _ = self.curve_at(np.column_stack([alpha, alpha]))
-        return phi * self._loads
+        return phi * self._loads * self.vehicle.load_ratio(v_x)
 
     def force(  # type: ignore[override]
         self,
@@ -201,7 +198,7 @@ class FittedModel(TireModel):
         found = np.asarray(TireModel.force(self, alpha, axle, v_x=v_x))
         if a_x is None:
             return found if found.ndim else float(found)
-        speed = self.curve_speed if v_x is None else v_x
+        speed = self._curve_speed if v_x is None else v_x
         coasting = -self.vehicle.drag * speed**2
         moving, plain = self.ratio(np.full(2, speed), np.array([a_x, coasting]))
         ratio = moving / plain
@@ -226,11 +223,6 @@ class FittedModel(TireModel):
         left = np.sqrt(np.maximum(1.0 - use**2, LEAST_GRIP))
         product: Array = np.maximum(load, LIGHTEST) * left
         return product
-
-    @property
-    def curve_speed(self) -> float:
-        """Speed [m/s] of curves that are asked for without one: with downforce 0, static loads."""
-        return 0.0 if self.vehicle.has_downforce else self.reference_speed
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
         """Return the steady axle forces (2,) [N] as a CasADi expression."""
@@ -286,7 +278,7 @@ class FittedModel(TireModel):
 
     # Over a drive.
 
-    def axle_force(self, recording: Recording) -> Array:
+    def predict(self, recording: Recording) -> Array:
         """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
 
         Signals go through a zero-phase mean of 0.07 s (`estimate.drive`); where the car is slower
@@ -338,25 +330,17 @@ class FittedModel(TireModel):
         return self.curve_at(slip)[1]
 
     @property
-    def known_speeds(self) -> Array:
-        """Least and largest speed [m/s] of the drives that taught, (2,)."""
-        return self.speeds
+    def drives(self) -> Drives:
+        """What the drives that taught it were, and what they had beside its tires."""
+        return Drives(
+            speeds=self.speeds,
+            lengthwise=(self.p, self.covariance),
+            elsewhere=tuple((one.begin, one.end) for one in self.segments),
+            notes=self._notes(),
+            at_bounds=self._at_bounds(),
+        )
 
-    @property
-    def lengthwise(self) -> tuple[Array, Array]:
-        """Its parameters (p,) and their covariance (p, p)."""
-        return self.p, self.covariance
-
-    def road_differs(self, t: Array) -> NDArray[np.bool_]:
-        """Return at which times [s] of the drive that taught the road was another one, (n,)."""
-        found = np.zeros(t.shape, dtype=bool)
-        for one in self.segments:
-            found |= (t >= one.begin) & (t <= one.end)
-        return found
-
-    @property
-    def notes(self) -> tuple[tuple[str, str], ...]:
-        """What the drives that taught showed beside the tires: code and one line of each."""
+    def _notes(self) -> tuple[tuple[str, str], ...]:
         listed = [
             (
                 "another_road",
@@ -394,7 +378,7 @@ class FittedModel(TireModel):
             )
         return tuple(listed)
 
-    def at_bounds(self) -> tuple[Reached, ...]:
+    def _at_bounds(self) -> tuple[Reached, ...]:
         """Return the numbers of the tires that rest at the bounds of what tires have."""
         priors, listed = Priors.of(self.vehicle), []
         for i, axle in enumerate(AXLES):
@@ -432,7 +416,7 @@ class FittedModel(TireModel):
     # What it says of itself.
 
     @property
-    def cornering_stiffness(self) -> Array:
+    def stiffness(self) -> Array:
         """Slope of the force curves at zero, under static loads [N/rad], (2,)."""
         _, slope, _ = self.curve_at(np.zeros((1, 2)))
         stiffness: Array = slope[0] * self._loads
@@ -442,7 +426,7 @@ class FittedModel(TireModel):
     def relaxation_length(self) -> Array:
         """Lag of slip at small slip, under static loads [m], (2,); it goes with the slope."""
         give = np.array([self["compliance_f"], self["compliance_r"]])
-        stiff = np.maximum(self.cornering_stiffness / self._loads, 0.0)
+        stiff = np.maximum(self.stiffness / self._loads, 0.0)
         length: Array = give * stiff + SHORTEST * self.vehicle.wheelbase
         return length
 
@@ -509,11 +493,6 @@ class FittedModel(TireModel):
         return tuple(lines)
 
     # Another car, another road, another form.
-
-    @property
-    def scales_with_load(self) -> bool:
-        """Whether forces are in static axle loads, so that another car's model scales to a car."""
-        return True
 
     def mounted_on(self, vehicle: Vehicle) -> "FittedModel":
         """Return the tires on another car, their forces scaled by its static axle loads."""
@@ -639,7 +618,7 @@ class FittedModel(TireModel):
             **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
             **({"parted_rad": self.parted} if self.parted else {}),
             **({"a_y_late_s": self.a_y_late} if self.a_y_late else {}),
-            "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
+            "cornering_stiffness_N_rad": self.stiffness.tolist(),
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
         }
@@ -701,7 +680,7 @@ class FittedBand(Band[FittedModel]):
     @property
     def speed(self) -> float:
         """Speed [m/s] at which it is given where none is asked for."""
-        return self.model.reference_speed
+        return brisk_speed(self.model.vehicle, self.model.min_speed)
 
     @property
     def load_doubt(self) -> Array:

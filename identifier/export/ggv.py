@@ -20,7 +20,7 @@ from codegen.escape import visible
 from identifier.band import LEVEL, Band, normal_quantile
 from identifier.estimate.priors import Priors
 from identifier.motion.parameters import INDEX
-from identifier.tire_model import AXLES, TireModel, require_band
+from identifier.tire_model import AXLES, TireModel, brisk_speed, require_band
 from models.vehicle import GRAVITY, LIGHTEST
 
 SPEEDS, PUSHES, SLIPS = 13, 200, 200  # of the table, of a diagram, of a curve
@@ -42,20 +42,15 @@ def limits(model: TireModel) -> Limits:
     Load transfer and ellipse of a model that has none are what is believed of its car. A model
     that cannot tell how sure it is, or is sure at no slip of an axle, is refused.
     """
-    band, car, known, own = (
-        require_band(model),
-        model.vehicle,
-        model.known_slip,
-        model.lengthwise,
-    )
+    band, car, known, drives = require_band(model), model.vehicle, model.known_slip, model.drives
     assert known is not None
     grip = np.array([_lowest_grip(band, i, float(known[i])) for i in range(2)])
     priors, index = Priors.of(car), [INDEX[name] for name in NUMBERS]
-    mean, covariance = (priors.mean, priors.covariance) if own is None else own
+    mean, covariance = drives.lengthwise or (priors.mean, priors.covariance)
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     ends = (mean + normal_quantile(LEVEL) * sd)[index]
     transfer = ends[0] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
-    top = model.reference_speed if model.known_speeds is None else float(model.known_speeds[1])
+    top = brisk_speed(car, model.min_speed) if drives.speeds is None else float(drives.speeds[1])
     v_x = np.linspace(0.0, top, SPEEDS)
     pressed = car.load_ratio(v_x)
     a_y = (grip * pressed).min(axis=1)
@@ -70,7 +65,7 @@ def _lowest_grip(band: Band[Any], i: int, known: float) -> float:
     """Return the largest force of the lower end of an axle's band, in static loads."""
     alpha = np.linspace(0.0, known, SLIPS + 1)[1:]
     half, model = band.half(alpha), band.model
-    low = float((model.force_at(alpha) - half)[:, i].max())
+    low = float((model.force(alpha) - half)[:, i].max())
     if known <= 0.0 or low <= 0.0:
         raise ValueError(f"the force of the {AXLES[i]} axle is not known at any slip: drive harder")
     return low / model.vehicle.axle_loads[i]

@@ -310,7 +310,7 @@ def test_every_axle_has_its_own_curves_in_the_slip_figure() -> None:
             -np.arctan((recording.v_y - 1.5 * recording.r) / recording.v_x),
         ]
     )
-    frozen = model.axle_force(recording)
+    frozen = model.predict(recording)
     assert recording.axle_force is not None
     for axle, axes in enumerate(figure.axes[:2]):
         drawn = {
@@ -519,7 +519,7 @@ def test_below_the_curve_stands_what_the_model_misses_of_the_truth() -> None:
     model = unlike_axles()
     figure = slip_figure(model, history.recording)
     assert history.recording.axle_force is not None
-    missed = (model.axle_force(history.recording) - history.recording.axle_force) / 1e3
+    missed = (model.predict(history.recording) - history.recording.axle_force) / 1e3
     for axle, axes in enumerate(figure.axes[2:]):
         _, cloud = axes.lines
         above = figure.axes[axle].lines[0]

@@ -48,7 +48,7 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         )
     if not (recording.v_x >= model.min_speed).any():
         raise ValueError(f"{recording.name}: v_x never reaches {model.min_speed:g} m/s")
-    vehicle, force = model.vehicle, model.axle_force(recording)
+    vehicle, force = model.vehicle, model.predict(recording)
     known, color, label = recording.axle_force, style.BLACK, "truth"
     if known is None and online is not None:
         known, color, label = online.axle_force, style.BLUE, "online"

@@ -27,22 +27,22 @@ def test_told_another_stiffness_it_reads_off_the_true_one(car, drive):
     told = replace(car, cornering_stiffness_front=0.7e5, cornering_stiffness_rear=1.8e5)
     model = learnt(drive(amplitude=0.04), told).freeze(15.0)
     true = np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear])
-    np.testing.assert_allclose(model.cornering_stiffness, true, rtol=0.08)
+    np.testing.assert_allclose(model.stiffness, true, rtol=0.08)
     alpha = np.array([-0.04, -0.01, 0.01, 0.04])
     expected = np.column_stack(
         [5000 * np.tanh(1.4e5 * alpha / 5000), 4500 * np.tanh(1.2e5 * alpha / 4500)]
     )
-    curve = learnt(drive(amplitude=0.06), told).freeze(15.0).force_at(alpha)
+    curve = learnt(drive(amplitude=0.06), told).freeze(15.0).force(alpha)
     np.testing.assert_allclose(curve, expected, atol=200.0)
     assert (model.relaxation_length < 0.15).all()  # the drive's tires have no lag
     early = learnt(drive(n=100, amplitude=0.0), told).freeze(0.0)
-    assert (np.abs(early.cornering_stiffness / true - 1) > 0.25).all()
+    assert (np.abs(early.stiffness / true - 1) > 0.25).all()
 
 
 def test_frozen_weights_repeat_the_drive_and_another(car, drive):
     model = learnt(drive(amplitude=0.08), car).freeze(15.0)
     for recording in (drive(amplitude=0.08), drive(amplitude=0.04, speed=25.0)):
-        assert (error(model.axle_force(recording), recording) < 0.05).all()
+        assert (error(model.predict(recording), recording) < 0.05).all()
 
 
 def test_frozen_and_online_forces_are_one_where_nothing_is_learnt(car, drive):
@@ -51,7 +51,7 @@ def test_frozen_and_online_forces_are_one_where_nothing_is_learnt(car, drive):
     recording = drive(n=400)
     history = identify(recording, car, never)
     np.testing.assert_allclose(
-        history.freeze(0.0).axle_force(recording), history.axle_force, rtol=1e-12, atol=1e-9
+        history.freeze(0.0).predict(recording), history.axle_force, rtol=1e-12, atol=1e-9
     )
 
 
@@ -109,7 +109,7 @@ def test_slip_is_known_up_to_where_a_quarter_of_the_doubt_is_left(car):
 
 def test_far_outside_it_saturates(car, drive):
     model = learnt(drive(amplitude=0.02), car).freeze(15.0)
-    far = np.abs(model.force_at(np.linspace(-1.5, 1.5, 61)))
+    far = np.abs(model.force(np.linspace(-1.5, 1.5, 61)))
     assert (far <= 1.5 * np.array(car.axle_loads) + 1e-6).all()
     np.testing.assert_allclose(far[0], far[1], rtol=0.01)
 
@@ -125,8 +125,8 @@ def test_learning_goes_on_from_stored_weights(car, drive, tmp_path):
     np.testing.assert_array_equal(again.state["W"][0], model.W)
     assert (error(again.axle_force, second) < 0.5 * error(afresh.axle_force, second)).all()
     np.testing.assert_allclose(
-        again.freeze(15.0).force_at(np.array([0.05])),
-        learnt(whole, car).freeze(15.0).force_at(np.array([0.05])),
+        again.freeze(15.0).force(np.array([0.05])),
+        learnt(whole, car).freeze(15.0).force(np.array([0.05])),
         rtol=0.03,
     )
 
@@ -146,7 +146,7 @@ def test_a_model_survives_its_file_bit_for_bit(car, drive, tmp_path):
     model.save(tmp_path / "weights.json")
     read = load_model(tmp_path / "weights.json")
     assert read.to_dict() == model.to_dict()
-    np.testing.assert_array_equal(read.axle_force(recording), model.axle_force(recording))
+    np.testing.assert_array_equal(read.predict(recording), model.predict(recording))
     earlier = {key: one for key, one in model.to_dict().items() if key not in BESIDE}
     earlier["own"] = np.column_stack([model.compliance, model.sway_share, model.offset]).tolist()
     assert AxleModel.from_dict(earlier, "earlier").to_dict() == model.to_dict()
@@ -226,10 +226,10 @@ def test_curves_may_be_kept_from_falling_before_a_slip(car, drive):
         W = history.state["W"][1:]
         slope = (W / (scales * np.cosh(until / scales) ** 2)).sum(axis=2)
         lowest.append(slope.min())
-        assert (error(history.freeze(15.0).axle_force(recording), recording) < 0.05).all()
+        assert (error(history.freeze(15.0).predict(recording), recording) < 0.05).all()
     assert lowest[0] < -0.01
     assert lowest[1] > -1e-9
     grid = np.linspace(0.0, until, 81)
-    assert (np.diff(history.freeze(15.0).force_at(grid), axis=0) > -1.0).all()
+    assert (np.diff(history.freeze(15.0).force(grid), axis=0) > -1.0).all()
     with pytest.raises(ValueError, match="rising_until must not be negative"):
         replace(free, rising_until=-0.1)

@@ -32,7 +32,7 @@ def learnt(recording, car, start=None):
 
 def miss(model, recording, where=slice(None)):
     """Error over the size of the true force, per axle."""
-    error = (model.axle_force(recording) - recording.axle_force)[where]
+    error = (model.predict(recording) - recording.axle_force)[where]
     return rms(error) / rms(recording.axle_force[where])
 
 
@@ -88,7 +88,7 @@ def test_on_a_real_small_car_it_transfers_better_than_a_linear_tire(shared_data)
         for other in drives:
             if other is not trained:
                 moving = other.v_x > 0.8
-                error = (model.axle_force(other) - other.axle_force)[moving]
+                error = (model.predict(other) - other.axle_force)[moving]
                 misses.append(np.sqrt(np.sum(error**2) / np.sum(other.axle_force[moving] ** 2)))
     assert np.mean(misses) < 0.21
     assert max(misses) < 0.30
@@ -99,7 +99,7 @@ def test_on_the_plant_it_repeats_the_slalom_and_knows_other_maneuvers(sensors, l
     plant, rng = Plant(sedan()), np.random.default_rng(11)
     slalom = plant.simulate(WEAVE, speed=20.0).recording(sensors, rng)
     model = learnt(slalom, sedan())
-    assert (rms(model.axle_force(slalom) - slalom.axle_force) < limit).all()
+    assert (rms(model.predict(slalom) - slalom.axle_force) < limit).all()
     for maneuver, speed in (
         (
             StepSteer(amplitude=np.radians(4.0), onset=1.0, rate_limit=1.0, duration=8.0),
@@ -119,7 +119,7 @@ def test_on_the_plant_it_repeats_the_slalom_and_knows_other_maneuvers(sensors, l
         (replace(WEAVE, amplitude=np.radians(2.5), duration=15.0), 25.0),
     ):
         other = plant.simulate(maneuver, speed=speed).recording(sensors, rng)
-        assert (rms(model.axle_force(other) - other.axle_force) < 150.0).all()
+        assert (rms(model.predict(other) - other.axle_force) < 150.0).all()
 
 
 def test_a_change_of_friction_is_followed_within_two_seconds_both_ways():
@@ -140,9 +140,9 @@ def test_a_change_of_friction_is_followed_within_two_seconds_both_ways():
         assert (rms(error[later]) < 0.07 * rms(size[later])).all()
     before, after = history.freeze(13.9), history.freeze(41.9)
     slips = np.array([0.01, 0.03, 0.06])
-    ratio = after.force_at(slips) / before.force_at(slips)
+    ratio = after.force(slips) / before.force(slips)
     np.testing.assert_allclose(ratio, 1.0, atol=0.12)
-    slid = history.freeze(27.9).force_at(slips) / before.force_at(slips)
+    slid = history.freeze(27.9).force(slips) / before.force(slips)
     tire, loads = Plant(sedan()).tire, np.array(sedan().axle_loads) / 2
     icy, dry = (
         np.array([[float(tire.forces(a, 0.0, 0.0, F, mu=mu).F_y) for F in loads] for a in slips])

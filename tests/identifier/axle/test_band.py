@@ -60,7 +60,7 @@ def coverage(model, recording, level=0.9):
     """Share of samples whose true force lies in the band around the replayed one (2,)."""
     slip, loads = model.lagged_slip(recording), recording.axle_force
     half = np.column_stack([model.band.half(slip[:, i], level)[:, i] for i in range(2)])
-    inside = np.abs(model.axle_force(recording) - loads) <= half
+    inside = np.abs(model.predict(recording) - loads) <= half
     return inside[recording.t > 1.5].mean(axis=0)
 
 
@@ -121,7 +121,7 @@ def test_where_nobody_was_the_band_is_the_priors(swinging, model):
     narrowed = replace(
         new,
         calibration=replace(
-            BandCalibration.declared(new.reference_speed),
+            BandCalibration.declared(new.band.speed),
             factors=np.full((2, 6), 0.1),
             color=np.full(2, 9.0),
         ),
@@ -174,7 +174,7 @@ def test_a_band_over_a_drive_holds_with_noise_in_it(model, swinging):
     """That of slip alone does not: a force is wrong by its slip, too."""
     drive, rng = swinging[1][2], np.random.default_rng(9)
     noisy = replace(drive, v_y=drive.v_y + 0.15 * rng.standard_normal(len(drive)))
-    away = np.abs(model.axle_force(noisy) - drive.axle_force)[drive.t > 1.5]
+    away = np.abs(model.predict(noisy) - drive.axle_force)[drive.t > 1.5]
     slip = model.lagged_slip(noisy)
     curve = model.band.along(slip, noisy.v_x)
     over = model.band.over(noisy)
@@ -194,8 +194,8 @@ def test_on_another_road_the_band_opens_by_what_friction_may_do(model):
     np.testing.assert_allclose(open_.band.half(near), model.band.half(near), rtol=0.1)
     for mu in (0.75, 1.3):
         alpha = np.linspace(0.04, 0.15, 20)
-        truth = mu * model.force_at(alpha / mu)
-        assert (np.abs(truth - model.force_at(alpha)) <= open_.band.half(alpha)).all()
+        truth = mu * model.force(alpha / mu)
+        assert (np.abs(truth - model.force(alpha)) <= open_.band.half(alpha)).all()
     for sd in (-0.1, np.nan):
         with pytest.raises(ValueError, match="sd_friction must be finite, not negative"):
             model.band.on_another_road(sd)
@@ -301,15 +301,15 @@ def test_the_variance_is_that_of_the_force_by_its_slope_over_what_was_learnt(mod
             W = [model.W.copy(), model.W.copy()]
             W[0][axle, j] += step
             W[1][axle, j] -= step
-            up, down = (replace(model, W=w).force_at(np.array([x]))[0, axle] for w in W)
+            up, down = (replace(model, W=w).force(np.array([x]))[0, axle] for w in W)
             slope.append((up - down) / (2.0 * step))
-        up, down = (model.force_at(np.array([x + d]))[0, axle] for d in (step, -step))
+        up, down = (model.force(np.array([x + d]))[0, axle] for d in (step, -step))
         slope += [0.0, 0.0, (up - down) / (2.0 * step) / (1.0, v_x)[axle]]
         h = np.array(slope) / model.vehicle.axle_loads[axle]
         told = replace(model, calibration=None)
         spread = told.band.spread(np.full((1, 2), x), np.array([v_x]), np.ones((1, 2)))
-        phi = model.force_at(np.array([x]))[0, axle] / model.vehicle.axle_loads[axle]
-        stretch = np.clip(told.reference_speed / v_x, 0.5, 2.0)
+        phi = model.force(np.array([x]))[0, axle] / model.vehicle.axle_loads[axle]
+        stretch = np.clip(told.band.speed / v_x, 0.5, 2.0)
         m2 = ((0.04 * phi) ** 2 + 0.01**2) * stretch**2
         total = float((spread.scaled + spread.fixed)[0, axle])
         assert total == pytest.approx(m2 + h @ model.covariance[axle] @ h, rel=1e-5)

@@ -133,7 +133,7 @@ def test_what_is_declared_holds_after_every_sample(fault, speed, car, drive):
     history = identify(spoilt(drive(speed=speed, amplitude=0.07), fault), car, design)
     assert history.diverged_at is None
     assert broken(design, car, history.state) == set()
-    assert history.freeze(1e9).cornering_stiffness.min() >= 0.0
+    assert history.freeze(1e9).stiffness.min() >= 0.0
 
 
 @pytest.mark.parametrize("dt", [0.2, 0.3, 0.5])

@@ -76,7 +76,7 @@ def learnt(recording, car):
 
 def missed(model, recording):
     force = recording.axle_force
-    return np.sqrt(np.mean((model.axle_force(recording) - force) ** 2, axis=0)) / np.sqrt(
+    return np.sqrt(np.mean((model.predict(recording) - force) ** 2, axis=0)) / np.sqrt(
         np.mean(force**2, axis=0)
     )
 
@@ -97,13 +97,13 @@ def a_model(run):
 
 
 def test_the_told_area_leaves_the_static_curve_to_learn(model, drive):
-    np.testing.assert_allclose(model.force_at(SLIPS), static(SLIPS), rtol=0.04)
+    np.testing.assert_allclose(model.force(SLIPS), static(SLIPS), rtol=0.04)
     np.testing.assert_allclose(model.stiffness, STIFF, rtol=0.08)
     assert (missed(model, drive) < 0.03).all()
     assert (missed(model, race(phase=2.0)) < 0.03).all()
     untold = learnt(drive, UNTOLD).freeze()
     assert (missed(untold, drive) > 0.1).all()
-    assert (np.abs(untold.force_at(SLIPS) / static(SLIPS) - 1.0).max(axis=0) > 0.15).all()
+    assert (np.abs(untold.force(SLIPS) / static(SLIPS) - 1.0).max(axis=0) > 0.15).all()
 
 
 def test_the_step_repeats_the_equations_by_hand(drive):
@@ -136,9 +136,9 @@ def test_a_car_without_has_the_functions_that_there_were():
 def test_curves_with_a_speed_are_those_of_its_load(model):
     for speed in (15.0, 40.0, 70.0):
         curve = model.force(SLIPS, v_x=speed)
-        np.testing.assert_allclose(curve, model.force_at(SLIPS) * pressed(speed), rtol=1e-9)
-    np.testing.assert_allclose(model.force(SLIPS), model.force_at(SLIPS), rtol=1e-9)
-    assert model.force(0.03, "rear") == pytest.approx(model.force_at(np.array([0.03]))[0, 1])
+        np.testing.assert_allclose(curve, model.force(SLIPS) * pressed(speed), rtol=1e-9)
+    np.testing.assert_allclose(model.force(SLIPS), model.force(SLIPS), rtol=1e-9)
+    assert model.force(0.03, "rear") == pytest.approx(model.force(np.array([0.03]))[0, 1])
     assert "30 m/s" in model.summary()
     assert "30 m/s" not in replace(model, vehicle=UNTOLD, guarantee=None).summary()
 
@@ -148,7 +148,7 @@ def test_motion_and_lag_are_those_of_the_replay(model, drive):
     soft = replace(
         model, compliance=np.array([0.02, 0.03]), sway_share=np.zeros(2), offset=np.zeros(2)
     )
-    force, slip = soft.axle_force(drive), soft.lagged_slip(drive)
+    force, slip = soft.predict(drive), soft.lagged_slip(drive)
     dynamics = ca.Function("rate", *_slip_rate(soft))
     begin, before, after = ca.SX.sym("x", 2), ca.SX.sym("before", 4), ca.SX.sym("after", 4)
     x = begin
@@ -177,7 +177,7 @@ def _slip_rate(model):
 def test_bands_hold_at_every_speed(run, drive):
     model, other = calibrated(run), race(phase=2.0)
     half = model.band.over(other)
-    inside = np.abs(model.axle_force(other) - other.axle_force) <= half
+    inside = np.abs(model.predict(other) - other.axle_force) <= half
     fast = other.v_x > 45.0
     assert (inside[fast].mean(axis=0) > 0.85).all() and (inside[~fast].mean(axis=0) > 0.85).all()
     # The factors of a band are of ranges of speed: those of one range are compared.
@@ -211,7 +211,7 @@ def test_a_file_keeps_the_downforce_and_one_without_has_no_word_of_it(model, tmp
     model.save(tmp_path / "racer.json")
     again = load_model(tmp_path / "racer.json")
     assert again.vehicle.downforce == RACER.downforce
-    np.testing.assert_array_equal(again.axle_force(drive), model.axle_force(drive))
+    np.testing.assert_array_equal(again.predict(drive), model.predict(drive))
     assert "downforce" not in str(replace(model, vehicle=UNTOLD, guarantee=None).to_dict())
 
 

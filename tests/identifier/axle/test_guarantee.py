@@ -154,7 +154,7 @@ def test_forces_of_drives_that_were_not_seen_are_inside(model):
         assert ((low <= drive.axle_force) & (drive.axle_force <= high))[late].all()
         t, broken = contradictions(model, drive)
         assert len(t) > 100 and not broken.any()
-        away = np.abs(model.axle_force(drive) - drive.axle_force)[late].max(axis=0)
+        away = np.abs(model.predict(drive) - drive.axle_force)[late].max(axis=0)
         assert (0.5 * (high - low)[late].mean(axis=0) < 5.0 * away).all()
 
 
@@ -305,7 +305,7 @@ def test_what_the_car_drives_or_brakes_with_may_be_missing_sideways(model):
     before, late = (drive.t > 2.0) & (drive.t < 8.0), drive.t > 10.0
     loads, carried = (
         np.array(model.vehicle.axle_loads),
-        model.force_at(model.driven_slip).diagonal(),
+        model.force(model.driven_slip).diagonal(),
     )
     expected = 1.0 - np.sqrt(1.0 - (2.0 * model.vehicle.mass / carried) ** 2)
     np.testing.assert_allclose(doubt.lost[late].mean(axis=0), expected, rtol=0.25)

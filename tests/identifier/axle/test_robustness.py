@@ -69,7 +69,7 @@ def test_everything_stays_finite_and_bounded(fault, car, drive, rng):
     model = history.freeze(1e9)
     for P in model.covariance:
         assert np.linalg.eigvalsh(P).min() > 0.0
-    assert np.isfinite(model.axle_force(recording)).all()
+    assert np.isfinite(model.predict(recording)).all()
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_what_was_learnt_survives_faults(fault, car, drive, rng):
     """The frozen model of the faulty drive, on a faultless one, is nearly as good as without."""
     clean = drive(amplitude=0.08)
     model = identify(faulty(clean, fault, rng), car, AxleIdentifier.for_vehicle(car)).freeze(1e9)
-    miss = model.axle_force(clean) - clean.axle_force
+    miss = model.predict(clean) - clean.axle_force
     assert np.sqrt(np.mean(miss**2)) < 0.05 * np.sqrt(np.mean(clean.axle_force**2))
 
 
@@ -94,7 +94,7 @@ def test_faults_that_are_believed_would_spoil_it(car, drive, rng):
     for method in (design, credulous):
         history = identify(recording, car, method)
         assert np.isfinite(history.axle_force).all()
-        force = history.freeze(1e9).axle_force(clean)
+        force = history.freeze(1e9).predict(clean)
         misses.append(np.sqrt(np.mean((force - clean.axle_force) ** 2)))
     assert misses[1] > 2 * misses[0]
 
@@ -139,6 +139,6 @@ def test_a_slow_sensor_in_a_fast_log_is_learnt_from(hold, car, drive):
     for one in (recording, slow):
         history = identify(one, car, design)
         assert history.state["excitation"][-1, :, 1].min() > 2.0  # seconds of learning
-        force = history.freeze(15.0).axle_force(recording)
+        force = history.freeze(15.0).predict(recording)
         errors.append(np.sqrt(np.mean((force - recording.axle_force) ** 2)))
     assert errors[1] < errors[0] + 0.06 * np.sqrt(np.mean(recording.axle_force**2))

@@ -371,7 +371,7 @@ def test_what_is_learnt_does_not_depend_on_the_rate(car, drive):
     slips = np.array([0.01, 0.03, 0.05])
     sds = [model.band.relative_sd(slips) for model in models]
     np.testing.assert_allclose(sds[0], sds[1], rtol=0.15)
-    curves = [model.force_at(slips) for model in models]
+    curves = [model.force(slips) for model in models]
     np.testing.assert_allclose(curves[0], curves[1], rtol=0.03)
     np.testing.assert_allclose(models[0].excitation, models[1].excitation, rtol=0.1, atol=0.1)
 
@@ -431,8 +431,8 @@ def test_errors_of_sensors_that_are_known_are_taken_out(car, drive):
     assert np.abs(wrong.axle_force - right.axle_force).max() > 0.05 * size
     model = history.freeze(1e9)
     assert model.sensors == known.sensors
-    again = AxleModel.from_dict(model.to_dict(), "model").axle_force(seen)
-    frozen = right.freeze(1e9).axle_force(recording)
+    again = AxleModel.from_dict(model.to_dict(), "model").predict(seen)
+    frozen = right.freeze(1e9).predict(recording)
     np.testing.assert_allclose(again, frozen, rtol=0, atol=1e-5 * size)
 
 

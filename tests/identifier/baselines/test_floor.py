@@ -40,7 +40,7 @@ def test_planted_lag_and_offsets_are_found_too(car, drive, rng):
         offset=np.array([0.003, -0.05]),
     )
     recording = drive(n=600)
-    recording = replace(recording, axle_force=true.axle_force(recording))
+    recording = replace(recording, axle_force=true.predict(recording))
     model = fit_floor(curve_structure(magic_formula_ekf(car), car), [recording], rng=rng, starts=1)
     np.testing.assert_allclose(model.relaxation_length, true.relaxation_length, rtol=1e-2)
     np.testing.assert_allclose(model.offset, true.offset, rtol=2e-2)
@@ -75,7 +75,7 @@ def test_the_same_seed_gives_the_same_floor(car, drive):
         fit_floor(structure, [recording], rng=np.random.default_rng(seed), starts=1, steps=5)
         for seed in (1, 1, 2)
     ]
-    forces = [model.axle_force(recording) for model in fits]
+    forces = [model.predict(recording) for model in fits]
     np.testing.assert_array_equal(forces[0], forces[1])
     assert np.abs(forces[0] - forces[2]).max() > 0.0
 

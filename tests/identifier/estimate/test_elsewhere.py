@@ -66,7 +66,7 @@ def off(model, ladder=None):
     """Largest difference of the projected curves on the identified range [static loads], (2,)."""
     units = model.in_units(ladder)
     slips = np.linspace(-1.0, 1.0, 201)[:, None] * model.known_slip
-    each = [model.force_at(x)[:, i] - units.force_at(x)[:, i] for i, x in enumerate(slips.T)]
+    each = [model.force(x)[:, i] - units.force(x)[:, i] for i, x in enumerate(slips.T)]
     return np.abs(each).max(axis=1) / CAR.axle_loads
 
 
@@ -167,7 +167,7 @@ def test_a_network_file_tells_curves_and_band_of_a_fit(fitted):
     alpha = np.linspace(-0.1, 0.1, 21)
     out = session.run(None, {"alpha_f": alpha[:, None], "alpha_r": alpha[:, None]})
     loads = np.array(CAR.axle_loads)
-    assert (np.abs(np.hstack(out[:2]) - fitted.force_at(alpha)) < 0.01 * loads).all()
+    assert (np.abs(np.hstack(out[:2]) - fitted.force(alpha)) < 0.01 * loads).all()
     band = fitted.band.half(alpha, v_x=float(fitted.speeds.mean()))
     np.testing.assert_allclose(np.hstack(out[2:]), band, rtol=0.02, atol=0.001 * loads.min())
 

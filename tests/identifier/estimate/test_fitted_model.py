@@ -19,7 +19,7 @@ def test_a_saved_model_is_the_same(learnt, tmp_path):
     assert isinstance(loaded, FittedModel)
     assert loaded.to_dict() == model.to_dict()
     drive = driven(5)
-    np.testing.assert_array_equal(loaded.axle_force(drive), model.axle_force(drive))
+    np.testing.assert_array_equal(loaded.predict(drive), model.predict(drive))
     np.testing.assert_array_equal(loaded.band.over(drive), model.band.over(drive))
 
 
@@ -75,7 +75,7 @@ def test_its_units_are_within_a_percent_of_the_static_load_where_it_is_identifie
     for i, known in enumerate(model.known_slip):
         assert known > 0.04
         slip = np.linspace(-known, known, 101)
-        away = np.abs(units.force_at(slip) - model.force_at(slip))[:, i]
+        away = np.abs(units.force(slip) - model.force(slip))[:, i]
         assert away.max() < 0.01 * model.vehicle.axle_loads[i]
 
 
@@ -85,7 +85,7 @@ def test_sample_by_sample_it_says_what_it_says_of_the_drive(learnt):
     run = model.setup(drive.dt).run(drive, tuple(blocks(len(drive))), ports=("axle_force",))
     step = np.concatenate([block.outputs["axle_force"] for block in run])
     size = np.sqrt(np.mean(drive.axle_force**2, axis=0))
-    away = np.sqrt(np.mean((step - model.axle_force(drive)) ** 2, axis=0))
+    away = np.sqrt(np.mean((step - model.predict(drive)) ** 2, axis=0))
     assert (away < 0.03 * size).all()
 
 
@@ -109,7 +109,7 @@ def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):
     own, other = model.band.half(slip), model.band.on_another_road().band.half(slip)
     np.testing.assert_allclose(other[0], own[0], rtol=0.05)  # the stiffness stays
     assert (other[1] > 2.0 * own[1]).all()
-    np.testing.assert_array_equal(model.band.on_another_road().force_at(slip), model.force_at(slip))
+    np.testing.assert_array_equal(model.band.on_another_road().force(slip), model.force(slip))
     with pytest.raises(ValueError, match="sd_friction"):
         model.band.on_another_road(-0.1)
 
@@ -117,5 +117,5 @@ def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):
 def test_on_half_the_friction_its_stiffness_stays(learnt):
     model, slip = learnt.model, np.array([0.001, 0.02, 0.05])
     half = model.at_friction(0.5)
-    np.testing.assert_allclose(half.force_at(0.5 * slip), 0.5 * model.force_at(slip), rtol=1e-9)
-    np.testing.assert_allclose(half.cornering_stiffness, model.cornering_stiffness, rtol=1e-9)
+    np.testing.assert_allclose(half.force(0.5 * slip), 0.5 * model.force(slip), rtol=1e-9)
+    np.testing.assert_allclose(half.stiffness, model.stiffness, rtol=1e-9)

@@ -152,7 +152,7 @@ def test_onnx_tells_the_band_of_the_model(single, model):
     alpha = np.linspace(-0.4, 0.4, 81)
     column = alpha[:, None].astype(np.float32 if single else np.float64)
     told = session.run(None, {"alpha_f": column, "alpha_r": column})
-    expected = np.column_stack([model.force_at(alpha), model.band.half(alpha)])
+    expected = np.column_stack([model.force(alpha), model.band.half(alpha)])
     np.testing.assert_allclose(np.hstack(told), expected, rtol=2e-4 if single else 1e-9, atol=0.1)
     assert len(runtime.InferenceSession(onnx_bytes(model)).get_outputs()) == 2
     paper = make_method("integral", CAR)

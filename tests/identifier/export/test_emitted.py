@@ -160,7 +160,7 @@ def test_the_diamond_of_planners_lies_within_the_forces_of_the_model(h, braking_
     model = fitted(PRESSED, sd=1e-6, load_transfer=h, **use, **grip)
     found = limits(model)
     low = 1.0 - Z * model.band.load_doubt
-    forces = [model.force_at(np.linspace(0.0, known, 300))[:, i].max()
+    forces = [model.force(np.linspace(0.0, known, 300))[:, i].max()
               for i, known in enumerate(model.known_slip)]  # fmt: skip
     peak = low * forces / PRESSED.axle_loads
     coasting = -PRESSED.drag * found.v_x**2
@@ -298,7 +298,7 @@ def test_the_loader_of_slipx_takes_the_folder(tmp_path):
     slipx_car(tmp_path, model)
     car = slipx.load_car(tmp_path)
     stiffness = [car.params.c_alpha_f, car.params.c_alpha_r]
-    np.testing.assert_allclose(stiffness, model.cornering_stiffness, rtol=0.1)
+    np.testing.assert_allclose(stiffness, model.stiffness, rtol=0.1)
     assert car.params.mass == SMALL.mass and car.params.lr == SMALL.l_r
     for i, tire in enumerate((car.spec.tyre_front, car.spec.tyre_rear)):
         found, load = tire.provenance.residuals, 0.5 * SMALL.axle_loads[i]
@@ -307,7 +307,7 @@ def test_the_loader_of_slipx_takes_the_folder(tmp_path):
         assert 0.0 < found["linear.c_alpha"]["stddev"] < tire.c_alpha
         slip = np.linspace(0.0, 1.0, 30) * model.known_slip[i]
         force = load * _mf_lite(slip, tire.c_alpha / load, tire.mu_y0, **tire.mf_lite)
-        expected = 0.5 * model.force_at(slip)[:, i]
+        expected = 0.5 * model.force(slip)[:, i]
         assert np.abs(force - expected).max() <= 0.02 * expected.max()
     assert "c_kappa" in _refusal(car, slipx.Tier.L2_DoubleTrack)
 

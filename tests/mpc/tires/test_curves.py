@@ -20,7 +20,7 @@ CURVES = {
 def test_forces_are_those_of_the_frozen_curve(car, motions, forces, at, curve):
     model = CurveModel(vehicle=car, curve=curve, parameters=CURVES[curve], min_speed=1.0)
     predicted, _ = forces(prediction_tire(model), *at(motions))
-    expected = model.axle_force(motions)
+    expected = model.predict(motions)
     np.testing.assert_allclose(predicted, expected, rtol=1e-9, atol=1e-6)
     parameters = np.array(CURVES[curve])
     parameters[1, -1] *= 1.02
@@ -64,7 +64,7 @@ def test_offsets_without_a_lag_add_no_states(car, motions, forces, at):
     tire = prediction_tire(model)
     assert not tire.structure.lagged
     force, _ = forces(tire, *at(motions))
-    np.testing.assert_allclose(force, model.axle_force(motions), rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(force, model.predict(motions), rtol=1e-9, atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", [DugoffTire, FialaTire])
