@@ -16,6 +16,7 @@ from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST, Sensors, Sway
 from identifier.band import (
+    LARGEST_SD,
     SD_FRICTION,
     Band,
     BandSpread,
@@ -410,7 +411,10 @@ class FittedModel(TireModel):
 
     @property
     def known_slip(self) -> Array:
-        """Largest slip [rad] that the drives reached and where the doubt is small, (2,)."""
+        """Largest slip [rad] that the drives reached and where the doubt is small, (2,).
+
+        A step steer decides the force at its end better than the slope at zero: the largest counts.
+        """
         return _known_slip(self).copy()
 
     # What it says of itself.
@@ -437,9 +441,12 @@ class FittedModel(TireModel):
         zero = np.zeros((1, 2))
         band = self.band
         stiff = [sd[0] / SMALL for sd in band.of_phi(np.full((1, 2), SMALL))]
-        peak = np.maximum(self.known_slip, 1e-3)[None]
-        top, at_known, _ = self.curve_at(peak)
         _, at_zero, _ = self.curve_at(zero)
+        slip = np.linspace(0.0, WIDEST, 201)
+        slip = np.column_stack([slip, slip])
+        phi = self.curve_at(slip)[0]
+        peak = np.take_along_axis(slip, phi.argmax(axis=0)[None], axis=0)
+        top = phi.max(axis=0)
         wide = band.of_phi(peak)
         listed = []
         for i, (axle, short) in enumerate(zip(AXLES, "fr", strict=True)):
@@ -454,12 +461,10 @@ class FittedModel(TireModel):
                     bool(sd <= DECIDED * stiff[1][i]),
                 )
             )  # fmt: skip
-            bent = bool(at_known[0, i] < 0.4 * C and wide[0][0, i] <= DECIDED * wide[1][0, i])
-            listed.append(
-                Estimate(
-                    GRIP, axle, float(top[0, i]), float(wide[0][0, i]), "static load", None, bent
-                )
-            )
+            sd = float(wide[0][0, i])
+            doubt = math.hypot(sd, top[i] * float(band.load_doubt[i]))
+            reached = bool(sd <= DECIDED * wide[1][0, i])
+            listed.append(Estimate(GRIP, axle, float(top[i]), doubt, "static load", None, reached))
             now, prior = (float(np.sqrt(P[s, s])) for P in (self.covariance, before))
             listed.append(
                 Estimate(RELAXATION, axle, lag, C * now, "m", None, now <= DECIDED * prior)
@@ -793,7 +798,11 @@ def _curve_expression(slip: Any, numbers: Array) -> tuple[Any, Any]:
 @lru_cache(maxsize=4)
 def _known_slip(model: FittedModel) -> Array:
     """Return `FittedModel.known_slip`, which a verdict asks for many times."""
-    return model.band.known_slip(model.driven, 100)
+    grid = np.linspace(0.0, 1.0, 101)[1:]
+    sd, prior = model.band.of_phi(np.outer(grid, model.driven))
+    sure = sd <= LARGEST_SD * np.maximum(prior, 1e-12)
+    known: Array = model.driven * np.max(grid[:, None] * sure, axis=0)
+    return known
 
 
 @lru_cache(maxsize=4)

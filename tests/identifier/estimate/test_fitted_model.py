@@ -8,8 +8,12 @@ import pytest
 from codegen.arrays import blocks
 from identifier.estimate.model import FittedModel
 from identifier.frozen import FrozenModelError
-from identifier.tire_model import load_model
+from identifier.tire_model import GRIP, load_model
+from models.maneuvers import Slalom, StepSteer
+from models.plant import Plant
+from models.vehicle import sedan
 from tests.identifier.estimate.conftest import driven
+from tireid.learning import identify
 
 
 def test_a_saved_model_is_the_same(learnt, tmp_path):
@@ -119,3 +123,25 @@ def test_on_half_the_friction_its_stiffness_stays(learnt):
     half = model.at_friction(0.5)
     np.testing.assert_allclose(half.force(0.5 * slip), 0.5 * model.force(slip), rtol=1e-9)
     np.testing.assert_allclose(half.stiffness, model.stiffness, rtol=1e-9)
+
+
+def test_grip_is_the_top_of_the_curve_and_known_slip_ends_where_a_drive_decides_the_force():
+    """A small slalom, a large one and a step agree on the grip, each within its own doubt."""
+    car, limit = sedan(), np.radians(30.0)
+    plant = Plant(car)
+    steering = [
+        Slalom(
+            amplitude=np.radians(size), frequency=0.5, onset=1.0, rate_limit=limit, duration=20.0
+        )
+        for size in (4.0, 6.0)
+    ]
+    step = StepSteer(amplitude=np.radians(3.0), onset=1.0, rate_limit=limit, duration=10.0)
+    found = []
+    for maneuver in (*steering, step):
+        run = identify(plant.simulate(maneuver, speed=20.0).recording(), car)
+        grip = [one for one in run.tire.estimates() if one.title == GRIP]
+        found.append(([one.value for one in grip], [one.sd for one in grip]))
+        assert (run.tire.known_slip > 0.9 * run.tire.driven).all()
+    values, sd = np.array([value for value, _ in found]), np.array([sd for _, sd in found])
+    assert (np.abs(values - values[1]) < 2.0 * sd).all()
+    assert (sd[:2] < 0.12).all() and (sd[2] > sd[:2]).all()
