@@ -241,8 +241,9 @@ class Band(ABC, Generic[Model]):
         return self._half(slip, v_x, self.model.vehicle.load_ratio(v_x), level)
 
     def _half(self, slip: Array, v_x: Array, pressed: Array, level: float) -> Array:
-        half = self.spread(slip, v_x, pressed).half_width(self.factor(slip, v_x), level)
-        return half * np.array(self.model.vehicle.axle_loads)
+        width = self.spread(slip, v_x, pressed).half_width(self.factor(slip, v_x), level)
+        half: Array = width * np.array(self.model.vehicle.axle_loads)
+        return half
 
     def of_curves(self, recording: Recording, level: float = LEVEL) -> Array:
         """Return half its width at the slip and speed of a drive, (n, 2) [N].

@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, overload
 
 import casadi as ca
 import numpy as np
@@ -168,19 +168,29 @@ class TireModel(ABC):
         """Return the model as plain numbers and words, ready for JSON."""
 
     @classmethod
-    @abstractmethod
-    def from_dict(cls, data: dict[str, Any], source: str) -> "TireModel":
+    def from_dict(cls, data: dict[str, Any], source: str) -> Self:
         """Return the model that `to_dict` describes.
 
         Parameters
         ----------
-        data : as from `to_dict`.
+        source : what the data are from, for an error.
 
         Raises
         ------
         FrozenModelError
             Where a key is missing or a value impossible.
         """
+        try:
+            return cls._read(Table(data, "", FrozenModelError))
+        except KeyError as error:
+            raise FrozenModelError(f"{source}: key {error} is missing") from error
+        except (TypeError, ValueError) as error:
+            raise FrozenModelError(f"{source}: {error}") from error
+
+    @classmethod
+    @abstractmethod
+    def _read(cls, table: Table) -> Self:
+        """Return the model that the table of `to_dict` describes."""
 
     @abstractmethod
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
@@ -228,7 +238,7 @@ class TireModel(ABC):
         )
 
     def at_friction(self, ratio: float) -> "TireModel":
-        """Return the tires on a road of another friction.
+        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ): the stiffness stays.
 
         Parameters
         ----------
@@ -518,7 +528,7 @@ def load_model(path: str | PathLike[str]) -> TireModel:
         dict(table.data), str(path)
     )
     try:
-        require_alive(FrozenModelError, model)
+        require_alive(FrozenModelError, model.force, model.vehicle)
     except FrozenModelError as error:
         raise FrozenModelError(f"{path}: {error}") from None
     return model

@@ -24,6 +24,7 @@ from codegen.arrays import Array
 from identifier.axle.learning import Regression
 from identifier.band import LEVEL, TINY, BandSpread
 from models.recordings import Recording
+from models.schema import Table
 from models.sensors import white_noise
 from models.vehicle import Vehicle
 
@@ -142,20 +143,16 @@ class BandCalibration:
         ValueError
             Where the ranges or the level are others, or a value is impossible.
         """
+        table = Table(data, "", ValueError, "band.")
         for name, ours in (
             ("ranges", list(RANGES)),
             ("speed_ranges", list(SPEEDS)),
             ("level", LEVEL),
         ):
-            if data[name] != ours:
+            if table.value(name) != ours:
                 raise ValueError(f"{name} of the band must be {ours}, they are {data[name]}")
-        factors, speeds, color, noise = (
-            np.array(data[name], dtype=np.float64)
-            for name in ("factors", "speeds", "color", "noise")
-        )
-        return cls(
-            factors=factors, speeds=speeds, color=color, speed=float(data["speed"]), noise=noise
-        )
+        numbers = {name: table.array(name) for name in ("factors", "speeds", "color", "noise")}
+        return cls(**numbers, speed=table.number("speed"))
 
 
 def ranges_of(slip: Array) -> Any:

@@ -2,7 +2,7 @@
 
 from dataclasses import asdict, dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 import casadi as ca
 import numpy as np
@@ -168,7 +168,6 @@ class AxleModel(TireModel):
 
     @property
     def min_speed(self) -> float:
-        """Below this speed [m/s] the forces read zero."""
         return self.plausibility.min_speed
 
     @property
@@ -203,7 +202,6 @@ class AxleModel(TireModel):
 
     @property
     def known_slip(self) -> Array:
-        """Largest slip [rad] that was seen while learning and where the doubt is small, (2,)."""
         grid = np.linspace(0.0, 1.0, 201)[1:]
         known = np.zeros(2)
         for i, largest in enumerate(self.excitation[:, 0]):
@@ -233,7 +231,6 @@ class AxleModel(TireModel):
 
     @property
     def guarantee(self) -> Guarantee | None:
-        """Between which forces the true ones lie, if the bound holds; None where nobody asked."""
         if self.possible is None:
             return None
         at = (self.ladder, self.driven_slip, self._loads, self.min_speed)
@@ -320,7 +317,6 @@ class AxleModel(TireModel):
         return bent
 
     def facts(self) -> tuple[Fact, ...]:
-        """Return what `summary` says beside the estimates."""
         known = self.known_slip
         lines = list(TireModel.facts(self))
         if (known > 0.0).all():
@@ -333,12 +329,10 @@ class AxleModel(TireModel):
         return tuple(lines)
 
     def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
-        """Return the tires on another car, their forces scaled by its static axle loads."""
         # Both were shown of this car alone.
         return replace(self, vehicle=vehicle, possible=None, force_missed=None)
 
     def at_friction(self, ratio: float) -> "AxleModel":
-        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays."""
         require_positive(ValueError, ratio=ratio)
         n = len(self.ladder)
         unit = np.concatenate([np.full(n, ratio), np.ones(3)])
@@ -357,16 +351,9 @@ class AxleModel(TireModel):
 
     @property
     def lagged(self) -> bool:
-        """Whether the force follows a lagged slip, two more states."""
         return True
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression.
-
-        Parameters
-        ----------
-        v_x : longitudinal speed [m/s]; looked at where the car has downforce.
-        """
         at = curve_at_speed(alpha, v_x, self.W, self.ladder, self.vehicle)
         return at.force * ca.DM(self._loads)
 
@@ -411,7 +398,6 @@ class AxleModel(TireModel):
         return self.setup(recording.dt).output(recording, "lagged_slip")
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay needs."""
         return Setup(
             scan=_frozen_scan(doublings(self.ladder), pressed=self.vehicle.has_downforce),
             carry={
@@ -434,7 +420,6 @@ class AxleModel(TireModel):
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the model as plain numbers and words, ready for JSON."""
         return {
             "format": FORMAT,
             "kind": self.kind,
@@ -464,39 +449,38 @@ class AxleModel(TireModel):
         }
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], source: str) -> "AxleModel":
-        """Return the model that `to_dict` describes."""
-        if "own" in data:  # files of earlier versions: the three in one
-            own = Table(data, f"{source}: ", FrozenModelError).array("own").T.tolist()
-            data = {**dict(zip(BESIDE, own, strict=False)), **data}
-        _require_plausible(data, source)
-        try:
-            if list(data["edges"]) != list(EDGES):
-                raise ValueError(f"edges must be {list(EDGES)}, they are {data['edges']}")
-            return cls(
-                vehicle=vehicle_from(data["vehicle"]),
-                ladder=tuple(float(scale) for scale in data["ladder"]),
-                sway=Sway(**data["sway"]),
-                plausibility=Plausibility(**data["plausibility"]),
-                **{name: np.array(data[name], dtype=np.float64) for name in ARRAYS},
-                sensors=Sensors(**data.get("sensors", {})),
-                calibration=BandCalibration.from_dict(data["band"]) if "band" in data else None,
-                possible=(
-                    PossibleWeights.from_dict(data["guarantee"], len(data["ladder"]))
-                    if "guarantee" in data
-                    else None
-                ),
-                tells_v_y=bool(data.get("tells_v_y", False)),
-                force_missed=(
-                    np.array(data["force_missed"], dtype=np.float64)
-                    if "force_missed" in data
-                    else None
-                ),
-            )
-        except KeyError as error:
-            raise FrozenModelError(f"{source}: key {error} is missing") from error
-        except (TypeError, ValueError) as error:
-            raise FrozenModelError(f"{source}: {error}") from error
+    def _read(cls, table: Table) -> Self:
+        if "own" in table:  # files of earlier versions: the three in one
+            three = dict(zip(BESIDE, table.array("own").T.tolist(), strict=False))
+            table = Table({**three, **table.data}, "", FrozenModelError)
+        numbers: dict[str, Any] = {name: table.array(name) for name in ("ladder", "edges", *ARRAYS)}
+        for name, values in numbers.items():
+            if (largest := np.abs(values).max(initial=0.0)) > LARGEST:
+                table.refuse(name, f"must hold numbers below {LARGEST:g}, it reaches {largest:g}")
+        ladder, edges = tuple(numbers.pop("ladder").tolist()), numbers.pop("edges").tolist()
+        if edges != list(EDGES):
+            table.refuse("edges", f"must be {list(EDGES)}, they are {edges}")
+        if "sensors" in table:
+            sensors = table.table("sensors")
+            numbers["sensors"] = Sensors(*(sensors.number(name) for name in Sensors._fields))
+        if "band" in table:
+            numbers["calibration"] = BandCalibration.from_dict(table.value("band"))
+        if "guarantee" in table:
+            data = table.table("guarantee").data
+            numbers["possible"] = PossibleWeights.from_dict(data, len(ladder))
+        tells = table.data.get("tells_v_y", False)
+        if not isinstance(tells, bool):
+            table.refuse("tells_v_y", f"must be true or false, it is {shown(tells)}")
+        if "force_missed" in table:
+            numbers["force_missed"] = table.array("force_missed")
+        return cls(
+            vehicle=vehicle_from(table.value("vehicle")),
+            ladder=ladder,
+            sway=Sway(**table.table("sway").record(Sway)),
+            plausibility=Plausibility(**table.table("plausibility").record(Plausibility)),
+            tells_v_y=tells,
+            **numbers,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -505,21 +489,17 @@ class AxleBand(Band[AxleModel]):
 
     @property
     def calibrated(self) -> bool:
-        """Whether its width was found on parts of the drive that did not teach."""
         return self.model.calibration is not None
 
     @property
     def speed(self) -> float:
-        """Speed [m/s] at which it is given where none is asked for."""
         return self.model.effective_calibration.speed
 
     def factor(self, slip: Array, v_x: Array) -> Array:
-        """Return the factors of the calibration, (n, 2)."""
         relative = v_x / self.model.vehicle.froude_speed
         return self.model.effective_calibration.factor(slip, relative)
 
     def spread(self, slip: Array, v_x: Array, pressed: Array) -> BandSpread:
-        """Return the variances of the steady forces that it is made of, (n, 2)."""
         model, n = self.model, len(self.model.ladder)
         T = np.stack([unit_matrix(slip[:, i], model.ladder) for i in range(2)])
         zero = model.slope_at(slip) * np.column_stack([np.ones_like(v_x), 1.0 / v_x])
@@ -536,7 +516,6 @@ class AxleBand(Band[AxleModel]):
         return declared_spread(force, left, before, calibration.stretch(v_x)[:, None])
 
     def relative_sd(self, alpha: Array) -> Array:
-        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning."""
         T, n = unit_matrix(alpha, self.model.ladder), len(self.model.ladder)
         ratio = [
             np.einsum("ki,ij,kj->k", T, now[:n, :n], T)
@@ -579,11 +558,9 @@ class AxleBand(Band[AxleModel]):
     def calibrated_by(
         self, calibration: BandCalibration | None, force_missed: Array | None = None
     ) -> AxleModel:
-        """Return the model, its band calibrated."""
         return replace(self.model, calibration=calibration, force_missed=force_missed)
 
     def on_another_road(self, sd_friction: float = SD_FRICTION) -> AxleModel:
-        """Return the model for a road whose friction is not that of the drive that taught."""
         model, n = self.model, len(self.model.ladder)
         change = require_friction_sd(sd_friction) * model.W @ friction_direction(model.ladder).T
         wider = model.covariance.copy()
@@ -591,7 +568,6 @@ class AxleBand(Band[AxleModel]):
         return replace(model, covariance=wider, possible=None)
 
     def samples(self, n: int, rng: np.random.Generator) -> tuple[AxleModel, ...]:
-        """Return models drawn from what learning left open, and from the errors of a model."""
         require_count(n)
         model, calibration = self.model, self.model.effective_calibration
         size = np.sqrt(np.mean(calibration.factors**2, axis=1))
@@ -626,29 +602,6 @@ class AxleBand(Band[AxleModel]):
         compliance, share, offset = np.clip(model.beside_curve + away[:, n:], low, high).T
         changed = replace(model, W=W, compliance=compliance, sway_share=share, offset=offset)
         return replace(changed, force_missed=None)
-
-
-def _require_plausible(data: dict[str, Any], source: str) -> None:
-    """Judge types and sizes of values before they become a model."""
-    table = Table(data, f"{source}: ", FrozenModelError)
-    for name, record in (("sway", Sway), ("plausibility", Plausibility)):
-        table.table(name).record(record)
-    if "tells_v_y" in data and not isinstance(data["tells_v_y"], bool):
-        table.refuse("tells_v_y", f"must be true or false, it is {shown(data['tells_v_y'])}")
-    if "sensors" in data:
-        for name in Sensors._fields:
-            table.table("sensors").number(name)
-    if "band" in data:
-        band = table.table("band")
-        for name in ("factors", "speeds", "color", "noise"):
-            band.array(name)
-        band.number("speed")
-    if "guarantee" in data:
-        table.table("guarantee")
-    for name in ("ladder", "edges", *ARRAYS):
-        largest = float(np.abs(table.array(name)).max(initial=0.0))
-        if largest > LARGEST:
-            table.refuse(name, f"must hold numbers below {LARGEST:g}, it reaches {largest:g}")
 
 
 def _is_covariance(P: Array) -> bool:

@@ -56,12 +56,10 @@ class FitMethod(Method):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of the step of what it learnt, axle_force first."""
         return PORTS
 
     @property
     def whole(self) -> "FitMethod":
-        """How it learns from a whole log at once."""
         return self
 
     def reads(self, recording: Recording, vehicle: Vehicle) -> Recording:

@@ -4,7 +4,7 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
@@ -27,7 +27,7 @@ from identifier.estimate.drive import Drive
 from identifier.estimate.latent import TRUST, LateralVelocity, estimate_v_y
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import ERROR_SIZE, car_numbers, simulate
-from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from identifier.frozen import FORMAT, vehicle_from, vehicle_numbers
 from identifier.motion.model import (
     LEAST_GRIP,
     REPLAYED,
@@ -73,6 +73,14 @@ SURELY, NOTED_GAIN = 3.0, 0.08  # standard deviations, and error of the steering
 WARM = 300  # samples before a part of a long drive, over which lag and sway settle
 LEAST_DOUBT = 1e-6  # of a prior, in variances of the usual one
 LARGEST = 1e6  # of the numbers in a file
+KEYS = {  # of arrays in a file
+    "covariance": "covariance",
+    "driven": "driven_slip_rad",
+    "speeds": "speeds_m_s",
+    "a_x": "a_x_m_s2",
+    "unexplained": "unexplained",
+    "force_missed": "force_missed",
+}
 
 
 class Segment(NamedTuple):
@@ -146,7 +154,6 @@ class FittedModel(TireModel):
 
     @property
     def min_speed(self) -> float:
-        """Below this speed [m/s] the forces read zero."""
         return self.vehicle.lowest_speed
 
     @property
@@ -226,7 +233,6 @@ class FittedModel(TireModel):
         return product
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression."""
         forces = []
         for i, axle in enumerate("fr"):
             phi, _ = _curve_expression(alpha[i], self._curve_numbers(axle))
@@ -269,7 +275,6 @@ class FittedModel(TireModel):
 
     @property
     def lagged(self) -> bool:
-        """Whether the force follows a lagged slip, two more states."""
         return True
 
     @property
@@ -332,7 +337,6 @@ class FittedModel(TireModel):
 
     @property
     def drives(self) -> Drives:
-        """What the drives that taught it were, and what they had beside its tires."""
         return Drives(
             speeds=self.speeds,
             lengthwise=(self.p, self.covariance),
@@ -435,62 +439,49 @@ class FittedModel(TireModel):
         return length
 
     def estimates(self) -> tuple[Estimate, ...]:
-        """Return stiffness, grip, relaxation length and zeros of sensors, with their doubt."""
         before = _covariance_before(self)
         given = self.vehicle.bicycle[4:]
-        zero = np.zeros((1, 2))
-        band = self.band
+        band, loads, lag = self.band, self._loads, self.relaxation_length
         stiff = [sd[0] / SMALL for sd in band.of_phi(np.full((1, 2), SMALL))]
-        _, at_zero, _ = self.curve_at(zero)
+        stiffness = self.stiffness
+        C = stiffness / loads
         slip = np.linspace(0.0, WIDEST, 201)
         slip = np.column_stack([slip, slip])
         phi = self.curve_at(slip)[0]
         peak = np.take_along_axis(slip, phi.argmax(axis=0)[None], axis=0)
-        top = phi.max(axis=0)
-        wide = band.of_phi(peak)
-        listed = []
-        for i, (axle, short) in enumerate(zip(AXLES, "fr", strict=True)):
-            load, s = float(self._loads[i]), INDEX[f"compliance_{short}"]
-            lag = float(self.relaxation_length[i])
-            C = float(at_zero[0, i])
-            sd = stiff[0][i]
-            whole = math.hypot(sd, C * float(band.load_doubt[i]))
-            listed.append(
-                Estimate(
-                    STIFFNESS, axle, C * load, whole * load, "N/rad", given[i],
-                    bool(sd <= DECIDED * stiff[1][i]),
-                )
-            )  # fmt: skip
-            sd = float(wide[0][0, i])
-            doubt = math.hypot(sd, top[i] * float(band.load_doubt[i]))
-            reached = bool(sd <= DECIDED * wide[1][0, i])
-            listed.append(Estimate(GRIP, axle, float(top[i]), doubt, "static load", None, reached))
-            now, prior = (float(np.sqrt(P[s, s])) for P in (self.covariance, before))
-            listed.append(
-                Estimate(RELAXATION, axle, lag, C * now, "m", None, now <= DECIDED * prior)
-            )
+        top, wide = phi.max(axis=0), [sd[0] for sd in band.of_phi(peak)]
+        sd_C, sd_top = (
+            np.hypot(sd[0], size * band.load_doubt) for sd, size in ((stiff, C), (wide, top))
+        )
+
+        def sd_of(name: str) -> tuple[float, float]:
+            """Return the standard deviation of a parameter, and the prior's."""
+            k = INDEX[name]
+            return math.sqrt(self.covariance[k, k]), math.sqrt(before[k, k])
+
+        rows: list[tuple[str, Axle, float, float, str, float | None, bool]] = []
+        for i, axle in enumerate(AXLES):
+            now, prior = sd_of(f"compliance_{axle[0]}")
+            known = [sd[0][i] <= DECIDED * sd[1][i] for sd in (stiff, wide)]
+            rows += [
+                (STIFFNESS, axle, stiffness[i], sd_C[i] * loads[i], "N/rad", given[i], known[0]),
+                (GRIP, axle, top[i], sd_top[i], "static load", None, known[1]),
+                (RELAXATION, axle, lag[i], C[i] * now, "m", None, now <= DECIDED * prior),
+            ]
         zeros: tuple[tuple[str, Axle, str, str, float], ...] = (
             ("zero of the steering", "front", "steering_zero", "deg", math.degrees(1.0)),
             ("bias of v_y", "rear", "v_y_bias", "m/s", 1.0),
         )
-        for title, of, name, unit, scale in zeros:
-            k = INDEX[name]
-            now, prior = (scale * float(np.sqrt(P[k, k])) for P in (self.covariance, before))
-            listed.append(
-                Estimate(
-                    title,
-                    of,
-                    scale * self[name],
-                    now,
-                    unit,
-                    0.0,
-                    now <= DECIDED * prior,
-                )
-            )
-        return tuple(listed)
+        for title, axle, name, unit, scale in zeros:
+            now, prior = sd_of(name)
+            known_zero, value = now <= DECIDED * prior, scale * self[name]
+            rows.append((title, axle, value, scale * now, unit, 0.0, known_zero))
+        return tuple(
+            Estimate(title, axle, float(value), float(sd), unit, declared, bool(known))
+            for title, axle, value, sd, unit, declared, known in rows
+        )
 
     def facts(self) -> tuple[Fact, ...]:
-        """Return what `summary` says beside the estimates."""
         lines = [Fact("identified up to a slip of", np.degrees(self.known_slip), "deg")]
         if self.vehicle.has_downforce:
             more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
@@ -500,11 +491,9 @@ class FittedModel(TireModel):
     # Another car, another road, another form.
 
     def mounted_on(self, vehicle: Vehicle) -> "FittedModel":
-        """Return the tires on another car, their forces scaled by its static axle loads."""
         return replace(self, vehicle=vehicle, segments=(), force_missed=None)
 
     def at_friction(self, ratio: float) -> "FittedModel":
-        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays."""
         require_positive(ValueError, ratio=ratio)
         p = self.p.copy()
         p[INDEX["ln_road"]] += math.log(ratio)
@@ -582,7 +571,6 @@ class FittedModel(TireModel):
         return found
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay sample by sample needs."""
         limits = Plausibility.for_vehicle(self.vehicle)
         return Setup(
             scan=replay_scan(),
@@ -603,7 +591,6 @@ class FittedModel(TireModel):
     # As a file.
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the model as plain numbers and words, ready for JSON."""
         return {
             "format": FORMAT,
             "kind": self.kind,
@@ -614,13 +601,12 @@ class FittedModel(TireModel):
                     PARAMETERS, self.p, np.maximum(np.diag(self.covariance), 0.0), strict=True
                 )
             },
-            "covariance": self.covariance.tolist(),
-            "driven_slip_rad": self.driven.tolist(),
-            "speeds_m_s": self.speeds.tolist(),
-            "a_x_m_s2": self.a_x.tolist(),
-            "unexplained": self.unexplained.tolist(),
+            **{
+                key: value.tolist()
+                for name, key in KEYS.items()
+                if (value := getattr(self, name)) is not None
+            },
             "segments": [one._asdict() for one in self.segments],
-            **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
             **({"parted_rad": self.parted} if self.parted else {}),
             **({"a_y_late_s": self.a_y_late} if self.a_y_late else {}),
             "cornering_stiffness_N_rad": self.stiffness.tolist(),
@@ -629,38 +615,30 @@ class FittedModel(TireModel):
         }
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], source: str) -> "FittedModel":
-        """Return the model that `to_dict` describes."""
-        table = Table(data, f"{source}: ", FrozenModelError)
+    def _read(cls, table: Table) -> Self:
         parameters = table.table("parameters")
-        p = np.array([parameters.table(name).number("value") for name in NAMES])
-        arrays = {
-            "covariance": "covariance",
-            "driven": "driven_slip_rad",
-            "speeds": "speeds_m_s",
-            "a_x": "a_x_m_s2",
-            "unexplained": "unexplained",
+        found = {
+            "p": np.array([parameters.table(name).number("value") for name in NAMES]),
+            **{name: table.array(key) for name, key in KEYS.items() if name != "force_missed"},
         }
         if "force_missed" in table:
-            arrays["force_missed"] = "force_missed"
-        found = {name: table.array(key) for name, key in arrays.items()}
-        for name, value in (("parameters", p), *found.items()):
+            found["force_missed"] = table.array("force_missed")
+        for name, value in found.items():
             if np.abs(value).max(initial=0.0) > LARGEST:
-                table.refuse(name, f"must hold numbers below {LARGEST:g}")
-        segments = tuple(
-            Segment(*(one.number(name) for name in Segment._fields))
-            for one in (table.tables("segments") if "segments" in table else [])
-        )
+                table.refuse(KEYS.get(name, "parameters"), f"must hold numbers below {LARGEST:g}")
+        segments = table.tables("segments") if "segments" in table else []
         parted, late = (
             table.number(key) if key in table else 0.0 for key in ("parted_rad", "a_y_late_s")
         )
-        try:
-            car = vehicle_from(data["vehicle"])
-            return cls(vehicle=car, p=p, segments=segments, parted=parted, a_y_late=late, **found)
-        except KeyError as error:
-            raise FrozenModelError(f"{source}: key {error} is missing") from error
-        except (TypeError, ValueError) as error:
-            raise FrozenModelError(f"{source}: {error}") from error
+        return cls(
+            vehicle=vehicle_from(table.value("vehicle")),
+            segments=tuple(
+                Segment(*(one.number(name) for name in Segment._fields)) for one in segments
+            ),
+            parted=parted,
+            a_y_late=late,
+            **found,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -674,7 +652,6 @@ class FittedBand(Band[FittedModel]):
 
     @property
     def origin(self) -> str:
-        """Where its width comes from, in words."""
         front, rear = 100.0 * self._error_at(TYPICAL)
         return (
             f"what the drives leave open, and an error of the model of {front:.0f} / {rear:.0f} % "
@@ -684,7 +661,6 @@ class FittedBand(Band[FittedModel]):
 
     @property
     def speed(self) -> float:
-        """Speed [m/s] at which it is given where none is asked for."""
         return brisk_speed(self.model.vehicle, self.model.min_speed)
 
     @property
@@ -738,7 +714,6 @@ class FittedBand(Band[FittedModel]):
         return sd[0], sd[1]
 
     def relative_sd(self, alpha: Array) -> Array:
-        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning."""
         sd, prior = self.of_phi(np.column_stack([alpha, alpha]))
         ratio: Array = sd / np.maximum(prior, 1e-12)
         return ratio
@@ -749,13 +724,11 @@ class FittedBand(Band[FittedModel]):
         return replace(self.model, force_missed=force_missed)
 
     def on_another_road(self, sd_friction: float = SD_FRICTION) -> FittedModel:
-        """Return the model for a road whose friction is not that of the drive that taught."""
         covariance, k = self.model.covariance.copy(), INDEX["ln_road"]
         covariance[k, k] += require_friction_sd(sd_friction) ** 2
         return replace(self.model, covariance=covariance)
 
     def samples(self, n: int, rng: np.random.Generator) -> tuple[FittedModel, ...]:
-        """Return models drawn from what the drives left open."""
         require_count(n)
         model, priors = self.model, Priors.of(self.model.vehicle)
         share = self._error_at(TYPICAL)

@@ -68,7 +68,7 @@ def _lowest_grip(band: Band[Any], i: int, known: float) -> float:
     low = float((model.force(alpha) - half)[:, i].max())
     if known <= 0.0 or low <= 0.0:
         raise ValueError(f"the force of the {AXLES[i]} axle is not known at any slip: drive harder")
-    return low / model.vehicle.axle_loads[i]
+    return low / float(model.vehicle.axle_loads[i])
 
 
 def _side(a_y: float, pressed: Array, transfer: Array, grip: Array, use: Array) -> float:

@@ -181,7 +181,6 @@ class InertialIdentifier(Method):
 
     @property
     def min_speed(self) -> float:
-        """Below this speed [m/s] forces read zero; learning rests below `learning_speed`."""
         return self.plausibility.min_speed
 
     def resumes(self, model: TireModel) -> bool:
@@ -195,7 +194,6 @@ class InertialIdentifier(Method):
 
     @property
     def limits(self) -> Limits:
-        """Where its estimates stay after every sample."""
         boxes = curve_boxes(self.bounds, stiffness=True) | {
             "roll_rad_per_g": [0.0, MOST["roll"]],
             "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
@@ -205,21 +203,9 @@ class InertialIdentifier(Method):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
         return PORTS
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-
-        Parameters
-        ----------
-        start : stored weights to begin with, which know how sure they are; None takes the prior.
-
-        Raises
-        ------
-        ValueError
-            Where stored weights are those of another structure.
-        """
         W, beside = self.prior.means(vehicle, self.ladder)
         compliance = beside[:, 0]
         P = self._prior_covariance(vehicle)
@@ -376,12 +362,6 @@ class InertialIdentifier(Method):
         return P
 
     def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
-        """Return cornering stiffness, relaxation length, and the force that curves saturate at.
-
-        Parameters
-        ----------
-        state : W (k, 2, n) and own (k, 2) at each of k instants.
-        """
         compliance = state["own"].reshape(-1, 2)
         return curve_tracks(vehicle, self.ladder, state["W"], compliance)
 
