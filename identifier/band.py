@@ -148,7 +148,7 @@ class Band(ABC, Generic[Model]):
         Parameters
         ----------
         calibration : None assumes the declared errors.
-        force_missed : share of the force that the model misses of the drive that taught, (2,);
+        force_missed : share of the force that the model misses of the identification drive, (2,);
             None where not computed.
         """
 
@@ -164,7 +164,7 @@ class Band(ABC, Generic[Model]):
 
     @abstractmethod
     def on_another_road(self, sd_friction: float = SD_FRICTION) -> Model:
-        """Return the model for a road whose friction is not that of the drive that taught.
+        """Return the model for a road whose friction is not that of the identification drive.
 
         Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
 

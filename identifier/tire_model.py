@@ -110,7 +110,7 @@ class Reached(NamedTuple):
 
 
 class Drives(NamedTuple):
-    """What the drives that taught a model were, and what they had beside its tires.
+    """What the identification drives of a model were, and what they had beside its tires.
 
     speeds : least and largest [m/s], (2,); None where unknown.   lengthwise : parameters (p,) with
     load transfer and ellipse, and covariance (p, p); None where there are none.   elsewhere : from
@@ -328,7 +328,7 @@ class TireModel(ABC):
 
     @property
     def drives(self) -> Drives:
-        """What the drives that taught it were, as far as it knows."""
+        """What the identification drives were, as far as the model knows."""
         return Drives()
 
     @property
