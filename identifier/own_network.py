@@ -29,7 +29,7 @@ from identifier.paper.network import SIGNALS, network_signals
 from identifier.setup import Setup
 from identifier.tire_model import StaticModel, TireModel
 from models.bicycle import BicycleParameters
-from models.rules import LARGEST_FORCE
+from models.rules import LARGEST_FORCE, require_positive
 from models.schema import Table, read_bytes
 from models.vehicle import Vehicle
 
@@ -331,8 +331,7 @@ class FrozenMethod(Method):
     dt: float = 0.01
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.dt < np.inf:
-            raise ValueError(f"dt must be positive, it is {self.dt}")
+        require_positive(ValueError, dt=self.dt)
 
     @property
     def min_speed(self) -> float:

@@ -18,7 +18,7 @@ SciPy is imported where a band is asked for: that takes longer than to learn fro
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self, overload
 
@@ -106,13 +106,6 @@ class Doubt(NamedTuple):
     beyond: Array
     rate: Array
     lost: Array
-
-    @classmethod
-    def none(cls, n: int) -> Self:
-        """Return that of n steady forces within the slip that taught, along which nothing
-        pushes.
-        """
-        return cls(*np.zeros((3, n, 2)))
 
 
 class Strips(NamedTuple):
@@ -351,7 +344,7 @@ class PossibleWeights:
         }
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], n: int) -> Self:
+    def from_dict(cls, data: Mapping[str, Any], n: int) -> Self:
         """Return those that `to_dict` describes.
 
         Parameters

@@ -6,7 +6,6 @@ from typing import Any, Self
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array, blocks
@@ -322,7 +321,7 @@ class AxleModel(TireModel):
         if (known > 0.0).all():
             unsure = 100.0 * np.diag(self.band.relative_sd(known))
             lines.append(Fact("standard deviation there over the prior's", unsure, "%"))
-        lines.append(Fact("time of learning", self.learning_time.sum(axis=1), "s"))
+        lines.append(Fact("time of learning", self.excitation[:, 1], "s"))
         if self.vehicle.has_downforce:
             more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
             lines.append(Fact(f"more of all forces at {DOWNFORCE_SPEED:g} m/s", more, "%"))
@@ -379,19 +378,6 @@ class AxleModel(TireModel):
             v_x=v_x,
             least_lag=least_lag,
         )
-
-    @property
-    def learning_time(self) -> Array:
-        """Time of learning in each range of slip between `EDGES`, the last open [s], (2, 8)."""
-        above = self.excitation[:, 1:]
-        return above - np.column_stack([above[:, 1:], np.zeros(2)])
-
-    def outside(self, recording: Recording) -> NDArray[np.bool_]:
-        """Return where the slip leaves the known range, (n, 2)."""
-        outside: NDArray[np.bool_] = (
-            self.setup(recording.dt).output(recording, "slip_size") > self.known_slip
-        )
-        return outside
 
     def lagged_slip(self, recording: Recording) -> Array:
         """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""

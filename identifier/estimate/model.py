@@ -8,10 +8,13 @@ from typing import Any, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from codegen.arrays import Array, blocks, large
-from identifier.axle.curve import EDGES, unit_matrix
+from identifier.axle.car import Car
+from identifier.axle.car import car_numbers as axle_numbers
+from identifier.axle.curve import EDGES, Curve, unit_matrix
+from identifier.axle.dynamics import lagged_force, series_compliance
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST, Sensors, Sway
@@ -54,7 +57,7 @@ from identifier.tire_model import (
 from models.recordings import Recording
 from models.rules import require_positive
 from models.schema import Table
-from models.vehicle import DOWNFORCE_SPEED, GRAVITY, LIGHTEST, Vehicle
+from models.vehicle import DOWNFORCE_SPEED, GRAVITY, LIGHTEST, Vehicle, load_ratio
 
 UNITS = (0.008, 0.016, 0.032, 0.064, 0.128, 0.256)  # rad, of the projection
 LEAST_REACH = 0.032  # rad, up to which it follows the curves at least
@@ -225,53 +228,51 @@ class FittedModel(TireModel):
         f = (np.asarray(a_x) + car.drag * np.square(v_x)) / GRAVITY
         moved = self["load_transfer"] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
         load = 1.0 + np.outer(f, moved) + np.outer(np.square(v_x), car.downforce)
-        drive = np.array([self["driving_f"], self["driving_r"]])
-        brake = np.array([self["braking_f"], self["braking_r"]])
-        use = np.where(f[:, None] > 0.0, drive, brake) * f[:, None]
+        use = np.where(f[:, None] > 0.0, self._pair("driving"), self._pair("braking")) * f[:, None]
         left = np.sqrt(np.maximum(1.0 - use**2, LEAST_GRIP))
         product: Array = np.maximum(load, LIGHTEST) * left
         return product
 
-    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        forces = []
-        for i, axle in enumerate("fr"):
-            phi, _ = _curve_expression(alpha[i], self._curve_numbers(axle))
-            forces.append(phi * self._loads[i] * self._load_at(i, v_x))
-        return ca.vertcat(*forces)
+    def _pair(self, name: str) -> Array:
+        """Return a parameter of both axles, (2,)."""
+        return np.array([self[f"{name}_f"], self[f"{name}_r"]])
 
-    def _load_at(self, i: int, v_x: Any) -> Any:
+    def _curve(self, slip: Any, v_x: Any) -> Curve:
+        """Return the force curve at a slip (2,) [rad] and a speed, in static axle loads."""
+        numbers = [self._curve_numbers(axle) for axle in "fr"]
+        found = [_curve_expression(slip[i], one) for i, one in enumerate(numbers)]
+        phi, slope = (ca.vertcat(*both) for both in zip(*found, strict=True))
+        at_least = 0.02 * ca.DM([math.exp(one[0]) for one in numbers])
+        static = Curve(ca.DM(2, 0), phi, slope, ca.fmax(slope, at_least), ca.DM(2, 1))
         if not self.vehicle.has_downforce:
-            return 1.0
-        load = 1 + self.vehicle.downforce[i] * v_x**2
-        return ca.fmax(load, LIGHTEST)
+            return static
+        return static.under(load_ratio(ca.DM(self.vehicle.downforce), v_x))
+
+    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
+        return self._curve(alpha, v_x).force * ca.DM(self._loads)
 
     def force_expression(
         self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
     ) -> tuple[Any, Any]:
         """Return the axle forces (2,) [N] and the rate of lagged slip (2,) [rad/s].
 
-        The sway gives way in series with the carcass, without its inertia (`axle.dynamics`); the
-        speed is held. x is read by the sensors of the drives.
+        Parameters
+        ----------
+        x : [v_y, r] (2,), as the sensors of the drives read them.
         """
-        car = self.vehicle
-        yaw = x[1]
-        v_y = x[0] - self["v_y_bias"] - self["v_y_angle"] * v_x - self["v_y_lever"] * yaw
-        wheel = (1.0 + self["steering_gain"]) * delta + self["steering_zero"]
-        omega = self._sway.frequency
-        forces, rates = [], []
-        for i, (axle, arm) in enumerate((("f", car.l_f), ("r", -car.l_r))):
-            angle = wheel if i == 0 else 0.0
-            alpha = angle - ca.atan((v_y + arm * yaw) / v_x)
-            numbers = self._curve_numbers(axle)
-            phi, slope = _curve_expression(slip[i], numbers)
-            load = self._load_at(i, v_x)
-            gives = self[f"compliance_{axle}"] + GRAVITY / omega**2 * self[f"sway_share_{axle}"]
-            sigma = gives * load * ca.fmax(slope, 0.02 * math.exp(numbers[0]))
-            sigma += SHORTEST * car.wheelbase
-            across = 1 - angle**2 / 2 + angle**4 / 24 if i == 0 else 1.0
-            forces.append(phi * load * self._loads[i] * across)
-            rates.append((alpha - slip[i]) / ca.fmax(sigma / v_x, least_lag))
-        return ca.vertcat(*forces), ca.vertcat(*rates)
+        v_y = x[0] - self["v_y_bias"] - self["v_y_angle"] * v_x - self["v_y_lever"] * x[1]
+        shares = self._pair("compliance"), self._pair("sway_share")
+        return lagged_force(
+            Car(*axle_numbers(self.vehicle).T),
+            self._curve(slip, v_x),
+            series_compliance(*shares, self._sway.frequency),
+            np.zeros(2),
+            slip=slip,
+            x=[v_y, x[1]],
+            delta=(1.0 + self["steering_gain"]) * delta + self["steering_zero"],
+            v_x=v_x,
+            least_lag=least_lag,
+        )
 
     @property
     def lagged(self) -> bool:
@@ -403,11 +404,6 @@ class FittedModel(TireModel):
                 )
         return tuple(listed)
 
-    def outside(self, recording: Recording) -> NDArray[np.bool_]:
-        """Return where the slip leaves the known range, (n, 2)."""
-        beyond: NDArray[np.bool_] = np.abs(self.lagged_slip(recording)) > self.known_slip
-        return beyond
-
     @property
     def band(self) -> "FittedBand":
         """How unsure it is, by its covariance and its error on the drives that taught."""
@@ -433,9 +429,8 @@ class FittedModel(TireModel):
     @property
     def relaxation_length(self) -> Array:
         """Lag of slip at small slip, under static loads [m], (2,); it goes with the slope."""
-        give = np.array([self["compliance_f"], self["compliance_r"]])
         stiff = np.maximum(self.stiffness / self._loads, 0.0)
-        length: Array = give * stiff + SHORTEST * self.vehicle.wheelbase
+        length: Array = self._pair("compliance") * stiff + SHORTEST * self.vehicle.wheelbase
         return length
 
     def estimates(self) -> tuple[Estimate, ...]:
@@ -537,8 +532,8 @@ class FittedModel(TireModel):
             sway=self._sway,
             plausibility=limits,
             W=W,
-            compliance=np.array([self["compliance_f"], self["compliance_r"]]),
-            sway_share=np.array([self["sway_share_f"], self["sway_share_r"]]),
+            compliance=self._pair("compliance"),
+            sway_share=self._pair("sway_share"),
             offset=np.clip(zeros, -most, most),
             covariance=self._units_covariance(fits, self.covariance),
             prior_covariance=self._units_covariance(fits, _covariance_before(self)),

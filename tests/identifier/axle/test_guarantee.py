@@ -291,7 +291,7 @@ def test_a_return_from_slip_that_did_not_teach_stays_inside(model):
         _, own = replace(model, possible=None).signals_of(drive)
         assert (doubt.rate >= own.rate - 1e-9).all()  # the model's is possible too
         low, high = model.guarantee.possible.limits(
-            units, Doubt.none(len(y))._replace(rate=own.rate)
+            units, Doubt(0.0 * own.beyond, own.rate, 0.0 * own.lost)
         )
         assert not ((low <= y) & (y <= high))[late].all()  # the same without either
 
