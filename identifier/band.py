@@ -152,7 +152,6 @@ class Band(ABC, Generic[Model]):
             None where not computed.
         """
 
-    @abstractmethod
     def samples(self, n: int, rng: np.random.Generator) -> tuple[Model, ...]:
         """Return models drawn from what is not known of the tires.
 
@@ -161,8 +160,13 @@ class Band(ABC, Generic[Model]):
         ValueError
             Where n is negative, or no tire is among what was drawn.
         """
+        if n < 0:
+            raise ValueError(f"n must not be negative, it is {n}")
+        return self._samples(n, rng)
 
     @abstractmethod
+    def _samples(self, n: int, rng: np.random.Generator) -> tuple[Model, ...]: ...
+
     def on_another_road(self, sd_friction: float = SD_FRICTION) -> Model:
         """Return the model for a road whose friction is not that of the identification drive.
 
@@ -172,6 +176,12 @@ class Band(ABC, Generic[Model]):
         ----------
         sd_friction : standard deviation of ln μ between the roads [-].
         """
+        if not 0.0 <= sd_friction < np.inf:
+            raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
+        return self._opened(sd_friction)
+
+    @abstractmethod
+    def _opened(self, sd_friction: float) -> Model: ...
 
     @overload
     def at(
@@ -284,16 +294,3 @@ def of_axle(both: Array, axle: Axle | None) -> Array:
 def ends(low: Array, high: Array) -> tuple[float, float] | tuple[Array, Array]:
     """Return both ends of a band, of a single slip as numbers."""
     return (float(low), float(high)) if low.ndim == 0 else (low, high)
-
-
-def require_friction_sd(sd: float) -> float:
-    """Refuse a standard deviation of ln μ between roads that is impossible [-]."""
-    if not 0.0 <= sd < np.inf:
-        raise ValueError(f"sd_friction must be finite, not negative, it is {sd}")
-    return sd
-
-
-def require_count(n: int) -> None:
-    """Refuse a negative number of models to draw."""
-    if n < 0:
-        raise ValueError(f"n must not be negative, it is {n}")

@@ -7,7 +7,7 @@ the same code; they differ in the `Method` that is handed over.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,16 +37,11 @@ def resumed(start: TireModel, kind: type[Model], refusal: str, **structure: Any)
     """Return a stored model to begin with, of the kind and structure that a method learns.
     structure : what the method and the model must agree on, by attribute of the model.
     """
-    if not fits(start, kind, **structure):
+    if not isinstance(start, kind) or any(
+        getattr(start, name) != value for name, value in structure.items()
+    ):
         raise ValueError(refusal)
     return start
-
-
-def fits(start: TireModel, kind: type[Model], **structure: Any) -> TypeGuard[Model]:
-    """Return whether a stored model is of the kind and structure that a method learns."""
-    return isinstance(start, kind) and all(
-        getattr(start, name) == value for name, value in structure.items()
-    )
 
 
 OTHER_STRUCTURE = "the stored weights are of another structure than the design's"

@@ -264,6 +264,10 @@ class TireModel(ABC):
         return self
 
     @property
+    def _loads(self) -> Array:
+        return np.array(self.vehicle.axle_loads)
+
+    @property
     def _curve_speed(self) -> float:
         """Speed [m/s] of curves that are asked for without one; 0 is under static loads."""
         if self.scales_with_load and self.vehicle.has_downforce:

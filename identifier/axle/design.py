@@ -47,6 +47,7 @@ from identifier.method import (
 )
 from identifier.setup import Port, Setup
 from identifier.tire_model import AXLES, Reached, TireModel, brisk_speed
+from models.rules import require_positive
 from models.vehicle import Vehicle
 
 NEAR = 0.99  # of a bound, from which on a number rests at it
@@ -91,8 +92,7 @@ class AxleIdentifier(Method):
     def __post_init__(self) -> None:
         object.__setattr__(self, "ladder", tuple(self.ladder))  # a list would not hash
         doublings(self.ladder)
-        if not 0.0 < self.dt < math.inf:
-            raise ValueError(f"dt must be positive, it is {self.dt}")
+        require_positive(ValueError, dt=self.dt)
         if self.rising_until is not None and not 0.0 <= self.rising_until < math.inf:
             raise ValueError(f"rising_until must not be negative, it is {self.rising_until}")
 
@@ -177,7 +177,7 @@ class AxleIdentifier(Method):
         P = prior_P = self.prior.covariance(vehicle, self.ladder)
         excitation, sensors = np.zeros((2, 1 + len(EDGES))), Sensors()
         if start is not None:
-            stored = self._resumed(start)
+            stored = resumed_units(start, self.ladder)
             W, own, P, excitation = (
                 stored.W,
                 stored.beside_curve,
@@ -229,10 +229,6 @@ class AxleIdentifier(Method):
         rises, pressed = self.rising_until is not None, vehicle.has_downforce
         return _scan(doublings(self.ladder), rises=rises, bands=bands, pressed=pressed)
 
-    def _resumed(self, start: TireModel) -> AxleModel:
-        """Return stored weights to begin with, of this structure."""
-        return resumed(start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
-
     def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.
 
@@ -241,7 +237,7 @@ class AxleIdentifier(Method):
         start : as of `setup`; without a calibration the declared errors are assumed.
         """
         setup = self.setup(vehicle, start)
-        stored = None if start is None else self._resumed(start).calibration
+        stored = None if start is None else resumed_units(start, self.ladder).calibration
         given = BandCalibration.declared(brisk_speed(vehicle, self.min_speed))
         noise = np.array([self.regression.noise, self.regression.noise, 0.0])
         calibration = stored or replace(given, noise=noise)
@@ -350,6 +346,11 @@ class AxleIdentifier(Method):
             excitation=state["excitation"].copy(),
             sensors=Sensors(*map(float, np.ravel(state["sensors"]))),
         )
+
+
+def resumed_units(start: TireModel, ladder: tuple[float, ...]) -> AxleModel:
+    """Return a stored model to begin with, in the units of a method."""
+    return resumed(start.in_units(ladder), AxleModel, OTHER_STRUCTURE, ladder=ladder)
 
 
 def curve_boxes(b: Bounds, *, stiffness: bool) -> dict[str, Any]:

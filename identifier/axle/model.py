@@ -38,12 +38,9 @@ from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.band import (
     LARGEST_SD,
     LEVEL,
-    SD_FRICTION,
     Band,
     BandSpread,
     normal_quantile,
-    require_count,
-    require_friction_sd,
 )
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
 from identifier.setup import Setup
@@ -178,17 +175,13 @@ class AxleModel(TireModel):
     @property
     def relaxation_length(self) -> Array:
         """Lag of slip at small slip, under static loads [m], (2,); it goes with the slope."""
-        slope: Array = (self.W / np.array(self.ladder)).sum(axis=1)
-        return self.compliance * np.maximum(slope, 0.0) + SHORTEST * self.vehicle.wheelbase
+        slope = np.maximum(self.stiffness / self._loads, 0.0)
+        return self.compliance * slope + SHORTEST * self.vehicle.wheelbase
 
     @property
     def beside_curve(self) -> Array:
         """[compliance, sway share, offset] of the axles, as steps carry them, (2, 3)."""
         return np.column_stack([self.compliance, self.sway_share, self.offset])
-
-    @property
-    def _loads(self) -> Array:
-        return np.array(self.vehicle.axle_loads)
 
     def _steady(self, alpha: Array, v_x: float) -> Array:
         force = unit_matrix(alpha, self.ladder) @ self.W.T * self._loads
@@ -285,7 +278,7 @@ class AxleModel(TireModel):
         steep[:n], level[:n] = 1.0 / scales, 1.0
         lag, zero = np.eye(n + 3)[n], np.eye(n + 3)[n + 2]
         slope = (self.W / scales).sum(axis=1)
-        bends = self._slope_at_known() < BENT * slope
+        bends = self.slope_at(self.known_slip[None])[0] < BENT * slope
         given = self.vehicle.bicycle[4:]
         offset = (("zero of the steering", "deg", np.degrees(1.0)), ("bias of v_y", "m/s", 1.0))
         listed = []
@@ -308,12 +301,6 @@ class AxleModel(TireModel):
                     Estimate(title, axle, float(value), float(per) * now, its_unit, before, learnt)
                 )
         return tuple(listed)
-
-    def _slope_at_known(self) -> Array:
-        """Return the slope of the curves where they end to be known [static loads/rad], (2,)."""
-        scales = np.array(self.ladder)
-        bent: Array = (self.W / (scales * np.cosh(self.known_slip[:, None] / scales) ** 2)).sum(1)
-        return bent
 
     def facts(self) -> tuple[Fact, ...]:
         known = self.known_slip
@@ -546,15 +533,14 @@ class AxleBand(Band[AxleModel]):
     ) -> AxleModel:
         return replace(self.model, calibration=calibration, force_missed=force_missed)
 
-    def on_another_road(self, sd_friction: float = SD_FRICTION) -> AxleModel:
+    def _opened(self, sd_friction: float) -> AxleModel:
         model, n = self.model, len(self.model.ladder)
-        change = require_friction_sd(sd_friction) * model.W @ friction_direction(model.ladder).T
+        change = sd_friction * model.W @ friction_direction(model.ladder).T
         wider = model.covariance.copy()
         wider[:, :n, :n] += change[:, :, None] * change[:, None, :]
         return replace(model, covariance=wider, possible=None)
 
-    def samples(self, n: int, rng: np.random.Generator) -> tuple[AxleModel, ...]:
-        require_count(n)
+    def _samples(self, n: int, rng: np.random.Generator) -> tuple[AxleModel, ...]:
         model, calibration = self.model, self.model.effective_calibration
         size = np.sqrt(np.mean(calibration.factors**2, axis=1))
         both = zip(model.covariance, model.prior_covariance, calibration.color, size, strict=True)

@@ -20,11 +20,8 @@ from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST, Sensors, Sway
 from identifier.band import (
     LARGEST_SD,
-    SD_FRICTION,
     Band,
     BandSpread,
-    require_count,
-    require_friction_sd,
 )
 from identifier.estimate.drive import Drive
 from identifier.estimate.latent import TRUST, LateralVelocity, estimate_v_y
@@ -158,10 +155,6 @@ class FittedModel(TireModel):
     @property
     def min_speed(self) -> float:
         return self.vehicle.lowest_speed
-
-    @property
-    def _loads(self) -> Array:
-        return np.array(self.vehicle.axle_loads)
 
     # The curve.
 
@@ -718,13 +711,12 @@ class FittedBand(Band[FittedModel]):
         del calibration
         return replace(self.model, force_missed=force_missed)
 
-    def on_another_road(self, sd_friction: float = SD_FRICTION) -> FittedModel:
+    def _opened(self, sd_friction: float) -> FittedModel:
         covariance, k = self.model.covariance.copy(), INDEX["ln_road"]
-        covariance[k, k] += require_friction_sd(sd_friction) ** 2
+        covariance[k, k] += sd_friction**2
         return replace(self.model, covariance=covariance)
 
-    def samples(self, n: int, rng: np.random.Generator) -> tuple[FittedModel, ...]:
-        require_count(n)
+    def _samples(self, n: int, rng: np.random.Generator) -> tuple[FittedModel, ...]:
         model, priors = self.model, Priors.of(self.model.vehicle)
         share = self._error_at(TYPICAL)
         values, vectors = np.linalg.eigh(model.covariance)

@@ -12,7 +12,7 @@ from codegen.arrays import Array
 from identifier.axle.car import car_numbers, downforce_numbers
 from identifier.axle.covariance import packed, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
-from identifier.axle.design import AxleIdentifier, curve_boxes, curve_tracks
+from identifier.axle.design import AxleIdentifier, curve_boxes, curve_tracks, resumed_units
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.guarantee import prior_box
 from identifier.axle.learning import Bounds, inward, rising_shares
@@ -30,17 +30,14 @@ from identifier.inertial.step import (
     build_step,
 )
 from identifier.method import (
-    OTHER_STRUCTURE,
     Accelerometer,
     Limits,
     Method,
     Track,
-    fits,
-    resumed,
 )
 from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
-from models.rules import require_within
+from models.rules import require_positive, require_within
 from models.vehicle import GRAVITY, Vehicle
 
 RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
@@ -98,8 +95,7 @@ class InertialIdentifier(Method):
         object.__setattr__(self, "sensor_position", tuple(self.sensor_position))
         object.__setattr__(self, "doubt", tuple(self.doubt))
         doublings(self.ladder)
-        if not 0.0 < self.dt < math.inf:
-            raise ValueError(f"dt must be positive, it is {self.dt}")
+        require_positive(ValueError, dt=self.dt)
         require_within(ValueError, 0.5, 100.0, roll_frequency=self.roll_frequency)
         require_within(ValueError, 0.01, 10.0, roll_damping=self.roll_damping)
         ahead, aside = self.sensor_position
@@ -175,17 +171,13 @@ class InertialIdentifier(Method):
             return cls.holding(model, vehicle, dt=dt), model
         usual = cls.for_vehicle(vehicle, dt=dt)
         tires = None if model is None else model.in_units(usual.ladder)
-        if model is None or not isinstance(tires, AxleModel) or not usual.resumes(model):
+        if not isinstance(tires, AxleModel) or tires.ladder != usual.ladder:
             return usual, None
         return replace(usual, sensors=tires.sensors), model
 
     @property
     def min_speed(self) -> float:
         return self.plausibility.min_speed
-
-    def resumes(self, model: TireModel) -> bool:
-        """Return whether a run can begin with a stored model."""
-        return fits(model.in_units(self.ladder), AxleModel, ladder=self.ladder)
 
     @property
     def accelerometer(self) -> Accelerometer:
@@ -213,9 +205,7 @@ class InertialIdentifier(Method):
         sensors = np.zeros(len(SENSORS))
         sensors[SENSORS.index("roll")] = self.beliefs.roll
         if start is not None:
-            stored = resumed(
-                start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder
-            )
+            stored = resumed_units(start, self.ladder)
             W, P, excitation = stored.W, stored.covariance, stored.excitation
             compliance = stored.compliance
             sensors[SENSORS.index("steering")] = stored.offset[0]
