@@ -18,19 +18,6 @@ from identifier.axle.slip import SHORTEST
 from models.vehicle import GRAVITY, Vehicle, load_ratio
 
 
-def static_curve(slip: Any, W: Array, ladder: tuple[float, ...]) -> Curve:
-    """Return the force curve at a slip, in static axle loads.
-
-    Parameters
-    ----------
-    slip : (2,) [rad].
-    W : weights [static axle loads], (2, n).
-    ladder : slip scales [rad], (n,).
-    """
-    scales = ca.DM(1.0 / np.array(ladder)[None])
-    return curve(slip, ca.DM(W), scales, doublings(ladder))
-
-
 def curve_at_speed(
     slip: Any, v_x: Any, W: Array, ladder: tuple[float, ...], vehicle: Vehicle
 ) -> Curve:
@@ -44,7 +31,8 @@ def curve_at_speed(
     ladder : slip scales [rad], (n,).
     vehicle : whose downforce counts; without any the speed is not looked at.
     """
-    static = static_curve(slip, W, ladder)
+    scales = ca.DM(1.0 / np.array(ladder)[None])
+    static = curve(slip, ca.DM(W), scales, doublings(ladder))
     if not vehicle.has_downforce:
         return static
     return static.under(load_ratio(ca.DM(vehicle.downforce), v_x))

@@ -299,7 +299,7 @@ class PossibleWeights:
         ----------
         rate : ρ of both axles [1/s], (k, 2).
         """
-        return beyond_driven(rate, np.array(self.fastest))
+        return _beyond_driven(rate, np.array(self.fastest))
 
     def reach(self, units: Array) -> tuple[Array, Array]:
         """Return least and largest h'w of the possible weights, (k, 2) each [static axle loads].
@@ -413,7 +413,7 @@ class Guarantee(NamedTuple):
         slip = np.asarray(alpha, dtype=np.float64)
         rates = np.tile(np.broadcast_to(np.abs(rate), slip.shape).ravel(), (2, 1)).T
         units = np.tile(unit_matrix(slip.ravel(), self.ladder)[:, None], (1, 2, 1))
-        beyond = beyond_driven(slip.reshape(-1, 1), self.driven) + self.possible.too_fast(rates)
+        beyond = _beyond_driven(slip.reshape(-1, 1), self.driven) + self.possible.too_fast(rates)
         sides = self.possible.limits(units, Doubt(beyond, rates, np.zeros_like(rates)))
         low, high = (of_axle((side * self.loads).reshape(*slip.shape, 2), axle) for side in sides)
         return ends(low, high)
@@ -469,7 +469,7 @@ def _faded(signal: Array, dt: float) -> Array:
     return mean
 
 
-def beyond_driven(slip: Array, driven: Array) -> Array:
+def _beyond_driven(slip: Array, driven: Array) -> Array:
     """Return by how much slip, or ρ, is beyond that of a drive, over it, (k, 2); 0 within.
 
     Parameters
@@ -491,7 +491,7 @@ def slip_beyond(slip: Array, driven: Array, dt: float, segments: Iterable[slice]
     """
     beyond = np.zeros_like(slip)
     for part in segments:
-        over = beyond_driven(slip[part], driven)
+        over = _beyond_driven(slip[part], driven)
         age = dt / MEMORY * np.arange(len(over))[:, None]
         with np.errstate(divide="ignore"):  # ln 0: nothing was beyond yet
             beyond[part] = np.exp(np.maximum.accumulate(np.log(over) + age, axis=0) - age)

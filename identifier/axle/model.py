@@ -188,9 +188,9 @@ class AxleModel(TireModel):
         return force * self.vehicle.load_ratio(v_x)
 
     @property
-    def band(self) -> "AxleBand":
+    def band(self) -> "_AxleBand":
         """How unsure it is, by its covariance."""
-        return AxleBand(self)
+        return _AxleBand(self)
 
     @property
     def known_slip(self) -> Array:
@@ -457,7 +457,7 @@ class AxleModel(TireModel):
 
 
 @dataclass(frozen=True, slots=True)
-class AxleBand(Band[AxleModel]):
+class _AxleBand(Band[AxleModel]):
     """How unsure an axle model is: by its covariance, and errors that no curve can explain."""
 
     @property

@@ -73,7 +73,7 @@ SURELY, NOTED_GAIN = 3.0, 0.08  # standard deviations, and error of the steering
 WARM = 300  # samples before a part of a long drive, over which lag and sway settle
 LEAST_DOUBT = 1e-6  # of a prior, in variances of the usual one
 LARGEST = 1e6  # of the numbers in a file
-KEYS = {  # of arrays in a file
+_KEYS = {  # of arrays in a file
     "covariance": "covariance",
     "driven": "driven_slip_rad",
     "speeds": "speeds_m_s",
@@ -398,9 +398,9 @@ class FittedModel(TireModel):
         return tuple(listed)
 
     @property
-    def band(self) -> "FittedBand":
+    def band(self) -> "_FittedBand":
         """How unsure it is, by its covariance and its error on the drives that taught."""
-        return FittedBand(self)
+        return _FittedBand(self)
 
     @property
     def known_slip(self) -> Array:
@@ -591,7 +591,7 @@ class FittedModel(TireModel):
             },
             **{
                 key: value.tolist()
-                for name, key in KEYS.items()
+                for name, key in _KEYS.items()
                 if (value := getattr(self, name)) is not None
             },
             "segments": [one._asdict() for one in self.segments],
@@ -607,13 +607,13 @@ class FittedModel(TireModel):
         parameters = table.table("parameters")
         found = {
             "p": np.array([parameters.table(name).number("value") for name in NAMES]),
-            **{name: table.array(key) for name, key in KEYS.items() if name != "force_missed"},
+            **{name: table.array(key) for name, key in _KEYS.items() if name != "force_missed"},
         }
         if "force_missed" in table:
             found["force_missed"] = table.array("force_missed")
         for name, value in found.items():
             if np.abs(value).max(initial=0.0) > LARGEST:
-                table.refuse(KEYS.get(name, "parameters"), f"must hold numbers below {LARGEST:g}")
+                table.refuse(_KEYS.get(name, "parameters"), f"must hold numbers below {LARGEST:g}")
         segments = table.tables("segments") if "segments" in table else []
         parted, late = (
             table.number(key) if key in table else 0.0 for key in ("parted_rad", "a_y_late_s")
@@ -630,7 +630,7 @@ class FittedModel(TireModel):
 
 
 @dataclass(frozen=True, slots=True)
-class FittedBand(Band[FittedModel]):
+class _FittedBand(Band[FittedModel]):
     """How unsure a fit is: by its covariance, and its error on the drives that taught."""
 
     @property

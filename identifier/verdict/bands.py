@@ -124,11 +124,11 @@ def calibrated(
 def _missed(model: TireModel, recording: Recording, found: Evidence) -> tuple[Array, ...]:
     """Return error, share, scaled and fixed of `Missed` in all windows, of a model with a band."""
     assert model.band is not None
-    spread = spread_by_range(model.band, recording, found.windows)
+    spread = _spread_by_range(model.band, recording, found.windows)
     return found.measured - modelled_force(model, recording, found.windows), *spread
 
 
-def spread_by_range(
+def _spread_by_range(
     band: Band[Any], recording: Recording, windows: Windows
 ) -> tuple[Array, Array, Array]:
     """Return share, scaled and fixed of `Missed`, (6, m, 2) each."""

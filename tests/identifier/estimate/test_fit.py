@@ -99,7 +99,7 @@ def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
     assert 0.4 < ratio < 0.75
     at = np.array([DROP - 5.0, DROP + 5.0])
     assert wet.drives.road_differs(at).tolist() == [not begins, begins]
-    (note,) = (text for _, text in wet.notes)
+    (note,) = (text for _, text in wet.drives.notes)
     assert f"{segment.ratio:.2f} ±" in note
 
 
