@@ -105,27 +105,18 @@ class Limits(NamedTuple):
     active: Callable[[Mapping[str, Array]], tuple[Reached, ...]] = lambda _: ()
 
 
-class WholeLog(Protocol):
-    """A method that learns from whole logs."""
+class WholeLog(NamedTuple):
+    """How a method learns from a whole log.
 
-    def reads(self, recording: Recording, vehicle: Vehicle) -> Recording:
-        """Return a log as the method reads it: a whole one may be read better than its samples."""
+    reads : of a log and its car the log as the method reads it: a whole one may be read better than
+    its samples.   fitted : of that log, its car, what is believed before or None, and None or what
+    is called now and then with the share that is done, 0 to 1: the tires.
+    """
 
-    def fitted(
-        self,
-        recording: Recording,
-        vehicle: Vehicle,
-        start: TireModel | None = None,
-        *,
-        progress: Callable[[float], None] | None = None,
-    ) -> TireModel:
-        """Return the tires that a log taught.
-
-        Parameters
-        ----------
-        start : what is believed before; None believes what the method does.
-        progress : called now and then with the share that is done, 0 to 1.
-        """
+    reads: Callable[[Recording, Vehicle], Recording]
+    fitted: Callable[
+        [Recording, Vehicle, TireModel | None, Callable[[float], None] | None], TireModel
+    ]
 
 
 def require_fresh(start: TireModel | None) -> None:
@@ -161,35 +152,24 @@ class Method(ABC):
         return ""
 
     @property
-    def whole(self) -> "WholeLog | None":
+    def whole(self) -> WholeLog | None:
         """How it learns from a whole log at once; None: sample by sample, by its step."""
         return None
 
     @property
-    def accelerometer(self) -> "Accelerometer | None":
+    def accelerometer(self) -> Accelerometer | None:
         """What it explains of an accelerometer's a_y; None where it takes all for a force."""
         return None
 
     @property
-    def limits(self) -> "Limits | None":
+    def limits(self) -> Limits | None:
         """Where its estimates stay; None where they have no bounds."""
         return None
 
-    def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.
-
-        Parameters
-        ----------
-        start : as of `setup`; its calibration is that of the band.
-
-        Raises
-        ------
-        ValueError
-            Where the method cannot tell how sure it is, or stored weights are those of another
-            structure.
-        """
-        del vehicle, start
-        raise ValueError(f"{type(self).__name__} cannot tell how sure it is: it has no band")
+    @property
+    def setup_with_band(self) -> Callable[[Vehicle, TireModel | None], Setup] | None:
+        """As `setup`, of a step that outputs `half_band` (2,) [N], too; None: it has no band."""
+        return None
 
     @property
     def ports(self) -> tuple[Port, ...]:

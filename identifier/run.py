@@ -132,7 +132,7 @@ class History:
             n = max(state_index(self.recording, t), 1)
             if n not in self.models:
                 driven = self.recording.taken(slice(0, n))
-                self.models[n] = whole.fitted(driven, self.vehicle, self.start)
+                self.models[n] = whole.fitted(driven, self.vehicle, self.start, None)
             return self.models[n]
         state = self.state_at(t)
         diverged_at = self.diverged_at
@@ -223,7 +223,7 @@ def identify(
     """
     recording, whole = _read(recording, vehicle, design), design.whole
     if whole is not None:
-        model = whole.fitted(recording, vehicle, start, progress=progress)
+        model = whole.fitted(recording, vehicle, start, progress)
         recording, outputs = _with_v_y(recording, model)
         return History(
             vehicle=vehicle,
@@ -307,7 +307,7 @@ def learn(
     recording = _read(recording, vehicle, design)
     n = len(recording) if t is None else state_index(recording, t)
     if design.whole is not None:
-        return design.whole.fitted(recording.taken(slice(0, max(n, 1))), vehicle, start)
+        return design.whole.fitted(recording.taken(slice(0, max(n, 1))), vehicle, start, None)
     state = design.setup(vehicle, start).last(recording, n)
     if not all(np.isfinite(value).all() for value in state.values()):
         raise DivergedError(f"the law diverged within {n} samples")

@@ -1,7 +1,7 @@
 """The axle identifier as a method: everything that is chosen before the car drives."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Any
@@ -229,13 +229,12 @@ class AxleIdentifier(Method):
         rises, pressed = self.rising_until is not None, vehicle.has_downforce
         return _scan(doublings(self.ladder), rises=rises, bands=bands, pressed=pressed)
 
-    def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.
+    @property
+    def setup_with_band(self) -> Callable[[Vehicle, TireModel | None], Setup]:
+        """As `setup`, of a step that outputs `half_band`, by the calibration of its start."""
+        return self._setup_with_band
 
-        Parameters
-        ----------
-        start : as of `setup`; without a calibration the declared errors are assumed.
-        """
+    def _setup_with_band(self, vehicle: Vehicle, start: TireModel | None) -> Setup:
         setup = self.setup(vehicle, start)
         stored = None if start is None else resumed_units(start, self.ladder).calibration
         given = BandCalibration.declared(brisk_speed(vehicle, self.min_speed))

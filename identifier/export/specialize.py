@@ -122,7 +122,10 @@ def specialize(
     with_a_y : whether a_y is an input of a method that goes without it as well.
     with_band : whether half the width of the band is an output, calibrated as `start` is.
     """
-    setup = (method.setup_with_band if with_band else method.setup)(vehicle, start)
+    making = method.setup_with_band if with_band else method.setup
+    if making is None:
+        raise ValueError(f"{type(method).__name__} cannot tell how sure it is: it has no band")
+    setup = making(vehicle, start)
     if not setup.scan.step.is_a("SXFunction"):
         raise ValueError(
             f"{type(method).__name__} cannot be exported: its step solves a problem by many calls, "
