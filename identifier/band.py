@@ -27,9 +27,6 @@ UNCALIBRATED = "of the identifier, not calibrated; run.tire calibrates it on the
 
 def normal_quantile(level: float) -> float:
     """Return z such that |x| <= z holds of a standard normal x in a share of cases.
-
-    Parameters
-    ----------
     level : the share, above 0 and below 1.
     """
     if not 0.0 < level < 1.0:
@@ -48,9 +45,6 @@ class BandSpread(NamedTuple):
 
     def half_width(self, factor: Array | float, level: float) -> Array:
         """Return half the width of a band [static axle loads].
-
-        Parameters
-        ----------
         factor : f, (k, 2) or one for all.
         """
         wide = np.sqrt(factor**2 * self.scaled + np.maximum(factor, 1.0) ** 2 * self.fixed)
@@ -58,11 +52,7 @@ class BandSpread(NamedTuple):
 
     def needed_factor(self, error: Array, noise: Array | float) -> Array:
         """Return f², with which a band of `LEVEL` just reaches an error; 0 where none is needed.
-
-        Parameters
-        ----------
-        error : [static axle loads].
-        noise : its variance that sensors made [static axle loads²].
+        error : [static axle loads].   noise : its variance that sensors made [static axle loads²].
         """
         size = (error / normal_quantile(LEVEL)) ** 2 - noise
         small = (size - self.fixed) / (self.scaled + TINY)
@@ -88,9 +78,6 @@ Model = TypeVar("Model", bound=_Curves)
 @dataclass(frozen=True, slots=True)
 class Band(ABC, Generic[Model]):
     """What is not known of the forces of a model, as a band around its curves.
-
-    Parameters
-    ----------
     model : whose band it is.
     """
 
@@ -117,11 +104,7 @@ class Band(ABC, Generic[Model]):
     @abstractmethod
     def spread(self, slip: Array, v_x: Array, pressed: Array) -> BandSpread:
         """Return the variances of the steady forces, (n, 2) each.
-
-        Parameters
-        ----------
-        slip : of front and rear axle [rad], (n, 2).
-        v_x : speeds [m/s], positive, (n,).
+        slip : of front and rear axle [rad], (n, 2).   v_x : speeds [m/s], positive, (n,).
         pressed : loads of the axles over the static ones [-], (n, 2).
         """
 
@@ -135,18 +118,12 @@ class Band(ABC, Generic[Model]):
         """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
 
         Standard deviation of the force over that of the prior.
-
-        Parameters
-        ----------
         alpha : slip angles [rad], (k,), not zero.
         """
 
     @abstractmethod
     def calibrated_by(self, calibration: Any, force_missed: Array | None = None) -> Model:
         """Return the model, its band calibrated.
-
-        Parameters
-        ----------
         calibration : None assumes the declared errors.
         force_missed : share of the force that the model misses of the identification drive, (2,);
             None where not computed.
@@ -171,9 +148,6 @@ class Band(ABC, Generic[Model]):
         """Return the model for a road whose friction is not that of the identification drive.
 
         Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
-
-        Parameters
-        ----------
         sd_friction : standard deviation of ln μ between the roads [-].
         """
         if not 0.0 <= sd_friction < np.inf:
@@ -206,9 +180,6 @@ class Band(ABC, Generic[Model]):
         v_x: float | None = None,
     ) -> tuple[float, float] | tuple[Array, Array]:
         """Return between which forces the true one lies [N]: (low, high), each as of `force`.
-
-        Parameters
-        ----------
         alpha, axle : as of `TireModel.force`.
         level : in which share of cases it shall, above 0 and below 1.
         v_x : speed [m/s], positive; None takes that of the identification drive.
@@ -227,9 +198,6 @@ class Band(ABC, Generic[Model]):
         self, alpha: Array, level: float = LEVEL, *, v_x: float | Array | None = None
     ) -> Array:
         """Return half its width around the steady forces, (k, 2) [N].
-
-        Parameters
-        ----------
         alpha : slip angles [rad], (k,).
         v_x : speed [m/s], a number or (k,), positive; None takes that of the identification drive,
             under static loads.
@@ -242,11 +210,7 @@ class Band(ABC, Generic[Model]):
 
     def along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
         """Return half its width where each axle has its own slip, (n, 2) [N].
-
-        Parameters
-        ----------
-        slip : of front and rear axle [rad], (n, 2).
-        v_x : speeds [m/s], positive, (n,).
+        slip : of front and rear axle [rad], (n, 2).   v_x : speeds [m/s], positive, (n,).
         """
         return self._half(slip, v_x, self.model.vehicle.load_ratio(v_x), level)
 
@@ -267,9 +231,6 @@ class Band(ABC, Generic[Model]):
         """Return half its width around the predicted forces of a drive, (n, 2) [N].
 
         It is zero where the forces read zero.
-
-        Parameters
-        ----------
         level : share of samples that it shall hold, above 0 and below 1.
         """
         moving = recording.v_x[:, None] >= self.model.min_speed

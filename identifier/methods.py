@@ -91,9 +91,6 @@ def _installed() -> dict[str, EntryPoint]:
 
 def draws_weights(name: str) -> bool:
     """Return whether a method begins with random weights, so that a seed changes its results.
-
-    Parameters
-    ----------
     name : one of `methods`.
     """
     return name in VARIANTS
@@ -129,11 +126,7 @@ def make_method(name: str, vehicle: Vehicle, seed: int = 0) -> Method:
 
 def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01, *, v_y: bool = True) -> Method:
     """Return the method that goes on from a model: it learns, or holds a fit and estimates v_y.
-
-    Parameters
-    ----------
-    dt : sampling interval [s].
-    v_y : whether there is a lateral velocity.
+    dt : sampling interval [s].   v_y : whether there is a lateral velocity.
 
     Raises
     ------

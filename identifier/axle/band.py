@@ -43,9 +43,6 @@ UNKNOWN = 0.25  # standard deviation over the prior's, from which on slip is not
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BandCalibration:
     """What stretches that did not teach a model say of its errors.
-
-    Parameters
-    ----------
     factors : of the errors of each range of slip, (2, 6).
     speeds : of the errors of each range of speed, over all, (2, 4).
     color : variance of a mean of errors over that of errors as declared, at least 1, (2,).
@@ -86,9 +83,6 @@ class BandCalibration:
     @classmethod
     def declared(cls, speed: float) -> Self:
         """Return that of a model whose errors are as declared, of a speed.
-
-        Parameters
-        ----------
         speed : [m/s], positive.
         """
         ones = np.ones((2, len(CENTERS))), np.ones((2, len(AT_SPEEDS)))
@@ -98,11 +92,7 @@ class BandCalibration:
 
     def factor(self, slip: Array, relative_speed: Array) -> Array:
         """Return the factors at slip angles and speeds, (k, 2): straight between centers.
-
-        Parameters
-        ----------
-        slip : of front and rear axle [rad], (k, 2).
-        relative_speed : over sqrt(g L), (k,).
+        slip : of front and rear axle [rad], (k, 2).   relative_speed : over sqrt(g L), (k,).
         """
         of_axles = zip(np.abs(slip).T, self.factors, self.speeds, strict=True)
         return np.column_stack(
@@ -114,9 +104,6 @@ class BandCalibration:
 
     def stretch(self, v_x: Array) -> Array:
         """Return s, by which errors of the model are larger at speeds, (k,).
-
-        Parameters
-        ----------
         v_x : speeds [m/s], positive, (k,).
         """
         return np.asarray(np.clip(self.speed / v_x, *STRETCH), dtype=np.float64)
@@ -157,9 +144,6 @@ class BandCalibration:
 
 def ranges_of(slip: Array) -> Any:
     """Return in which of the six ranges slip angles lie.
-
-    Parameters
-    ----------
     slip : its size [rad].
     """
     return np.searchsorted(RANGES, slip, side="right")
@@ -167,9 +151,6 @@ def ranges_of(slip: Array) -> Any:
 
 def colored(P: Array, prior: Array, color: float, factor: float = 1.0) -> Array:
     """Return a covariance as errors leave it that are correlated longer than declared.
-
-    Parameters
-    ----------
     P, prior : covariance now and before the first sample (q, q).
     color : how much less samples tell, at least 1.
     factor : of the errors along what was learnt; along the rest it only widens.
@@ -189,11 +170,7 @@ def colored(P: Array, prior: Array, color: float, factor: float = 1.0) -> Array:
 
 def colored_variance(left: Array, before: Array, color: Array) -> Array:
     """Return a bound of h'P' h, P' of `colored`, that is never below it and needs no inverse.
-
-    Parameters
-    ----------
-    left, before : h'P h and h'P₀ h, (k, 2).
-    color : how much less samples tell, at least 1, (2,).
+    left, before : h'P h and h'P₀ h, (k, 2).   color : how much less samples tell, at least 1, (2,).
     """
     share = np.minimum(left / np.maximum(before, TINY), 1.0)
     wider: Array = np.maximum(left, before * share * color / (1.0 + share * (color - 1.0)))
@@ -217,9 +194,6 @@ def sensor_noise(recording: Recording, vehicle: Vehicle) -> Array:
 
 def root(P: Array) -> Array:
     """Return R with R R' = P (q, q), also where P is singular.
-
-    Parameters
-    ----------
     P : covariance (q, q).
     """
     sd = np.sqrt(np.diag(P))
@@ -232,11 +206,7 @@ def declared_spread(
     force: Array, left: Array, before: Array, stretch: Array | float = 1.0
 ) -> BandSpread:
     """Return the variances (1 - ρ) (m² s² + v), scaled by the factor, and ρ (m² s² + v), fixed.
-
-    Parameters
-    ----------
-    force : φ of the model [static axle loads].
-    left, before : v and v₀ [static axle loads²].
+    force : φ of the model [static axle loads].   left, before : v and v₀ [static axle loads²].
     stretch : s, of errors of the model [-], a number or (k, 1).
     """
     share = np.minimum(left / np.maximum(UNKNOWN**2 * before, TINY), 1.0)

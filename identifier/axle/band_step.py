@@ -43,9 +43,6 @@ class BandNumbers(NamedTuple):
 
 def band_numbers(calibration: BandCalibration, froude_speed: float) -> BandNumbers:
     """Return the numbers of a step.
-
-    Parameters
-    ----------
     froude_speed : sqrt(g L) [m/s].
     """
     return BandNumbers(
@@ -61,11 +58,7 @@ def hinges(values: Array, at: Sequence[float]) -> Array:
     """Return [value at the first center, changes of slope at each but the last], (2, k).
 
     What is straight between centers is a sum of hinges: no table is searched.
-
-    Parameters
-    ----------
-    values : at the centers (2, k).
-    at : the centers (k,).
+    values : at the centers (2, k).   at : the centers (k,).
     """
     slopes = np.diff(values, axis=1) / np.diff(np.array(at))
     return np.column_stack([values[:, 0], np.diff(slopes, axis=1, prepend=0.0)])
@@ -73,11 +66,7 @@ def hinges(values: Array, at: Sequence[float]) -> Array:
 
 def hinged(numbers: list[Any], at: Sequence[float], x: Any) -> Any:
     """Return what `hinges` describe, level beyond the last center.
-
-    Parameters
-    ----------
-    numbers : of an axle, k entries.
-    at : the centers (k,).
+    numbers : of an axle, k entries.   at : the centers (k,).
     """
     x, value = smaller(x, at[-1]), numbers[0]
     for change, begin in zip(numbers[1:], at[:-1], strict=True):
@@ -110,9 +99,6 @@ def half_band(
     speeds: list[Any],
 ) -> Any:
     """Return half the width of the band of an axle [static axle loads].
-
-    Parameters
-    ----------
     at : the axle at the sample.
     P, prior : factors of the covariance now and before the first sample.
     """

@@ -368,9 +368,6 @@ def curve_tracks(
     vehicle: Vehicle, ladder: tuple[float, ...], W: Array, compliance: Array
 ) -> tuple[Track, ...]:
     """Return cornering stiffness, relaxation length, and the force that curves saturate at.
-
-    Parameters
-    ----------
     W : weights at each of k instants [static axle loads], (k, 2, n).
     compliance : [m per load], (k, 2).
     """

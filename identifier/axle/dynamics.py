@@ -22,12 +22,7 @@ def curve_at_speed(
     slip: Any, v_x: Any, W: Array, ladder: tuple[float, ...], vehicle: Vehicle
 ) -> Curve:
     """Return the force curve of a car at a slip and a speed, in static axle loads.
-
-    Parameters
-    ----------
-    slip : (2,) [rad].
-    v_x : longitudinal speed [m/s].
-    W : weights [static axle loads], (2, n).
+    slip : (2,) [rad].   v_x : longitudinal speed [m/s].   W : weights [static axle loads], (2, n).
     ladder : slip scales [rad], (n,).
     vehicle : whose downforce counts; without any the speed is not looked at.
     """
@@ -40,11 +35,7 @@ def curve_at_speed(
 
 def series_compliance(compliance: Array, share: Array, roll_frequency: float) -> Array:
     """Return the deflection of carcass and body per static axle load [m], (2,).
-
-    Parameters
-    ----------
-    compliance : of the carcass [m per load], (2,).
-    share : of the sway [-], (2,).
+    compliance : of the carcass [m per load], (2,).   share : of the sway [-], (2,).
     roll_frequency : ω [rad/s].
     """
     return compliance + GRAVITY / roll_frequency**2 * share
@@ -63,16 +54,10 @@ def lagged_force(
     least_lag: Any,
 ) -> tuple[Any, Any]:
     """Return the axle forces (2,) [N] and dα'/dt (2,) [rad/s].
-
-    Parameters
-    ----------
-    at : force curve at the lagged slip.
-    compliance : of `series_compliance`.
+    at : force curve at the lagged slip.   compliance : of `series_compliance`.
     offset : zero of the front steering [rad] and bias of v_y [m/s], (2,).
-    slip : lagged slip α' (2,) [rad].
-    x : [v_y, r] (2,).
-    delta : angle of the front wheels [rad].
-    v_x : longitudinal speed [m/s], positive.
+    slip : lagged slip α' (2,) [rad].   x : [v_y, r] (2,).
+    delta : angle of the front wheels [rad].   v_x : longitudinal speed [m/s], positive.
     least_lag : time under which no lag falls [s].
     """
     sideways = x[0] - offset[1] + ca.DM(car.arm) * x[1]

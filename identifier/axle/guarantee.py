@@ -48,9 +48,6 @@ AT_ONCE = 256  # samples times all vertices: so many products stay in the cache
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceBound:
     """By how much a force may differ from the best curve, front and rear.
-
-    Parameters
-    ----------
     error : e [static axle loads], (2,).
     lateness : τ [s], by which a force may be late or early, (2,).
 
@@ -79,20 +76,13 @@ class ForceBound:
     @classmethod
     def of(cls, given: "float | ForceBound") -> "ForceBound":
         """Return a bound as given: a number is the error of both axles, nothing is late.
-
-        Parameters
-        ----------
         given : number [static axle loads], or the bound itself.
         """
         return given if isinstance(given, ForceBound) else cls(error=(float(given), float(given)))
 
     def allowed(self, beyond: Array, rate: Array) -> Array:
         """Return e (1 + β) + τ ρ [static axle loads], (k, 2).
-
-        Parameters
-        ----------
-        beyond : β of both axles, (k, 2).
-        rate : ρ of both axles [1/s], (k, 2).
+        beyond : β of both axles, (k, 2).   rate : ρ of both axles [1/s], (k, 2).
         """
         wide: Array = np.array(self.error) * (1.0 + beyond) + np.array(self.lateness) * rate
         return wide
@@ -142,9 +132,6 @@ def prior_box(bounds: Bounds, ladder: tuple[float, ...]) -> HalfSpaces:
 
     Saturated force, stiffness at no slip and each weight are within bounds, and the secant
     stiffness φ(α)/α does not rise with slip, as of every brush and Magic Formula tire.
-
-    Parameters
-    ----------
     ladder : slip scales of the units [rad].
     """
     n, scales = len(ladder), np.array(ladder)
@@ -161,12 +148,7 @@ def prior_box(bounds: Bounds, ladder: tuple[float, ...]) -> HalfSpaces:
 
 def strip_sides(y: Array, h: Array, allowed: Array) -> HalfSpaces:
     """Return |y - h'w| <= allowed of one axle.
-
-    Parameters
-    ----------
-    y : (m,).
-    h : (m, n).
-    allowed : e (1 + β) + τ ρ (m,).
+    y : (m,).   h : (m, n).   allowed : e (1 + β) + τ ρ (m,).
     """
     return HalfSpaces(np.vstack([h, -h]), np.concatenate([allowed + y, allowed - y]))
 
@@ -256,9 +238,6 @@ def possible_weights(strips: Strips, axle: int, bound: ForceBound, box: HalfSpac
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PossibleWeights:
     """What a drive leaves possible of the curves of both axles, under a bound of the errors.
-
-    Parameters
-    ----------
     given : whether the bound was given; else it was estimated from the drive.
     corners : vertices of the possible weights of front and rear, (k, n) each.
     speed : mean of the drive that taught [m/s].
@@ -294,18 +273,12 @@ class PossibleWeights:
 
     def too_fast(self, rate: Array) -> Array:
         """Return by how much ρ is beyond that of the drive that taught, over it, (k, 2).
-
-        Parameters
-        ----------
         rate : ρ of both axles [1/s], (k, 2).
         """
         return _beyond_driven(rate, np.array(self.fastest))
 
     def reach(self, units: Array) -> tuple[Array, Array]:
         """Return least and largest h'w of the possible weights, (k, 2) each [static axle loads].
-
-        Parameters
-        ----------
         units : h of both axles (k, 2, n).
         """
         of = [_extremes(units[:, i], corners) for i, corners in enumerate(self.corners)]
@@ -314,9 +287,6 @@ class PossibleWeights:
 
     def limits(self, units: Array, doubt: Doubt) -> tuple[Array, Array]:
         """Return least and largest force, (k, 2) each [static axle loads].
-
-        Parameters
-        ----------
         units : h of both axles (k, 2, n).
         """
         low, high = self.reach(units)
@@ -346,9 +316,6 @@ class PossibleWeights:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], n: int) -> Self:
         """Return those that `to_dict` describes.
-
-        Parameters
-        ----------
         n : weights of each.
         """
         pairs = []
@@ -403,9 +370,6 @@ class Guarantee(NamedTuple):
         self, alpha: ArrayLike, axle: Axle | None = None, rate: ArrayLike = 0.0
     ) -> tuple[float, float] | tuple[Array, Array]:
         """Return least and largest steady force under static loads [N], each as of `force`.
-
-        Parameters
-        ----------
         alpha, axle : as of `TireModel.force`.
         rate : how fast the force changes, static axle loads per second, of the shape of `alpha` or
             one number: a force may be late. 0 is steady.
@@ -442,9 +406,6 @@ def force_rate(
     """Return ρ (k, 2) [1/s]: the larger of |dφ/dt| and of its mean over the last 0.3 s.
 
     Of several curves that which changes most counts, at each instant.
-
-    Parameters
-    ----------
     units : tanh(x/α_j) of both axles (k, 2, n).
     curves : weights of front and rear, (m, n) each [static axle loads].
     dt : sampling interval [s].
@@ -471,9 +432,6 @@ def _faded(signal: Array, dt: float) -> Array:
 
 def _beyond_driven(slip: Array, driven: Array) -> Array:
     """Return by how much slip, or ρ, is beyond that of a drive, over it, (k, 2); 0 within.
-
-    Parameters
-    ----------
     slip : of both axles [rad], (k, 2), or (k, 1) where both have the same; or ρ [1/s].
     driven : largest of the drive (2,), positive, of the same unit.
     """
@@ -482,11 +440,7 @@ def _beyond_driven(slip: Array, driven: Array) -> Array:
 
 def slip_beyond(slip: Array, driven: Array, dt: float, segments: Iterable[slice]) -> Array:
     """Return β (k, 2): the largest |x|/x_driven - 1 until now, each fading with 0.3 s; 0 within.
-
-    Parameters
-    ----------
-    slip : lagged x (k, 2) [rad].
-    driven : largest of the drive that taught (2,), positive [rad].
+    slip : lagged x (k, 2) [rad].   driven : largest of the drive that taught (2,), positive [rad].
     dt : sampling interval [s].
     """
     beyond = np.zeros_like(slip)
@@ -502,9 +456,6 @@ def grip_lost(along: Array, grip: Array) -> Array:
     """Return which share of a side force a force along the car may cost, (k, 2).
 
     An ellipse: 1 - √(1 - (f/grip)²). Which axle is driven or braked nobody tells; each could be.
-
-    Parameters
-    ----------
     along : f, force along the car over the load of each axle (k, 2).
     grip : what the axle carries at least (2,) or (k, 2) [static axle loads].
     """
@@ -514,12 +465,7 @@ def grip_lost(along: Array, grip: Array) -> Array:
 
 def along_acceleration(v_x: Array, turning: Array, dt: float, segments: Iterable[slice]) -> Array:
     """Return dv_x/dt - v_y r over the last 0.3 s (k,) [m/s²].
-
-    Parameters
-    ----------
-    v_x : forward speed (k,) [m/s].
-    turning : v_y r (k,) [m/s²].
-    dt : sampling interval [s].
+    v_x : forward speed (k,) [m/s].   turning : v_y r (k,) [m/s²].   dt : sampling interval [s].
     """
     along = np.zeros_like(v_x)
     for part in segments:

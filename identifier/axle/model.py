@@ -77,11 +77,7 @@ class AxleModel(TireModel):
     Odd in slip up to the sensor offsets, saturating at Σ w_j. Rows are axles, front and rear.
     Where the car has downforce, forces are those times λ = 1 + κ v_x² (`Vehicle.load_ratio`); what
     is given without a speed is of the static loads.
-
-    Parameters
-    ----------
-    ladder : slip scales α_j of the units [rad].
-    W : weights [static axle loads], (2, n).
+    ladder : slip scales α_j of the units [rad].   W : weights [static axle loads], (2, n).
     compliance : deflection of the carcass [m per static axle load], (2,).
     sway_share : of the sway of the body that the axle follows [-], (2,).
     offset : zero of the steering in front [rad], bias of v_y at the rear [m/s], (2,).
@@ -205,9 +201,6 @@ class AxleModel(TireModel):
 
     def slope_at(self, slip: Array) -> Array:
         """Return the slope of the curves under static loads at slips [static loads/rad], (n, 2).
-
-        Parameters
-        ----------
         slip : of front and rear axle [rad], (n, 2).
         """
         scales = np.array(self.ladder)
@@ -347,11 +340,7 @@ class AxleModel(TireModel):
         self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
     ) -> tuple[Any, Any]:
         """Return the axle forces (2,) [N] and the rate of lagged slip (2,) [rad/s].
-
-        Parameters
-        ----------
-        slip : lagged slip (2,) [rad].
-        x : [v_y, r] (2,), as the sensors read them while learning.
+        slip : lagged slip (2,) [rad].   x : [v_y, r] (2,), as the sensors read them while learning.
         """
         v_y = self.sensors.v_y(x[0], x[1], v_x)
         return lagged_force(

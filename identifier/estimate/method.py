@@ -34,11 +34,7 @@ class FitMethod(Method):
     """Maximum a posteriori of tires, body and sensors over a whole log.
 
     By `estimate.solve`, without a v_y by `estimate.latent`.
-
-    Parameters
-    ----------
-    min_speed : below this speed [m/s] forces read zero.
-    dt : sampling interval of the log [s].
+    min_speed : below this speed [m/s] forces read zero.   dt : sampling interval of the log [s].
     """
 
     judged_by = "tireid predict on another drive"

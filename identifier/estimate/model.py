@@ -95,9 +95,6 @@ class Segment(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class FittedModel(TireModel):
     """Axle forces of the forward model (`motion.model`) at estimated parameters.
-
-    Parameters
-    ----------
     p : parameters, as `motion.parameters` lists them (p,).
     covariance : of them (p, p); zero of what was not estimated.
     driven : largest slip of each axle that the drives reached [rad], (2,).
@@ -164,9 +161,6 @@ class FittedModel(TireModel):
 
     def curve_at(self, alpha: Array) -> tuple[Array, Array, Array]:
         """Return φ and dφ/dα (k, 2) [static loads], and slopes of φ over curve numbers (2, k, 9).
-
-        Parameters
-        ----------
         alpha : slip angles of each axle [rad], (k, 2).
         """
         phi, slope, J = [], [], []
@@ -192,9 +186,6 @@ class FittedModel(TireModel):
         a_x: float | None = None,
     ) -> float | Array:
         """Return the steady lateral force at slip angles, the wheels straight ahead [N].
-
-        Parameters
-        ----------
         a_x : longitudinal acceleration [m/s²]: braking and power take of the lateral force, and
             shift load between the axles. None is of tires that push nothing lengthwise, as those
             of a car that coasts.
@@ -211,11 +202,7 @@ class FittedModel(TireModel):
 
     def ratio(self, v_x: Array, a_x: Array) -> Array:
         """Return λ G, load and ellipse: force over that at static load of one that coasts, (k, 2).
-
-        Parameters
-        ----------
-        v_x : speeds [m/s], (k,).
-        a_x : longitudinal accelerations [m/s²], (k,).
+        v_x : speeds [m/s], (k,).   a_x : longitudinal accelerations [m/s²], (k,).
         """
         car = self.vehicle
         f = (np.asarray(a_x) + car.drag * np.square(v_x)) / GRAVITY
@@ -248,9 +235,6 @@ class FittedModel(TireModel):
         self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
     ) -> tuple[Any, Any]:
         """Return the axle forces (2,) [N] and the rate of lagged slip (2,) [rad/s].
-
-        Parameters
-        ----------
         x : [v_y, r] (2,), as the sensors of the drives read them.
         """
         v_y = x[0] - self["v_y_bias"] - self["v_y_angle"] * v_x - self["v_y_lever"] * x[1]
@@ -501,9 +485,6 @@ class FittedModel(TireModel):
         """Return the tires in the hidden units of the axle identifier.
 
         Curve, lag, sway and errors of the sensors; without load transfer and ellipse.
-
-        Parameters
-        ----------
         ladder : slip scales of the units [rad]; None takes `UNITS`, whose curves are within
             0.3 % of the static load.
         """
