@@ -49,11 +49,6 @@ class BandCalibration:
     speed : root mean square of v_x there [m/s], positive.
     noise : standard deviation of the white noise that sensors made: of the lateral velocity of
         front and rear axle [m/s], and of the steering in front [rad], (3,).
-
-    Raises
-    ------
-    ValueError
-        Where a number has the wrong shape or is out of its range.
     """
 
     factors: Array
@@ -123,13 +118,7 @@ class BandCalibration:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Return the calibration that `to_dict` describes.
-
-        Raises
-        ------
-        ValueError
-            Where the ranges or the level are others, or a value is impossible.
-        """
+        """Return the calibration that `to_dict` describes."""
         table = Table(data, "", ValueError, "band.")
         for name, ours in (
             ("ranges", list(RANGES)),

@@ -48,13 +48,8 @@ AT_ONCE = 256  # samples times all vertices: so many products stay in the cache
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceBound:
     """By how much a force may differ from the best curve, front and rear.
-    error : e [static axle loads], (2,).
-    lateness : τ [s], by which a force may be late or early, (2,).
-
-    Raises
-    ------
-    ValueError
-        Where an error is not positive or beyond 10, or a lateness negative or beyond 1 s.
+    error : e [static axle loads], above 0 and at most 10, (2,).
+    lateness : τ [s], by which a force may be late or early, from 0 to 1, (2,).
     """
 
     error: tuple[float, float]
@@ -242,11 +237,6 @@ class PossibleWeights:
     corners : vertices of the possible weights of front and rear, (k, n) each.
     speed : mean of the drive that taught [m/s].
     fastest : largest ρ of its means [static axle loads/s], (2,): beyond it the band opens.
-
-    Raises
-    ------
-    ValueError
-        Where there are no corners, one is not finite, or speed or rate is not positive.
     """
 
     bound: ForceBound

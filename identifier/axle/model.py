@@ -90,11 +90,6 @@ class AxleModel(TireModel):
     possible : weights that the drive left; None where nobody asked for a guarantee.
     force_missed : share of the measured force that it misses of the drive that taught, rms, (2,);
         None where nobody looked.
-
-    Raises
-    ------
-    ValueError
-        Where a number has the wrong shape or is not finite.
     """
 
     kind = "axle"
