@@ -204,12 +204,6 @@ class AxleModel(TireModel):
         return slope
 
     @property
-    def effective_calibration(self) -> BandCalibration:
-        """Calibration of the band; where there is none, of the declared errors."""
-        brisk = brisk_speed(self.vehicle, self.min_speed)
-        return self.calibration or BandCalibration.declared(brisk)
-
-    @property
     def guarantee(self) -> Guarantee | None:
         if self.possible is None:
             return None
@@ -449,12 +443,18 @@ class _AxleBand(Band[AxleModel]):
         return self.model.calibration is not None
 
     @property
+    def calibration(self) -> BandCalibration:
+        """That of the model; where there is none, of the declared errors."""
+        brisk = brisk_speed(self.model.vehicle, self.model.min_speed)
+        return self.model.calibration or BandCalibration.declared(brisk)
+
+    @property
     def speed(self) -> float:
-        return self.model.effective_calibration.speed
+        return self.calibration.speed
 
     def factor(self, slip: Array, v_x: Array) -> Array:
         relative = v_x / self.model.vehicle.froude_speed
-        return self.model.effective_calibration.factor(slip, relative)
+        return self.calibration.factor(slip, relative)
 
     def spread(self, slip: Array, v_x: Array, pressed: Array) -> BandSpread:
         model, n = self.model, len(self.model.ladder)
@@ -467,7 +467,7 @@ class _AxleBand(Band[AxleModel]):
             np.einsum("aki,aij,akj->ka", h, both, h)
             for both in (model.covariance, model.prior_covariance)
         )
-        calibration = model.effective_calibration
+        calibration = self.calibration
         left = colored_variance(left, before, calibration.color)
         force = np.einsum("aki,ai->ka", T, model.W) * pressed
         return declared_spread(force, left, before, calibration.stretch(v_x)[:, None])
@@ -525,7 +525,7 @@ class _AxleBand(Band[AxleModel]):
         return replace(model, covariance=wider, possible=None)
 
     def _samples(self, n: int, rng: np.random.Generator) -> tuple[AxleModel, ...]:
-        model, calibration = self.model, self.model.effective_calibration
+        model, calibration = self.model, self.calibration
         size = np.sqrt(np.mean(calibration.factors**2, axis=1))
         both = zip(model.covariance, model.prior_covariance, calibration.color, size, strict=True)
         roots = [root(colored(P, prior, float(c), float(f))) for P, prior, c, f in both]

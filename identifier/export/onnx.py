@@ -290,7 +290,7 @@ def _band_of_axle(model: AxleModel, graph: Graph, axle: int, units: str, force: 
     """
     nodes = _Nodes(graph, HALF_BANDS[axle].name)
     node, number = nodes.node, nodes.number
-    load, calibration = model.vehicle.axle_loads[axle], model.effective_calibration
+    load, calibration = model.vehicle.axle_loads[axle], model.band.calibration
     speed = calibration.speed
     h = nodes.sensitivity(model, axle, units, speed)
     left, before = (
