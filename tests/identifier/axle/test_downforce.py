@@ -140,7 +140,7 @@ def test_curves_with_a_speed_are_those_of_its_load(model):
     np.testing.assert_allclose(model.force(SLIPS), model.force(SLIPS), rtol=1e-9)
     assert model.force(0.03, "rear") == pytest.approx(model.force(np.array([0.03]))[0, 1])
     assert "30 m/s" in model.summary()
-    assert "30 m/s" not in replace(model, vehicle=UNTOLD, guarantee=None).summary()
+    assert "30 m/s" not in replace(model, vehicle=UNTOLD, possible=None).summary()
 
 
 def test_motion_and_lag_are_those_of_the_replay(model, drive):
@@ -212,7 +212,7 @@ def test_a_file_keeps_the_downforce_and_one_without_has_no_word_of_it(model, tmp
     again = load_model(tmp_path / "racer.json")
     assert again.vehicle.downforce == RACER.downforce
     np.testing.assert_array_equal(again.predict(drive), model.predict(drive))
-    assert "downforce" not in str(replace(model, vehicle=UNTOLD, guarantee=None).to_dict())
+    assert "downforce" not in str(replace(model, vehicle=UNTOLD, possible=None).to_dict())
 
 
 def test_the_certificate_states_no_time_of_a_drop_that_is_not_proven():
