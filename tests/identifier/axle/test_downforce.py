@@ -161,7 +161,7 @@ def test_motion_and_lag_are_those_of_the_replay(model, drive):
     _, found = sample.mapaccum(len(drive) - 1)(np.zeros(2), rows[:, :-1], rows[:, 1:])
     away = np.abs(np.array(found).T[100:] - force[101:]).max(axis=0)
     assert (away < 0.02 * np.abs(force).max(axis=0)).all()
-    plain = replace(soft, vehicle=UNTOLD, guarantee=None)
+    plain = replace(soft, vehicle=UNTOLD, possible=None)
     assert np.abs(plain.lagged_slip(drive) - slip).max() > 1e-3  # more slope, a longer lag
 
 
