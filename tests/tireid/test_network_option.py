@@ -159,7 +159,7 @@ def test_a_network_cannot_be_learnt_on_from_a_model():
     method = make_method("linear", CAR)
     with pytest.raises(ValueError, match="dt must be positive"):
         FrozenMethod(model=method, dt=0.0)
-    with pytest.raises(ValueError, match="learns nothing"):
+    with pytest.raises(ValueError, match="learns no tire"):
         FrozenMethod(model=method).setup(CAR, start=object())
 
 
