@@ -34,8 +34,9 @@ from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
 from codegen.processor import PROCESSORS, missing_tools, replay
 from identifier.axle import AxleIdentifier, AxleModel
-from identifier.axle.band import RANGES, SPEEDS, normal_quantile, ranges_of
+from identifier.axle.band import RANGES, SPEEDS, ranges_of
 from identifier.axle.curve import unit_matrix
+from identifier.band import normal_quantile
 from identifier.export.package import build_package, synthetic_samples
 from identifier.export.processor import recording_program
 from identifier.run import identify
@@ -129,8 +130,8 @@ def held(
     loads = np.array(model.vehicle.axle_loads)
     moving = (drive.v_x >= model.min_speed) & (drive.t >= drive.t[0] + lead)
     slips = np.abs(model.lagged_slip(drive))[moving]
-    away = (np.abs(model.axle_force(drive) - force) / loads)[moving]
-    wide = (model.half_band_over(drive) / loads)[moving]
+    away = (np.abs(model.predict(drive) - force) / loads)[moving]
+    wide = (model.band.over(drive) / loads)[moving]
     fast = np.searchsorted(SPEEDS, drive.v_x[moving] / model.vehicle.froude_speed, side="right")
     for i, axle in enumerate(AXLES):
         slip, error = slips[:, i], away[:, i]
@@ -220,7 +221,7 @@ def dart_cases() -> Iterator[Asked]:
         if {one, name} & set(SLOW):
             yield asked(("dart_slow",), tires, *truth)
         elif TILES in (one, name):
-            elsewhere = tires._replace(model=tires.model.on_another_road())
+            elsewhere = tires._replace(model=tires.model.band.on_another_road())
             yield asked(("dart_other_floor",), elsewhere, *truth)
             yield asked(("dart_other_floor_untold",), tires, *truth)
         else:

@@ -98,7 +98,7 @@ def missed(model: ti.TireModel, drives: list[Recording]) -> Errors:
     for one in drives:
         assert one.axle_force is not None
         late = one.t >= TURNED
-        wrong += np.square(model.axle_force(one) - one.axle_force)[late].sum(axis=0)
+        wrong += np.square(model.predict(one) - one.axle_force)[late].sum(axis=0)
         true += np.square(one.axle_force)[late].sum(axis=0)
     front, rear = np.sqrt(wrong / true)
     return Errors(float(front), float(rear))

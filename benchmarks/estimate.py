@@ -312,7 +312,7 @@ def judge_place(
     print(f"{place}: {len(tasks)} drives teach; mean, median and worst [% of rms force]")
     means: dict[str, float] = {}
     for name in names:
-        if not make_method(name, tasks[0].car).needs_v_y:
+        if "v_y" not in make_method(name, tasks[0].car).needs:
             continue  # it tells v_y: `without_v_y`
         try:
             errors = [error for one in tasks for error in errors_of(one, name)]
@@ -456,8 +456,8 @@ def held(tire: TireModel, asked: Recording, *, since: float = 0.0, slow: float =
     """
     assert isinstance(tire, FittedModel) and asked.axle_force is not None
     counts = (asked.t >= since) & (asked.v_x >= max(slow, tire.min_speed))
-    away = np.abs(tire.axle_force(asked) - asked.axle_force)
-    return 100.0 * float(np.mean((away <= tire.half_band_over(asked, LEVEL))[counts]))
+    away = np.abs(tire.predict(asked) - asked.axle_force)
+    return 100.0 * float(np.mean((away <= tire.band.over(asked, LEVEL))[counts]))
 
 
 Case = tuple[str, Vehicle, Sequence[Recording], Recording, float, float]

@@ -37,14 +37,14 @@ def faults(targets: Targets) -> None:
             finite = np.isfinite(history.axle_force).all()
             try:
                 force = history.design.frozen(car, history.state_at(clean.t[-1]))
-                finite = finite and np.isfinite(force.axle_force(recording)).all()
+                finite = finite and np.isfinite(force.predict(recording)).all()
             except CannotFreezeError:
                 pass
             except ValueError:
                 finite = np.bool_(False)
             lost += [] if finite else [name]
             if name == LIVE and finite:
-                error = course.share(clean.name, course.error(clean, force.axle_force(clean)))
+                error = course.share(clean.name, course.error(clean, force.predict(clean)))
                 show(f"{fault}: {LIVE} frozen, on the clean slalom", f"{error:.1f} %")
                 targets.record(f"faults/{_slug(fault)}/{LIVE}", error, "%")
         text = f" ({', '.join(lost)})" if lost else ""

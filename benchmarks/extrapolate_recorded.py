@@ -11,6 +11,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.floor import axle_structure, fit_floor
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
@@ -124,7 +125,7 @@ def _outside(targets: Targets, learnt: Recording, unseen: Recording) -> None:
                 targets.record(f"{key}_linear", one.linear, "%")
     grid = np.linspace(-0.5, 0.5, 201)
     curve = max(
-        float((np.abs(model.force_at(grid)).max(axis=0) / CARMAKER.axle_loads).max())
+        float((np.abs(model.force(grid)).max(axis=0) / CARMAKER.axle_loads).max())
         for model in models
     )
     label = "  largest force up to 29 deg, over the axle's load"
@@ -147,13 +148,20 @@ def _learnt(car: Vehicle, recording: Recording) -> AxleModel:
     return model
 
 
+def outside_known(model: AxleModel, recording: Recording) -> NDArray[np.bool_]:
+    """Return where the slip of a drive leaves the range that a model knows, (n, 2)."""
+    slip = model.setup(recording.dt).output(recording, "slip_size")
+    outside: NDArray[np.bool_] = slip > model.known_slip
+    return outside
+
+
 def _by_slip(model: AxleModel, recording: Recording, axle: int) -> BySlip:
     """Errors of a model on a drive, by whether it knows the slip."""
     car, truth = model.vehicle, recording.axle_force
     assert truth is not None
     stiffness = [car.cornering_stiffness_front, car.cornering_stiffness_rear]
     linear = recording.alpha(car.l_f, car.l_r) * stiffness
-    force, outside = model.axle_force(recording), model.outside(recording)[:, axle]
+    force, outside = model.predict(recording), outside_known(model, recording)[:, axle]
     own, line, right = force[:, axle], linear[:, axle], truth[:, axle]
     inside = _error(own[~outside], right[~outside])
     if not outside.any():

@@ -285,7 +285,7 @@ def missed(model: TireModel, drives: Sequence[Recording]) -> float:
         force = one.axle_force
         assert force is not None
         late = one.t > one.t[-1] - 29.0
-        away = (model.axle_force(one) - force)[late]
+        away = (model.predict(one) - force)[late]
         shares.append(np.sqrt((away**2).mean(axis=0) / (force[late] ** 2).mean(axis=0)))
     return float(np.mean(shares))
 

@@ -122,7 +122,7 @@ def _errors(model: TireModel, recording: Recording) -> Array:
     counted = counted_samples(recording, model.min_speed)
     size = axle_rms(truth, counted)
     unit = np.array([size.front, size.rear]) * np.sqrt(np.count_nonzero(counted))
-    errors: Array = (model.axle_force(recording) - truth)[counted] / unit
+    errors: Array = (model.predict(recording) - truth)[counted] / unit
     return errors
 
 
@@ -153,13 +153,16 @@ def axle_structure(method: AxleIdentifier, vehicle: Vehicle) -> Structure:
         return np.concatenate([scattered.ravel(), (own / scale).ravel()])
 
     def model(parameters: Array) -> AxleModel:
+        compliance, share, offset = (parameters[2 * n :].reshape(2, 3) * scale).T
         return AxleModel(
             vehicle=vehicle,
             ladder=method.ladder,
             sway=method.sway,
             plausibility=method.plausibility,
             W=parameters[: 2 * n].reshape(2, n).copy(),
-            own=parameters[2 * n :].reshape(2, 3) * scale,
+            compliance=compliance,
+            sway_share=share,
+            offset=offset,
             covariance=prior,
             prior_covariance=prior,
             excitation=np.zeros((2, 1 + len(EDGES))),

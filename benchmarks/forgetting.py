@@ -149,7 +149,7 @@ def left_of(model: NetworkModel, asked: list[Recording]) -> After:
     missed, force = 0.0, 0.0
     for recording in asked:
         assert recording.axle_force is not None
-        missed += float(np.mean((model.axle_force(recording) - recording.axle_force) ** 2))
+        missed += float(np.mean((model.predict(recording) - recording.axle_force) ** 2))
         force += float(np.mean(recording.axle_force**2))
     W, V = (float(np.linalg.norm(weights)) for weights in model.weights)
     return After(100.0 * (missed / force) ** 0.5, W, V)

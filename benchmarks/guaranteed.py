@@ -4,7 +4,7 @@
 
 Random cars of four classes learn on a drive with good sensors, and `run.guarantee()` states which
 forces they can have, by the motion alone. Then other random drives of each, of other speeds: one
-counts as outside where at any instant the true force of an axle is outside of `guaranteed_force`,
+counts as outside where at any instant the true force of an axle is outside of `guarantee.over`,
 known slip or not, with exact signals, as the band says nothing of sensors. Half the width of the
 band is meant over the known slip, and set over the largest error of the frozen model there, as
 `bounds_monte_carlo` sets bounds over the largest error that was observed; and over the rms error.
@@ -87,13 +87,12 @@ def asked(models: dict[str, AxleModel], drive: Recording, lead: float) -> dict[s
     assert force is not None
     counts = (drive.v_x >= model.min_speed) & moving(drive, lead)
     force = force[counts]
-    error = np.abs(model.axle_force(hidden)[counts] - force)
+    error = np.abs(model.predict(hidden)[counts] - force)
     known = np.abs(model.lagged_slip(hidden))[counts] <= model.known_slip
     found = {}
     for kind, one in models.items():
-        limits = one.guaranteed_force(hidden)
-        assert limits is not None
-        low, high = (side[counts] for side in limits)
+        assert one.guarantee is not None
+        low, high = (side[counts] for side in one.guarantee.over(hidden))
         beyond = float((np.maximum(low - force, force - high) / loads).max())
         largest, rms = np.full(2, np.nan), np.full(2, np.nan)
         for i in range(2):

@@ -5,7 +5,7 @@
 Random cars of four classes learn on one drive, as in `guaranteed.py`, steered at 0.4 to 1.5 Hz.
 Then each is asked about sines of 1.5 and 2.5 Hz at the speed of that drive, of a quarter to all of
 its steering angle. Counted are those whose slip stays within what taught; one is outside where at
-any instant the true force of an axle is outside of `guaranteed_force`. The same drives are counted
+any instant the true force of an axle is outside of `guarantee.over`. The same drives are counted
 against the band as it was without ρ in β. These cars had been looked at when ρ came into β; ask
 others with `--first 1100`.
 """
@@ -44,10 +44,10 @@ def plant_case(job: tuple[str, int]) -> list[tuple[float, dict[str, Asked]]]:
     kind, seed = job
     drive = drawn(kind, seed)
     model = guaranteed(learnt(drive.log(np.random.default_rng([seed, 1])), drive.car.told))
-    assert isinstance(model, AxleModel) and model.guarantee is not None
+    assert isinstance(model, AxleModel) and model.possible is not None
     models = {
         "": model,
-        "without": replace(model, guarantee=replace(model.guarantee, fastest=(ANY_RATE, ANY_RATE))),
+        "without": replace(model, possible=replace(model.possible, fastest=(ANY_RATE, ANY_RATE))),
     }
     largest, found = float(np.abs(drive.exact.delta_f).max()), []
     for frequency in FREQUENCIES:

@@ -72,7 +72,7 @@ def dart(targets: Targets) -> None:
     for run, model in fits.items():
         history = onward(model, tape)
         found = missed(history.axle_force, tape, moving + SETTLED, slowest)
-        held = missed(model.axle_force(tape), tape, moving + SETTLED, slowest)
+        held = missed(model.predict(tape), tape, moving + SETTLED, slowest)
         good += bool(found.max() <= 25.0)
         print(f"{run} -> tape: {found.round(1)} %, held {held.round(1)}; {changes(history)}")
         for axle, value in zip(("front", "rear"), found, strict=True):
@@ -86,7 +86,7 @@ def dart(targets: Targets) -> None:
             history = onward(model, logs[other])
             false += len(changes(history))
             found = missed(history.axle_force, logs[other], moving + SETTLED, slowest)
-            held = missed(model.axle_force(logs[other]), logs[other], moving + SETTLED, slowest)
+            held = missed(model.predict(logs[other]), logs[other], moving + SETTLED, slowest)
             print(f"{run} -> {other}: {found.round(1)}, held {held.round(1)}; {changes(history)}")
     targets.at_most("changes of road told on the same floor", false, 0, "", key="false")
     freezes(targets, slowest)
@@ -98,7 +98,7 @@ def freezes(targets: Targets, slowest: float) -> None:
     history = ti.identify(log, DART, ti.make_method(LIVE, DART), check=False).history
     times = np.arange(log.t[0] + FREEZES[0], log.t[-1], FREEZES[1])
     found = [
-        missed(history.freeze(float(t)).axle_force(log), log, float(log.t[0]), slowest)
+        missed(history.freeze(float(t)).predict(log), log, float(log.t[0]), slowest)
         for t in (*times, float(log.t[-1]))
     ]
     worst = np.max(np.array(found[:-1]) / found[-1])
@@ -126,7 +126,7 @@ def random(targets: Targets, cars: int) -> None:
             since = SETTLED + (0.0 if ratio == 1.0 else change)
             slowest = 0.45 * car.vehicle.froude_speed
             found = missed(history.axle_force, exact, since, slowest)
-            held = missed(model.axle_force(exact), exact, since, slowest)
+            held = missed(model.predict(exact), exact, since, slowest)
             unnoticed += ratio < 1.0 and not any(t >= change for t in told)
             if ratio < 1.0:
                 after.append(found.max())

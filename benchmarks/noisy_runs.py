@@ -135,7 +135,7 @@ def run(seed: int) -> Ended:
         history = ti.identify(log, told, check=False)
         for t in (float(log.t[len(log) // 2]), None):
             tire = history.freeze(t)
-            if not np.isfinite(tire.axle_force(log)).all():
+            if not np.isfinite(tire.predict(log)).all():
                 return Ended(seed, drive.car.kind, "force that is not finite")
         stiffness = tire.stiffness
         assert stiffness is not None

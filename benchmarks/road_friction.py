@@ -102,7 +102,7 @@ def wrong_at(model: ti.TireModel, drive: Recording, since: float, lasts: float =
     lasts : how long it must stay wrong [s].
     """
     assert drive.axle_force is not None
-    away = np.abs(model.axle_force(drive) - drive.axle_force) / np.array(model.vehicle.axle_loads)
+    away = np.abs(model.predict(drive) - drive.axle_force) / np.array(model.vehicle.axle_loads)
     fast = drive.v_x >= BRISK * model.vehicle.froude_speed
     wrong = (away.max(axis=1) > WRONG) & (drive.t >= since) & fast
     n = max(1, round(lasts / drive.dt))

@@ -1,7 +1,7 @@
 """The format of stored frozen models, and the refusal of tires that no road has."""
 
-from collections.abc import Mapping
-from typing import Any, Protocol
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
@@ -44,22 +44,13 @@ def vehicle_from(data: Mapping[str, Any]) -> Vehicle:
     return Vehicle(**table.record(Vehicle, skip=("chassis",)))
 
 
-class _SteadyTires(Protocol):
-    """What has steady axle forces at slip angles, and knows the linear tires of its car."""
-
-    @property
-    def vehicle(self) -> Vehicle:
-        """The car, with the cornering stiffnesses that are stated of it."""
-
-    def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles, (k, 2) [N].
-        alpha : slip angles in the paper's sign [rad], (k,).
-        """
-
-
-def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
-    """Refuse tires that no road has: forces that are not finite or too large, or a dead axle."""
-    force = np.asarray(tires.force_at(np.array([-WIDE, -PROBE, PROBE, WIDE])))
+def require_alive(
+    refusal: type[ValueError], steady: Callable[[Array], Array], vehicle: Vehicle
+) -> None:
+    """Refuse tires that no road has: forces that are not finite or too large, or a dead axle.
+    steady : axle forces at slip angles (k,) [rad], (k, 2) [N].   vehicle : states its stiffnesses.
+    """
+    force = np.asarray(steady(np.array([-WIDE, -PROBE, PROBE, WIDE])))
     if not (np.abs(force) <= LARGEST_FORCE).all():
         raise refusal(
             f"axle forces must be finite and below {LARGEST_FORCE:g} N, at {WIDE} rad of slip and "
@@ -72,7 +63,7 @@ def require_alive(refusal: type[ValueError], tires: _SteadyTires) -> None:
             "and the sign of slip (slip_sign)"
         )
     slope = (force[2] - force[1]) / (2.0 * PROBE)
-    for axle, here, said in zip(("front", "rear"), slope, tires.vehicle.bicycle[4:], strict=True):
+    for axle, here, said in zip(("front", "rear"), slope, vehicle.bicycle[4:], strict=True):
         if not here >= DEAD * said:
             raise refusal(
                 f"the {axle} axle does not push: it has {here:.4g} N/rad, its vehicle {said:.4g}; "

@@ -7,7 +7,7 @@ the same code; they differ in the `Method` that is handed over.
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, is_dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeGuard, TypeVar, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,16 +37,11 @@ def resumed(start: TireModel, kind: type[Model], refusal: str, **structure: Any)
     """Return a stored model to begin with, of the kind and structure that a method learns.
     structure : what the method and the model must agree on, by attribute of the model.
     """
-    if not fits(start, kind, **structure):
+    if not isinstance(start, kind) or any(
+        getattr(start, name) != value for name, value in structure.items()
+    ):
         raise ValueError(refusal)
     return start
-
-
-def fits(start: TireModel, kind: type[Model], **structure: Any) -> TypeGuard[Model]:
-    """Return whether a stored model is of the kind and structure that a method learns."""
-    return isinstance(start, kind) and all(
-        getattr(start, name) == value for name, value in structure.items()
-    )
 
 
 OTHER_STRUCTURE = "the stored weights are of another structure than the design's"
@@ -86,6 +81,50 @@ class Run(Protocol):
         """
 
 
+class Accelerometer(NamedTuple):
+    """What of an accelerometer's a_y a method takes for no force of the tires.
+
+    beside_force : of carried values by port at n + 1 instants of a run: what it found to be none,
+    to the left (n,) [car weights]: what a banked road pushes, bias, roll of the body.   body : of a
+    car the prior of how its body rolls; None where v_y is not estimated.
+    """
+
+    beside_force: Callable[[Mapping[str, Array]], Array]
+    body: "Callable[[Vehicle], Body] | None" = None
+
+
+class Limits(NamedTuple):
+    """Where the estimates of a method stay, whatever is measured.
+
+    boxes : least and largest of each number, by name and unit.   curves : weights that the curve of
+    a tire can have.   active : of carried values the estimates at active bounds.
+    """
+
+    boxes: Mapping[str, Any]
+    curves: "HalfSpaces"
+    active: Callable[[Mapping[str, Array]], tuple[Reached, ...]] = lambda _: ()
+
+
+class WholeLog(NamedTuple):
+    """How a method learns from a whole log.
+
+    reads : of a log and its car the log as the method reads it: a whole one may be read better than
+    its samples.   fitted : of that log, its car, what is believed before or None, and None or what
+    is called now and then with the share that is done, 0 to 1: the tires.
+    """
+
+    reads: Callable[[Recording, Vehicle], Recording]
+    fitted: Callable[
+        [Recording, Vehicle, TireModel | None, Callable[[float], None] | None], TireModel
+    ]
+
+
+def require_fresh(start: TireModel | None) -> None:
+    """Refuse a stored model as the beginning of a run, where no tire is identified."""
+    if start is not None:
+        raise ValueError("what learns no tire cannot begin with a stored model")
+
+
 class Method(ABC):
     """A way to identify axle forces: everything that is chosen before the car drives."""
 
@@ -104,73 +143,33 @@ class Method(ABC):
     judged_by = ""  # what gives the certificate, where a package cannot hold it
     estimates = ""  # what a method tells that learns no tire
 
-    @property
-    def needs_v_y(self) -> bool:
-        """Whether its step needs a measured lateral velocity; else its step estimates it."""
-        return True
-
-    @property
-    def tells_v_y(self) -> bool:
-        """Whether it estimates the lateral velocity of a recording without one."""
-        return not self.needs_v_y
-
-    @property
-    def needs_a_y(self) -> bool:
-        """Whether it learns nothing from a recording without an accelerometer."""
-        return False
+    needs: tuple[str, ...] = ("v_y",)
+    """Channels that its step needs to learn, beside v_x, r and steering."""
 
     @property
     def remark(self) -> str:
         """What a table of methods must say of it beside its name; empty: nothing."""
         return ""
 
-    def reads(self, recording: Recording, vehicle: Vehicle) -> Recording:
-        """Return a log as the method reads it; a whole one may be read better than its samples."""
-        del vehicle
-        return recording
+    @property
+    def whole(self) -> WholeLog | None:
+        """How it learns from a whole log at once; None: sample by sample, by its step."""
+        return None
 
     @property
-    def whole(self) -> bool:
-        """Whether it learns from a whole log at once, by `fitted`, and has no step."""
-        return False
+    def accelerometer(self) -> Accelerometer | None:
+        """What it explains of an accelerometer's a_y; None where it takes all for a force."""
+        return None
 
-    def fitted(
-        self,
-        recording: Recording,
-        vehicle: Vehicle,
-        start: TireModel | None = None,
-        *,
-        progress: Callable[[float], None] | None = None,
-    ) -> TireModel:
-        """Return the tires that a whole log taught: of a method that is `whole`.
+    @property
+    def limits(self) -> Limits | None:
+        """Where its estimates stay; None where they have no bounds."""
+        return None
 
-        Parameters
-        ----------
-        progress : called now and then with the share that is done, 0 to 1.
-
-        Raises
-        ------
-        CannotFreezeError
-            For a method that learns sample by sample.
-        """
-        del recording, vehicle, start, progress
-        raise CannotFreezeError("it learns sample by sample")
-
-    def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.
-
-        Parameters
-        ----------
-        start : as of `setup`; its calibration is that of the band.
-
-        Raises
-        ------
-        ValueError
-            Where the method cannot tell how sure it is, or stored weights are those of another
-            structure.
-        """
-        del vehicle, start
-        raise ValueError(f"{type(self).__name__} cannot tell how sure it is: it has no band")
+    @property
+    def setup_with_band(self) -> Callable[[Vehicle, TireModel | None], Setup] | None:
+        """As `setup`, of a step that outputs `half_band` (2,) [N], too; None: it has no band."""
+        return None
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -178,9 +177,9 @@ class Method(ABC):
         return (AXLE_FORCE,)
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
-        """Return what is proven of it: nothing, where a method does not say more."""
+        """Return what is proven of it: its limits, where a method does not say more."""
         del vehicle, driving
-        return Certificate()
+        return Certificate(limits={} if self.limits is None else self.limits.boxes)
 
     def certify_along(self, history: Run) -> Certificate:
         """Return what is proven of what a run of it taught: nothing, where it does not say more."""
@@ -210,33 +209,6 @@ class Method(ABC):
         """
         del vehicle, state
         return ()
-
-    def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
-        """Return the estimates at active bounds: none, where there are no bounds."""
-        del vehicle, state
-        return ()
-
-    def beside_force(self, state: Mapping[str, Array]) -> Array | None:
-        """Return what a run found to be no force of the tires, to the left (n,) [weights].
-
-        What a banked road pushes; without a v_y what the accelerometer shows beside forces: bias,
-        and the roll of the body. None where a method takes all for a force.
-
-        Parameters
-        ----------
-        state : carried values by port at n + 1 instants, of a run.
-        """
-        del state
-        return None
-
-    def possible_tires(self) -> "HalfSpaces | None":
-        """Return the weights that the curve of a tire can have; None where it learns no curves."""
-        return None
-
-    def body_prior(self, vehicle: Vehicle) -> "Body | None":
-        """Return the prior of the roll of a car's body; None where v_y is not estimated."""
-        del vehicle
-        return None
 
     def port(self, name: str) -> Port:
         """Return what stands in an output or a carried value."""
@@ -269,13 +241,3 @@ class Method(ABC):
         """
         del vehicle, state
         raise CannotFreezeError(f"it estimates {self.estimates}, not a tire")
-
-    def require_fresh(self, start: TireModel | None) -> None:
-        """Reject a stored model as the beginning of a run, where no tire is identified.
-
-        Parameters
-        ----------
-        start : None, or the model.
-        """
-        if start is not None:
-            raise ValueError("what learns no tire cannot begin with a stored model")

@@ -74,9 +74,6 @@ _RIVALS = ("linear_kf", "joint_ekf", "washout", "mhe")
 
 def draws_weights(name: str) -> bool:
     """Return whether a method begins with random weights, so that a seed changes its results.
-
-    Parameters
-    ----------
     name : one of `methods`.
     """
     return name in VARIANTS
@@ -127,11 +124,7 @@ def require_method(name: str) -> None:
 
 def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01, *, v_y: bool = True) -> Method:
     """Return the method that goes on from a model: it learns, or holds a fit and estimates v_y.
-
-    Parameters
-    ----------
-    dt : sampling interval [s].
-    v_y : whether there is a lateral velocity.
+    dt : sampling interval [s].   v_y : whether there is a lateral velocity.
 
     Raises
     ------

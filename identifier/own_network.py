@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import casadi as ca
 import numpy as np
@@ -19,18 +19,17 @@ from codegen.errors import TireidError
 from codegen.writing import write_file
 from identifier.frozen import (
     FORMAT,
-    FrozenModelError,
     require_alive,
     require_min_speed,
     vehicle_from,
     vehicle_numbers,
 )
-from identifier.method import Method
+from identifier.method import Method, require_fresh
 from identifier.paper.network import SIGNALS, network_signals
 from identifier.setup import Setup
 from identifier.tire_model import StaticModel, TireModel
 from models.bicycle import BicycleParameters
-from models.rules import LARGEST_FORCE
+from models.rules import LARGEST_FORCE, require_positive
 from models.schema import Table, read_bytes
 from models.vehicle import Vehicle
 
@@ -195,7 +194,7 @@ class OnnxModel(StaticModel):
             raise ValueError(f"slip_sign must be 1 or -1, it is {self.slip_sign}")
         if self.inputs is not None:
             object.__setattr__(self, "inputs", tuple(self.inputs))
-        require_alive(UnusableNetworkError, self)
+        require_alive(UnusableNetworkError, self.force, self.vehicle)
         self._require_bounded()
 
     def _require_bounded(self) -> None:
@@ -265,7 +264,6 @@ class OnnxModel(StaticModel):
         return self.step(x, ca.vertcat(delta, 0), v_x, ca.vertcat(*self.vehicle.bicycle))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the model as plain numbers and words, ready for JSON; the network in base64."""
         return {
             "format": FORMAT,
             "kind": self.kind,
@@ -278,18 +276,14 @@ class OnnxModel(StaticModel):
         }
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], source: str) -> "OnnxModel":
-        try:
-            table = Table(data, "", FrozenModelError)
-            return cls(
-                vehicle=vehicle_from(table.value("vehicle")),
-                content=base64.b64decode(table.text("onnx_base64"), validate=True),
-                min_speed=table.number("min_speed_m_s"),
-                inputs=None if table.value("inputs") is None else table.texts("inputs"),
-                slip_sign=table.whole("slip_sign"),
-            )
-        except ValueError as error:
-            raise FrozenModelError(f"{source}: {error}") from error
+    def _read(cls, table: Table) -> Self:
+        return cls(
+            vehicle=vehicle_from(table.value("vehicle")),
+            content=base64.b64decode(table.text("onnx_base64"), validate=True),
+            min_speed=table.number("min_speed_m_s"),
+            inputs=None if table.value("inputs") is None else table.texts("inputs"),
+            slip_sign=table.whole("slip_sign"),
+        )
 
 
 @cache
@@ -337,25 +331,17 @@ class FrozenMethod(Method):
     dt: float = 0.01
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.dt < np.inf:
-            raise ValueError(f"dt must be positive, it is {self.dt}")
+        require_positive(ValueError, dt=self.dt)
 
     @property
     def min_speed(self) -> float:
-        """Below this speed [m/s] forces read zero."""
         return self.model.min_speed
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-        vehicle : the car; the model keeps its own.
-        start : None; there is nothing that a stored model could begin.
-        """
         del vehicle
-        if start is not None:
-            raise ValueError("a frozen model learns nothing, it cannot begin with a stored one")
+        require_fresh(start)
         return self.model.setup(self.dt)
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> OnnxModel:
-        """Return the model itself.   vehicle : the car; the model keeps its own."""
         del vehicle, state
         return self.model

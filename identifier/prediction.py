@@ -4,8 +4,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from codegen.arrays import Array
+from identifier.band import UNCALIBRATED
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
-from identifier.tire_model import UNCALIBRATED, TireModel
+from identifier.tire_model import TireModel
 from identifier.verdict import RoadFriction, Verdict, judge_prediction
 from identifier.verdict.motion import MotionError, motion_error
 from models.recordings import Recording
@@ -56,7 +57,7 @@ class Prediction:
         ValueError
             Where the band of the model is not calibrated: its errors would look like friction.
         """
-        if self.model.has_band and not self.model.band_calibrated:
+        if self.model.band is not None and not self.model.band.calibrated:
             raise ValueError(f"friction() wants a calibrated band; this one is {UNCALIBRATED}")
         return self.verdict.friction
 
@@ -78,7 +79,7 @@ def predict(model: TireModel, recording: Recording, *, since: float | None = Non
     model : the frozen model; samples below its minimum speed do not count.
     since : samples before this time [s] do not count; None counts all.
     """
-    force = model.axle_force(recording)
+    force = model.predict(recording)
     counted = counted_samples(recording, model.min_speed, since)
     truth = recording.axle_force
     return Prediction(

@@ -140,7 +140,7 @@ def replay(model: TireModel, online: History, *, since: float | None = None) -> 
         another.
     since : samples before this time [s] do not count; None counts all.
     """
-    force, truth = model.axle_force(online.recording), online.recording.axle_force
+    force, truth = model.predict(online.recording), online.recording.axle_force
     counted = counted_samples(online.recording, model.min_speed, since)
     return Replay(
         recording=online.recording,

@@ -128,11 +128,11 @@ class History:
         t : time in the recording's own clock [s]; None is the end.
         """
         t = float(self.recording.t[-1]) if t is None else t
-        if self.design.whole:
+        if (whole := self.design.whole) is not None:
             n = max(state_index(self.recording, t), 1)
             if n not in self.models:
                 driven = self.recording.taken(slice(0, n))
-                self.models[n] = self.design.fitted(driven, self.vehicle, self.start)
+                self.models[n] = whole.fitted(driven, self.vehicle, self.start, None)
             return self.models[n]
         state = self.state_at(t)
         diverged_at = self.diverged_at
@@ -144,15 +144,15 @@ class History:
         """Return what the model frozen at a time says of another recording, which teaches nothing.
         t : time of the freeze in this recording's own clock [s]; None is the end.
         """
-        if self.online:
+        if (whole := self.design.whole) is None:
             raise ValueError(
                 "a run that learns sample by sample cannot be asked about another drive: "
                 "freeze it and predict"
             )
         model = self.freeze(t)
-        known = self.design.reads(recording.as_logged(), self.vehicle)
+        known = whole.reads(recording.as_logged(), self.vehicle)
         recording, outputs = _with_v_y(known, model)
-        force = model.axle_force(recording)
+        force = model.predict(recording)
         return replace(
             self,
             recording=recording,
@@ -199,8 +199,7 @@ def check_recording(recording: Recording, design: Method) -> None:
         raise ValueError(
             f"{recording.name} is sampled at {recording.dt:g} s, the design at {design.dt:g} s"
         )
-    needed = {"v_y": not design.tells_v_y, "a_y": design.needs_a_y}
-    for name in (name for name, one in needed.items() if one):
+    for name in design.needs if design.whole is None else ():
         if getattr(recording, name) is None:
             raise RecordingError(
                 f"{recording.name}: there is no {name.replace('_', '')}, from which "
@@ -222,16 +221,15 @@ def identify(
     start : stored weights to begin with; None begins afresh.
     progress : called now and then with the share that is done, 0 to 1.
     """
-    recording = design.reads(recording.as_logged(), vehicle)
-    check_recording(recording, design)
-    if design.whole:
-        model = design.fitted(recording, vehicle, start, progress=progress)
+    recording, whole = _read(recording, vehicle, design), design.whole
+    if whole is not None:
+        model = whole.fitted(recording, vehicle, start, progress)
         recording, outputs = _with_v_y(recording, model)
         return History(
             vehicle=vehicle,
             design=design,
             recording=recording,
-            axle_force=model.axle_force(recording),
+            axle_force=model.predict(recording),
             state={},
             outputs=outputs,
             start=start,
@@ -274,6 +272,15 @@ def identify(
     )
 
 
+def _read(recording: Recording, vehicle: Vehicle, design: Method) -> Recording:
+    """Return a log as a method reads it; refuse one that it cannot run over."""
+    recording = recording.as_logged()
+    if design.whole is not None:
+        recording = design.whole.reads(recording, vehicle)
+    check_recording(recording, design)
+    return recording
+
+
 def _with_v_y(recording: Recording, model: TireModel) -> tuple[Recording, Mapping[str, Array]]:
     """Return a recording with the v_y that a model tells where there is none, and how well."""
     found = model.estimated_v_y(recording) if recording.v_y is None else None
@@ -297,11 +304,10 @@ def learn(
     """Return what a method has learnt, without a record of the way there: `identify` and freeze.
     t : time of the freeze in the recording's own clock [s]; None is the end.
     """
-    recording = design.reads(recording.as_logged(), vehicle)
-    check_recording(recording, design)
+    recording = _read(recording, vehicle, design)
     n = len(recording) if t is None else state_index(recording, t)
-    if design.whole:
-        return design.fitted(recording.taken(slice(0, max(n, 1))), vehicle, start)
+    if design.whole is not None:
+        return design.whole.fitted(recording.taken(slice(0, max(n, 1))), vehicle, start, None)
     state = design.setup(vehicle, start).last(recording, n)
     if not all(np.isfinite(value).all() for value in state.values()):
         raise DivergedError(f"the law diverged within {n} samples")
@@ -366,7 +372,7 @@ class OnlineIdentifier:
         """
         (v_y, r), (delta_f, delta_r) = x, u
         felt = math.nan if a_y is None else float(a_y)
-        needs_v_y = self.method.needs_v_y
+        needs_v_y = "v_y" in self.method.needs
         if not self.limits.accept(v_x, v_y, r, delta_f, delta_r, needs_v_y=needs_v_y):
             return self._refused()
         v_y = self.limits.possible(v_y)
@@ -397,7 +403,7 @@ class OnlineIdentifier:
         self.counts.refused += 1
         self.counts.missed += 1
         if self._stepper is not None and self._judges:
-            v_y = 0.0 if self.method.needs_v_y else math.nan
+            v_y = 0.0 if "v_y" in self.method.needs else math.nan
             self._take((v_y, 0.0), (0.0, 0.0), NOWHERE)
         if self.stale:
             self._force = np.zeros(2)

@@ -8,10 +8,10 @@ import importlib
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, overload
 
 import casadi as ca
 import numpy as np
@@ -19,6 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
 from codegen.escape import shown
+from identifier.band import AXLES as AXLES
+from identifier.band import Axle as Axle
+from identifier.band import Band, of_axle
 from identifier.frozen import FORMAT, FrozenModelError, require_alive
 from identifier.measured import NOT_IDENTIFIABLE, printed_unit, printed_value
 from identifier.setup import Setup
@@ -28,15 +31,11 @@ from models.schema import Table, read_json
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
-    from identifier.axle.band import BandCalibration, SpreadByRange
     from identifier.axle.guarantee import Guarantee
     from identifier.estimate.latent import LateralVelocity
 
-Axle = Literal["front", "rear"]
-AXLES: tuple[Axle, ...] = ("front", "rear")
 # As summaries and verdicts name what is learnt of an axle.
 STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
-UNCALIBRATED = "of the identifier, not calibrated; run.tire calibrates it on the drive"
 
 
 class _TireFunctions(NamedTuple):
@@ -110,6 +109,29 @@ class Reached(NamedTuple):
     refuses: bool
 
 
+class Drives(NamedTuple):
+    """What the identification drives of a model were, and what they had beside its tires.
+
+    speeds : least and largest [m/s], (2,); None where unknown.   lengthwise : parameters (p,) with
+    load transfer and ellipse, and covariance (p, p); None where there are none.   elsewhere : from
+    and to [s] of what was driven on another road.   notes : findings, code and one line of each.
+    at_bounds : estimates at active bounds.
+    """
+
+    speeds: Array | None = None
+    lengthwise: tuple[Array, Array] | None = None
+    elsewhere: tuple[tuple[float, float], ...] = ()
+    notes: tuple[tuple[str, str], ...] = ()
+    at_bounds: tuple[Reached, ...] = ()
+
+    def road_differs(self, t: Array) -> NDArray[np.bool_]:
+        """Return at which times `t` [s], (n,), the road was another."""
+        found = np.zeros(t.shape, dtype=bool)
+        for begin, end in self.elsewhere:
+            found |= (t >= begin) & (t <= end)
+        return found
+
+
 class TireModel(ABC):
     """Axle forces from weights that no longer change: the front and the rear tires of one car."""
 
@@ -136,15 +158,6 @@ class TireModel(ABC):
         dt : sampling interval of what is replayed [s].
         """
 
-    def axle_force(self, recording: Recording) -> Array:
-        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
-
-        Parameters
-        ----------
-        recording : its signals are the input; its forces are not looked at.
-        """
-        return self.setup(recording.dt).output(recording, "axle_force")
-
     def estimated_v_y(self, recording: Recording) -> "LateralVelocity | None":
         """Return the v_y of a drive whose sensors show none; None of tires that cannot tell it."""
         del recording
@@ -155,19 +168,29 @@ class TireModel(ABC):
         """Return the model as plain numbers and words, ready for JSON."""
 
     @classmethod
-    @abstractmethod
-    def from_dict(cls, data: dict[str, Any], source: str) -> "TireModel":
+    def from_dict(cls, data: dict[str, Any], source: str) -> Self:
         """Return the model that `to_dict` describes.
 
         Parameters
         ----------
-        data : as from `to_dict`.
+        source : what the data are from, for an error.
 
         Raises
         ------
         FrozenModelError
             Where a key is missing or a value impossible.
         """
+        try:
+            return cls._read(Table(data, "", FrozenModelError))
+        except KeyError as error:
+            raise FrozenModelError(f"{source}: key {error} is missing") from error
+        except (TypeError, ValueError) as error:
+            raise FrozenModelError(f"{source}: {error}") from error
+
+    @classmethod
+    @abstractmethod
+    def _read(cls, table: Table) -> Self:
+        """Return the model that the table of `to_dict` describes."""
 
     @abstractmethod
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
@@ -199,10 +222,8 @@ class TireModel(ABC):
         """Whether the force follows a lagged slip, two more states."""
         return False
 
-    @property
-    def scales_with_load(self) -> bool:
-        """Whether forces are in static axle loads, so that another car's model scales to a car."""
-        return False
+    scales_with_load = False
+    """Whether forces are in static axle loads, so that another car's model scales to a car."""
 
     def mounted_on(self, vehicle: Vehicle) -> "TireModel":
         """Return the tires on another car, their forces scaled by its static axle loads.
@@ -217,7 +238,7 @@ class TireModel(ABC):
         )
 
     def at_friction(self, ratio: float) -> "TireModel":
-        """Return the tires on a road of another friction.
+        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ): the stiffness stays.
 
         Parameters
         ----------
@@ -229,10 +250,6 @@ class TireModel(ABC):
             Where the ratio is not positive, or the model cannot be scaled to another friction.
         """
         raise ValueError(f"a {type(self).__name__} cannot be scaled to a friction of {ratio:g}")
-
-    def beside_v_y(self) -> "TireModel":
-        """Return the model as the beginning of a method with a given lateral velocity."""
-        return self
 
     def in_units(self, ladder: tuple[float, ...] | None = None) -> "TireModel":
         """Return the model in the hidden units of the axle identifier where it projects on them.
@@ -247,23 +264,24 @@ class TireModel(ABC):
         return self
 
     @property
-    def reference_speed(self) -> float:
-        """Speed [m/s] at which a force that depends on it is given, 4 sqrt(g L): brisk driving."""
-        return brisk_speed(self.vehicle, self.min_speed)
+    def _loads(self) -> Array:
+        return np.array(self.vehicle.axle_loads)
 
     @property
-    def curve_speed(self) -> float:
-        """Speed [m/s] at which curves and stiffness are given that are asked for without one."""
-        return self.reference_speed
+    def _curve_speed(self) -> float:
+        """Speed [m/s] of curves that are asked for without one; 0 is under static loads."""
+        if self.scales_with_load and self.vehicle.has_downforce:
+            return 0.0
+        return brisk_speed(self.vehicle, self.min_speed)
 
     def predict(self, recording: Recording) -> Array:
-        """Return the axle forces that the model predicts of a drive, (n, 2) [N].
+        """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
 
         Parameters
         ----------
         recording : its signals are the input; its forces are not looked at.
         """
-        return self.axle_force(recording)
+        return self.setup(recording.dt).output(recording, "axle_force")
 
     @overload
     def force(self, alpha: float, axle: Axle, *, v_x: float | None = None) -> float: ...
@@ -283,35 +301,25 @@ class TireModel(ABC):
         ----------
         alpha : slip angles in the paper's sign [rad], a number or an array of any shape.
         axle : "front" or "rear", for a result of the shape of `alpha`; None gives both, (..., 2).
-        v_x : speed [m/s]; None takes `curve_speed`. A curve of slip does not look at it, but where
-            the car has downforce.
+        v_x : speed [m/s]; None is brisk driving, 4 sqrt(g L), and where the car has downforce, of a
+            curve of slip, static loads. Else a curve of slip does not look at it.
         """
-        if axle is not None and axle not in AXLES:
-            raise ValueError(f"axle must be front or rear, it is {axle!r}")
         slip = np.asarray(alpha, dtype=np.float64)
-        pairs = np.tile(slip.ravel(), (2, 1))
-        speed = self.curve_speed if v_x is None else v_x
-        found = self._force_curve()(pairs, speed) if slip.size else pairs
-        both: Array = np.array(found, dtype=np.float64).T.reshape(*slip.shape, 2)
-        if axle is None:
-            return both
-        one: Array = both[..., AXLES.index(axle)]
-        return float(one) if slip.ndim == 0 else one
+        both = self._steady(slip.ravel(), self._curve_speed if v_x is None else v_x)
+        one = of_axle(both.reshape(*slip.shape, 2), axle)
+        return float(one) if one.ndim == 0 else one
 
-    def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles, (k, 2) [N].
-
-        Parameters
-        ----------
-        alpha : slip angles in the paper's sign [rad], (k,).
-        """
-        return self.force(alpha)
+    def _steady(self, alpha: Array, v_x: float) -> Array:
+        """Return the steady axle forces at slip angles (k,) [rad] and a speed, (k, 2) [N]."""
+        pairs = np.tile(alpha, (2, 1))
+        found = self._force_curve()(pairs, v_x) if alpha.size else pairs
+        return np.array(found, dtype=np.float64).T
 
     @property
     def stiffness(self) -> Array:
         """Cornering stiffness: slope of the steady force at zero slip [N/rad], (2,)."""
         alpha = ca.MX.sym("alpha", 2)
-        force = self.curve_expression(alpha, self.curve_speed)
+        force = self.curve_expression(alpha, self._curve_speed)
         slope = ca.Function("stiffness", [alpha], [ca.jacobian(force, alpha)])
         both = np.array([1.0, 1.0])  # the axles slip alike
         stiffness: Array = np.array(slope(np.zeros(2))) @ both
@@ -323,50 +331,9 @@ class TireModel(ABC):
         return None
 
     @property
-    def known_speeds(self) -> Array | None:
-        """Least and largest speed [m/s] of the identification drives, (2,); None where unknown."""
-        return None
-
-    @property
-    def lengthwise(self) -> tuple[Array, Array] | None:
-        """Parameters (p,) with load transfer and ellipse, and covariance (p, p); None: none."""
-        return None
-
-    def road_differs(self, t: Array) -> NDArray[np.bool_]:
-        """Return at which times `t` [s], (n,), of the identification drive the road was another."""
-        return np.zeros(t.shape, dtype=bool)
-
-    @property
-    def notes(self) -> tuple[tuple[str, str], ...]:
-        """Findings of the identification drives beside the tires: code and one line of each."""
-        return ()
-
-    def at_bounds(self) -> "tuple[Reached, ...]":
-        """Return the estimates at active bounds."""
-        return ()
-
-    def relative_sd(self, alpha: Array) -> Array | None:
-        """Return how unsure the forces at slip angles still are, (k, 2); None: it cannot tell.
-
-        Standard deviation of the force over that before learning: 1 is the prior.
-
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,), not zero.
-        """
-        del alpha
-        return None
-
-    def slope_over(self, recording: Recording) -> Array:
-        """Return the slope of the force curves over the slip of a drive [static loads/rad], (n, 2).
-
-        Raises
-        ------
-        ValueError
-            Where forces are no curves of slip.
-        """
-        del recording
-        raise ValueError(f"forces of a {type(self).__name__} are no curves of slip")
+    def drives(self) -> Drives:
+        """What the identification drives were, as far as the model knows."""
+        return Drives()
 
     @property
     def force_missed(self) -> Array | None:
@@ -376,192 +343,14 @@ class TireModel(ABC):
         return None
 
     @property
-    def has_band(self) -> bool:
-        """Whether the model can tell how sure it is."""
-        return False
-
-    @property
-    def band_origin(self) -> str:
-        """Where the width of the band comes from, in words."""
-        return "calibrated on the drive" if self.band_calibrated else UNCALIBRATED
-
-    @property
-    def band_calibrated(self) -> bool:
-        """Whether the width of `band` was found on parts of the drive that did not teach.
-
-        As of `Run.tire`, where enough was driven; else that of the identifier.
-        """
-        return False
-
-    def with_calibration(
-        self, calibration: "BandCalibration | None", force_missed: Array | None = None
-    ) -> "TireModel":
-        """Return the model, its band calibrated; as it is where it has none.
-
-        Parameters
-        ----------
-        calibration : None assumes the declared errors.
-        force_missed : of the identification drive, (2,); None where not computed.
-        """
-        del calibration, force_missed
-        return self
-
-    def spread_by_range(
-        self, recording: Recording, mean: Callable[[Array], Array]
-    ) -> "SpreadByRange":
-        """Return the variances that a band is made of, by range of slip and window of a drive.
-
-        Parameters
-        ----------
-        mean : over the windows: signals (n, ...) -> (m, ...).
-        """
-        del recording, mean
-        raise ValueError(f"a {type(self).__name__} cannot tell how sure it is: it has no band")
-
-    def half_band_of_curves(self, recording: Recording, level: float = 0.9) -> Array | None:
-        """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N].
-
-        Of the steady forces, without noise of the drive's sensors. None where unknown.
-        """
-        del recording, level
+    def band(self) -> Band[Any] | None:
+        """How unsure the forces are; None where the model does not know."""
         return None
-
-    def half_band(
-        self, alpha: Array, level: float = 0.9, *, v_x: float | Array | None = None
-    ) -> Array | None:
-        """Return half the width of `band`, (k, 2) [N]; None where unknown.
-
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,).
-        v_x : speed [m/s], a number or (k,), positive; None takes that of the identification drive.
-        """
-        del alpha, level, v_x
-        return None
-
-    def half_band_over(self, recording: Recording, level: float = 0.9) -> Array | None:
-        """Return half the width of the band around `axle_force` of a drive, (n, 2) [N].
-
-        None where unknown.
-
-        Parameters
-        ----------
-        level : share of samples that the band shall hold, above 0 and below 1.
-        """
-        del recording, level
-        return None
-
-    @overload
-    def band(
-        self, alpha: float, axle: Axle, level: float = ..., *, v_x: float | None = ...
-    ) -> tuple[float, float] | None: ...
-    @overload
-    def band(
-        self,
-        alpha: ArrayLike,
-        axle: Axle | None = None,
-        level: float = ...,
-        *,
-        v_x: float | None = ...,
-    ) -> tuple[Array, Array] | None: ...
-
-    def band(
-        self,
-        alpha: ArrayLike,
-        axle: Axle | None = None,
-        level: float = 0.9,
-        *,
-        v_x: float | None = None,
-    ) -> tuple[float, float] | tuple[Array, Array] | None:
-        """Return between which forces the true one lies [N]: (low, high), each as of `force`.
-
-        None where the model has no band; `band_calibrated` says whether that share was calibrated.
-
-        Parameters
-        ----------
-        alpha, axle : as of `force`.
-        level : in which share of cases it shall, above 0 and below 1.
-        v_x : speed [m/s], positive; None takes that of the identification drive.
-
-        Raises
-        ------
-        ValueError
-            Where the axle has another name, or level or speed are impossible.
-        """
-        slip = np.asarray(alpha, dtype=np.float64)
-        center = np.asarray(self.force(slip, axle))
-        half = self.half_band(slip.ravel(), level, v_x=v_x)
-        if half is None:
-            return None
-        half = half.reshape(*slip.shape, 2)
-        half = half if axle is None else half[..., AXLES.index(axle)]
-        if center.ndim == 0:
-            return float(center - half), float(center + half)
-        return center - half, center + half
 
     @property
     def guarantee(self) -> "Guarantee | None":
-        """Weights that the drive left possible; None where nobody asked, or none are of curves."""
+        """Between which forces the true ones lie under a bound; None where nobody asked for it."""
         return None
-
-    def guaranteed_at(self, alpha: Array, rate: Array) -> tuple[Array, Array] | None:
-        """Return `guaranteed_band` of both axles, (k, 2) each [N]; None where none is stated.
-
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,).
-        rate : of the force, static axle loads per second (k,).
-        """
-        del alpha, rate
-        return None
-
-    def guaranteed_force(self, recording: Recording) -> tuple[Array, Array] | None:
-        """Return least and largest axle force over a drive, (n, 2) [N]; None: none is stated."""
-        del recording
-        return None
-
-    @overload
-    def guaranteed_band(
-        self, alpha: float, axle: Axle, rate: float = ...
-    ) -> tuple[float, float] | None: ...
-    @overload
-    def guaranteed_band(
-        self, alpha: ArrayLike, axle: Axle | None = None, rate: ArrayLike = ...
-    ) -> tuple[Array, Array] | None: ...
-
-    def guaranteed_band(
-        self, alpha: ArrayLike, axle: Axle | None = None, rate: ArrayLike = 0.0
-    ) -> tuple[float, float] | tuple[Array, Array] | None:
-        """Return between which forces [N] the true one lies, if the bound of `History.guaranteed`
-        holds: (low, high), each as of `force`.
-
-        None where no guarantee is stated.
-
-        Parameters
-        ----------
-        alpha, axle : as of `force`.
-        rate : how fast the force changes, static axle loads per second, of the shape of `alpha` or
-            one number: a force may be late. 0 is steady.
-        """
-        if axle is not None and axle not in AXLES:
-            raise ValueError(f"axle must be front or rear, it is {axle!r}")
-        slip = np.asarray(alpha, dtype=np.float64)
-        rates = np.broadcast_to(np.asarray(rate, dtype=np.float64), slip.shape)
-        found = self.guaranteed_at(slip.ravel(), rates.ravel())
-        if found is None:
-            return None
-        low, high = (side.reshape(*slip.shape, 2) for side in found)
-        if axle is None:
-            return low, high
-        low, high = (side[..., AXLES.index(axle)] for side in (low, high))
-        return (float(low), float(high)) if slip.ndim == 0 else (low, high)
-
-    def samples(self, n: int, rng: np.random.Generator) -> "tuple[TireModel, ...]":
-        """Return models drawn from what is not known of the tires."""
-        del n, rng
-        raise ValueError(
-            f"a {type(self).__name__} cannot tell how sure it is: nothing to draw from"
-        )
 
     def estimates(self) -> tuple[Estimate, ...]:
         """Return what a verdict tells of each axle: stiffness, without a doubt that is known."""
@@ -601,9 +390,8 @@ class TireModel(ABC):
         for row in rows:
             cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
             lines.append("  ".join(cells).rstrip())
-        if self.has_band:
-            how = self.band_origin
-            lines.append(f"band: {how}")
+        if self.band is not None:
+            lines.append(f"band: {self.band.origin}")
         if self.vehicle.estimates:
             lines.append(self.vehicle.estimates)
         return "\n".join(lines)
@@ -697,6 +485,13 @@ class StaticModel(TireModel):
         return self.static_force(x, delta, v_x), ca.MX(0, 1)
 
 
+def require_band(model: TireModel) -> Band[Any]:
+    """Return the band of a model; refuse one that has none."""
+    if model.band is None:
+        raise ValueError(f"a {type(model).__name__} cannot tell how sure it is: it has no band")
+    return model.band
+
+
 def brisk_speed(vehicle: Vehicle, min_speed: float) -> float:
     """Return 4 sqrt(g L), but no speed at which forces read zero [m/s].
     min_speed : below which they do [m/s].
@@ -737,7 +532,7 @@ def load_model(path: str | PathLike[str]) -> TireModel:
         dict(table.data), str(path)
     )
     try:
-        require_alive(FrozenModelError, model)
+        require_alive(FrozenModelError, model.force, model.vehicle)
     except FrozenModelError as error:
         raise FrozenModelError(f"{path}: {error}") from None
     return model

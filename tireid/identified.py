@@ -372,8 +372,9 @@ def _curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[st
     if known is not None:
         inside = (np.abs(slip)[:, None] <= known).astype(np.float64)
         columns |= {"front_known": inside[:, 0], "rear_known": inside[:, 1]}
-    band = model.band(slip)
-    for sides, found in (("low", "high"), band), (("least", "most"), model.guaranteed_band(slip)):
+    band = None if model.band is None else model.band.at(slip)
+    sure = None if model.guarantee is None else model.guarantee.at(slip)
+    for sides, found in (("low", "high"), band), (("least", "most"), sure):
         for side, bound in zip(sides, found or (), strict=found is not None):
             columns |= axle_columns(f"Fy{{}}_{side}_N", bound)
     return columns

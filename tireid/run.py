@@ -98,7 +98,7 @@ class Run:
         """Return the tire with a guaranteed band beside the calibrated one.
 
         Where |F/F_z - φ| <= e (1 + β) + τ ρ holds of some curve φ at every instant, the true force
-        lies in `guaranteed_band`. It is `tire` where the method learns no curve of slip, no lateral
+        lies in its `guarantee`. It is `tire` where the method learns no curve of slip, no lateral
         velocity was measured, or too little is driven.
 
         Parameters

@@ -254,7 +254,7 @@ def steady_stiffness(model: TireModel, v_x: float) -> Array:
     """
     t, zeros = np.arange(SLIDE) / 100.0, np.zeros(SLIDE)
     right, left = (
-        model.axle_force(
+        model.predict(
             Recording(
                 name="a steady slide",
                 t=t,

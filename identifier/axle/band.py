@@ -16,14 +16,15 @@ taken of the mean (Jensen). That bound is v of the band: it costs no inverse.
 """
 
 from dataclasses import dataclass
-from statistics import NormalDist
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 
 from codegen.arrays import Array
 from identifier.axle.learning import Regression
+from identifier.band import LEVEL, TINY, BandSpread
 from models.recordings import Recording
+from models.schema import Table
 from models.sensors import white_noise
 from models.vehicle import Vehicle
 
@@ -32,32 +33,22 @@ CENTERS = (0.005, 0.015, 0.03, 0.06, 0.12, 0.24)  # rad: where the factor of a r
 SPEEDS = (2.0, 3.0, 4.0)  # sqrt(g L): ends of the ranges of speed, first and last are open
 AT_SPEEDS = (1.5, 2.5, 3.5, 4.5)  # sqrt(g L): where the factor of a range of speed holds
 STRETCH = (0.5, 2.0)  # s at most and least
-LEVEL = 0.9  # at which factors are found, and which is asked for if no other is given
 RELATIVE = Regression().relative_error  # of the force
 FLOOR = 0.5 * Regression().error  # static axle loads
 LEAST, MOST = 0.1, 100.0  # factors
 MOST_COLOR = 1000.0
 UNKNOWN = 0.25  # standard deviation over the prior's, from which on slip is not known
-TINY = 1e-30  # keeps quotients of variances finite at no slip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BandCalibration:
     """What stretches that did not teach a model say of its errors.
-
-    Parameters
-    ----------
     factors : of the errors of each range of slip, (2, 6).
     speeds : of the errors of each range of speed, over all, (2, 4).
     color : variance of a mean of errors over that of errors as declared, at least 1, (2,).
     speed : root mean square of v_x there [m/s], positive.
     noise : standard deviation of the white noise that sensors made: of the lateral velocity of
         front and rear axle [m/s], and of the steering in front [rad], (3,).
-
-    Raises
-    ------
-    ValueError
-        Where a number has the wrong shape or is out of its range.
     """
 
     factors: Array
@@ -87,9 +78,6 @@ class BandCalibration:
     @classmethod
     def declared(cls, speed: float) -> Self:
         """Return that of a model whose errors are as declared, of a speed.
-
-        Parameters
-        ----------
         speed : [m/s], positive.
         """
         ones = np.ones((2, len(CENTERS))), np.ones((2, len(AT_SPEEDS)))
@@ -97,28 +85,20 @@ class BandCalibration:
             factors=ones[0], speeds=ones[1], color=np.ones(2), speed=speed, noise=np.zeros(3)
         )
 
-    def factor(self, alpha: Array, relative_speed: Array) -> Array:
+    def factor(self, slip: Array, relative_speed: Array) -> Array:
         """Return the factors at slip angles and speeds, (k, 2): straight between centers.
-
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,).
-        relative_speed : over sqrt(g L), (k,).
+        slip : of front and rear axle [rad], (k, 2).   relative_speed : over sqrt(g L), (k,).
         """
-        size = np.abs(alpha)
-        return np.stack(
+        of_axles = zip(np.abs(slip).T, self.factors, self.speeds, strict=True)
+        return np.column_stack(
             [
-                np.interp(size, CENTERS, slip) * np.interp(relative_speed, AT_SPEEDS, speed)
-                for slip, speed in zip(self.factors, self.speeds, strict=True)
-            ],
-            axis=1,
+                np.interp(size, CENTERS, slips) * np.interp(relative_speed, AT_SPEEDS, speeds)
+                for size, slips, speeds in of_axles
+            ]
         )
 
     def stretch(self, v_x: Array) -> Array:
         """Return s, by which errors of the model are larger at speeds, (k,).
-
-        Parameters
-        ----------
         v_x : speeds [m/s], positive, (k,).
         """
         return np.asarray(np.clip(self.speed / v_x, *STRETCH), dtype=np.float64)
@@ -138,56 +118,28 @@ class BandCalibration:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
-        """Return the calibration that `to_dict` describes.
-
-        Raises
-        ------
-        ValueError
-            Where the ranges or the level are others, or a value is impossible.
-        """
+        """Return the calibration that `to_dict` describes."""
+        table = Table(data, "", ValueError, "band.")
         for name, ours in (
             ("ranges", list(RANGES)),
             ("speed_ranges", list(SPEEDS)),
             ("level", LEVEL),
         ):
-            if data[name] != ours:
+            if table.value(name) != ours:
                 raise ValueError(f"{name} of the band must be {ours}, they are {data[name]}")
-        factors, speeds, color, noise = (
-            np.array(data[name], dtype=np.float64)
-            for name in ("factors", "speeds", "color", "noise")
-        )
-        return cls(
-            factors=factors, speeds=speeds, color=color, speed=float(data["speed"]), noise=noise
-        )
+        numbers = {name: table.array(name) for name in ("factors", "speeds", "color", "noise")}
+        return cls(**numbers, speed=table.number("speed"))
 
 
 def ranges_of(slip: Array) -> Any:
     """Return in which of the six ranges slip angles lie.
-
-    Parameters
-    ----------
     slip : its size [rad].
     """
     return np.searchsorted(RANGES, slip, side="right")
 
 
-def normal_quantile(level: float) -> float:
-    """Return z such that |x| <= z holds of a standard normal x in a share of cases.
-
-    Parameters
-    ----------
-    level : the share, above 0 and below 1.
-    """
-    if not 0.0 < level < 1.0:
-        raise ValueError(f"level must be above 0 and below 1, it is {level}")
-    return NormalDist().inv_cdf(0.5 * (1.0 + level))
-
-
 def colored(P: Array, prior: Array, color: float, factor: float = 1.0) -> Array:
     """Return a covariance as errors leave it that are correlated longer than declared.
-
-    Parameters
-    ----------
     P, prior : covariance now and before the first sample (q, q).
     color : how much less samples tell, at least 1.
     factor : of the errors along what was learnt; along the rest it only widens.
@@ -207,11 +159,7 @@ def colored(P: Array, prior: Array, color: float, factor: float = 1.0) -> Array:
 
 def colored_variance(left: Array, before: Array, color: Array) -> Array:
     """Return a bound of h'P' h, P' of `colored`, that is never below it and needs no inverse.
-
-    Parameters
-    ----------
-    left, before : h'P h and h'P₀ h, (k, 2).
-    color : how much less samples tell, at least 1, (2,).
+    left, before : h'P h and h'P₀ h, (k, 2).   color : how much less samples tell, at least 1, (2,).
     """
     share = np.minimum(left / np.maximum(before, TINY), 1.0)
     wider: Array = np.maximum(left, before * share * color / (1.0 + share * (color - 1.0)))
@@ -235,9 +183,6 @@ def sensor_noise(recording: Recording, vehicle: Vehicle) -> Array:
 
 def root(P: Array) -> Array:
     """Return R with R R' = P (q, q), also where P is singular.
-
-    Parameters
-    ----------
     P : covariance (q, q).
     """
     sd = np.sqrt(np.diag(P))
@@ -246,60 +191,13 @@ def root(P: Array) -> Array:
     return half
 
 
-class SpreadByRange(NamedTuple):
-    """What a band is made of at the slip of a drive, by range of slip, in m windows.
-
-    share : of the window in which the slip of an axle was in the range (6, m, 2).   scaled, held :
-    variances at the mean of the slip there, as of `BandSpread` (6, m, 2).
+def declared_spread(
+    force: Array, left: Array, before: Array, stretch: Array | float = 1.0
+) -> BandSpread:
+    """Return the variances (1 - ρ) (m² s² + v), scaled by the factor, and ρ (m² s² + v), fixed.
+    force : φ of the model [static axle loads].   left, before : v and v₀ [static axle loads²].
+    stretch : s, of errors of the model [-], a number or (k, 1).
     """
-
-    share: Array
-    scaled: Array
-    held: Array
-
-
-class BandSpread(NamedTuple):
-    """Variances of the force of an axle [static axle loads²], as errors are declared.
-
-    scaled : (1 - ρ) (m² s² + v), by the factor.   held : ρ (m² s² + v), which no factor narrows.
-    """
-
-    scaled: Array
-    held: Array
-
-    @classmethod
-    def of(cls, force: Array, left: Array, before: Array, stretch: Array | float = 1.0) -> Self:
-        """Return those of a force, of the variance that learning left, and of the prior's.
-
-        Parameters
-        ----------
-        force : φ of the model [static axle loads].
-        left, before : v and v₀ [static axle loads²].
-        stretch : s, of errors of the model [-], a number or (k, 1).
-        """
-        share = np.minimum(left / np.maximum(UNKNOWN**2 * before, TINY), 1.0)
-        total = ((RELATIVE * force) ** 2 + FLOOR**2) * stretch**2 + left
-        return cls((1.0 - share) * total, share * total)
-
-    def half_width(self, factor: Array, level: float) -> Array:
-        """Return half the width of a band [static axle loads].
-
-        Parameters
-        ----------
-        factor : f, (k, 2).
-        """
-        wide = np.sqrt(factor**2 * self.scaled + np.maximum(factor, 1.0) ** 2 * self.held)
-        return np.asarray(normal_quantile(level) * wide)
-
-    def needed_factor(self, error: Array, noise: Array | float) -> Array:
-        """Return f², with which a band of `LEVEL` just reaches an error; 0 where none is needed.
-
-        Parameters
-        ----------
-        error : [static axle loads].
-        noise : its variance that sensors made [static axle loads²].
-        """
-        size = (error / normal_quantile(LEVEL)) ** 2 - noise
-        small = (size - self.held) / (self.scaled + TINY)
-        large = size / (self.scaled + self.held)
-        return np.maximum(np.where(large < 1.0, small, large), 0.0)
+    share = np.minimum(left / np.maximum(UNKNOWN**2 * before, TINY), 1.0)
+    total = ((RELATIVE * force) ** 2 + FLOOR**2) * stretch**2 + left
+    return BandSpread((1.0 - share) * total, share * total)

@@ -17,15 +17,14 @@ from identifier.axle.band import (
     AT_SPEEDS,
     CENTERS,
     FLOOR,
-    LEVEL,
     RELATIVE,
     STRETCH,
     UNKNOWN,
     BandCalibration,
-    normal_quantile,
 )
 from identifier.axle.car import larger, reciprocal, smaller, within
 from identifier.axle.covariance import Factors, excited
+from identifier.band import LEVEL, normal_quantile
 
 LEAST_BEFORE = 1e-12  # static axle loads²: far below any prior's variance, and no zero in float
 

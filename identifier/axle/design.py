@@ -1,9 +1,10 @@
 """The axle identifier as a method: everything that is chosen before the car drives."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -19,7 +20,7 @@ from identifier.axle.certificate import certified
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.gate import Plausibility
-from identifier.axle.guarantee import HalfSpaces, prior_box
+from identifier.axle.guarantee import prior_box
 from identifier.axle.learning import (
     BoundNumbers,
     Bounds,
@@ -34,9 +35,18 @@ from identifier.axle.slip import SHORTEST, Sensors, Sway
 from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
 from identifier.certificate import Certificate
 from identifier.driving import Driving, natural_driving
-from identifier.method import OTHER_STRUCTURE, Method, Run, Track, resumed
+from identifier.method import (
+    OTHER_STRUCTURE,
+    Accelerometer,
+    Limits,
+    Method,
+    Run,
+    Track,
+    resumed,
+)
 from identifier.setup import Port, Setup
 from identifier.tire_model import AXLES, Reached, TireModel, brisk_speed
+from models.rules import require_positive
 from models.vehicle import Vehicle
 
 NEAR = 0.99  # of a bound, from which on a number rests at it
@@ -81,8 +91,7 @@ class AxleIdentifier(Method):
     def __post_init__(self) -> None:
         object.__setattr__(self, "ladder", tuple(self.ladder))  # a list would not hash
         doublings(self.ladder)
-        if not 0.0 < self.dt < math.inf:
-            raise ValueError(f"dt must be positive, it is {self.dt}")
+        require_positive(ValueError, dt=self.dt)
         if self.rising_until is not None and not 0.0 <= self.rising_until < math.inf:
             raise ValueError(f"rising_until must not be negative, it is {self.rising_until}")
 
@@ -117,33 +126,33 @@ class AxleIdentifier(Method):
         ----------
         driving : friction and speed of the drop that is followed; None takes `natural_driving`.
         """
-        b, rising = self.bounds, self.rising_until
         return Certificate(
             properties=certified(self, vehicle, driving or natural_driving(vehicle)),
-            limits={
-                "grip_static_axle_loads": [b.least_grip, b.most_grip],
-                "weight_static_axle_loads": [-b.weight, b.weight],
-                **({} if rising is None else {"force_curves_rise_at_slip_rad": rising}),
-                **(
-                    {"stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness]}
-                    if rising == 0.0
-                    else {}
-                ),
-                "compliance_m": [0.0, b.compliance],
-                "sway_share": [0.0, 1.0],
-                "steering_offset_rad": [-b.steering, b.steering],
-                "v_y_offset_m_s": [-b.v_y, b.v_y],
-                "covariance_over_prior": [0.0, self.regression.widest],
-            },
+            limits=self.limits.boxes,
         )
 
     def certify_along(self, history: Run) -> Certificate:
         """Return what is proven of the curves that a run of it taught."""
         return Certificate(properties=certified_along(self, history))
 
-    def possible_tires(self) -> HalfSpaces:
-        """Return the weights that the curve of a tire can have, within the bounds."""
-        return prior_box(self.bounds, self.ladder)
+    @property
+    def accelerometer(self) -> Accelerometer:
+        """What a_y tells of a road that is not level."""
+        return Accelerometer(self._road_push)
+
+    @property
+    def limits(self) -> Limits:
+        """Where its estimates stay after every sample."""
+        b, rising = self.bounds, self.rising_until
+        boxes = curve_boxes(b, stiffness=rising == 0.0)
+        if rising is not None:
+            boxes["force_curves_rise_at_slip_rad"] = rising
+        boxes |= {
+            "sway_share": [0.0, 1.0],
+            "v_y_offset_m_s": [-b.v_y, b.v_y],
+            "covariance_over_prior": [0.0, self.regression.widest],
+        }
+        return Limits(boxes, prior_box(b, self.ladder), self._at_bounds)
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -167,8 +176,13 @@ class AxleIdentifier(Method):
         P = prior_P = self.prior.covariance(vehicle, self.ladder)
         excitation, sensors = np.zeros((2, 1 + len(EDGES))), Sensors()
         if start is not None:
-            stored = self._resumed(start)
-            W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
+            stored = resumed_units(start, self.ladder)
+            W, own, P, excitation = (
+                stored.W,
+                stored.beside_curve,
+                stored.covariance,
+                stored.excitation,
+            )
             sensors = stored.sensors
             if stored is not start:  # of another form: units can be what no curve of it could
                 P = _within_prior(P, prior_P, n)
@@ -210,19 +224,14 @@ class AxleIdentifier(Method):
         rises, pressed = self.rising_until is not None, vehicle.has_downforce
         return _scan(doublings(self.ladder), rises=rises, bands=bands, pressed=pressed)
 
-    def _resumed(self, start: TireModel) -> AxleModel:
-        """Return stored weights to begin with, of this structure."""
-        return resumed(start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder)
+    @property
+    def setup_with_band(self) -> Callable[[Vehicle, TireModel | None], Setup]:
+        """As `setup`, of a step that outputs `half_band`, by the calibration of its start."""
+        return self._setup_with_band
 
-    def setup_with_band(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs whose step tells `half_band` (2,) [N] beside its force.
-
-        Parameters
-        ----------
-        start : as of `setup`; without a calibration the declared errors are assumed.
-        """
+    def _setup_with_band(self, vehicle: Vehicle, start: TireModel | None) -> Setup:
         setup = self.setup(vehicle, start)
-        stored = None if start is None else self._resumed(start).calibration
+        stored = None if start is None else resumed_units(start, self.ladder).calibration
         given = BandCalibration.declared(brisk_speed(vehicle, self.min_speed))
         noise = np.array([self.regression.noise, self.regression.noise, 0.0])
         calibration = stored or replace(given, noise=noise)
@@ -268,17 +277,10 @@ class AxleIdentifier(Method):
         ----------
         state : W (k, 2, n) and own (k, 2, 3) at each of k instants.
         """
-        return tracks(self.ladder, vehicle, state["W"], state["own"][:, :, 0])
+        return curve_tracks(vehicle, self.ladder, state["W"], state["own"][:, :, 0])
 
-    def reached(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Reached, ...]:
-        """Return stiffness, grip, lag and offsets that rest at their bounds, to a hundredth.
-
-        Parameters
-        ----------
-        vehicle : not looked at: the bounds are in static axle loads.
-        state : W (2, n) and own (2, 3).
-        """
-        del vehicle
+    def _at_bounds(self, state: Mapping[str, Array]) -> tuple[Reached, ...]:
+        """Return stiffness, grip, lag and offsets that rest at their bounds, to a hundredth."""
         b, W, own = self.bounds, state["W"], state["own"]
         grip, slope = W.sum(axis=1), (W / np.array(self.ladder)).sum(axis=1)
         elsewhere = "a sensor has a larger offset, or another place than declared"
@@ -303,13 +305,8 @@ class AxleIdentifier(Method):
             ]  # fmt: skip
         return tuple(one for rests, one in listed if rests)
 
-    def beside_force(self, state: Mapping[str, Array]) -> Array | None:
-        """Return what a banked road pushed to the left by the accelerometer, (n,) [weights].
-
-        Parameters
-        ----------
-        state : bank (n + 1, 4), of a run.
-        """
+    def _road_push(self, state: Mapping[str, Array]) -> Array:
+        """Return what a banked road pushed to the left, (n,) [car weights]."""
         offsets_alone = UNPROVEN * self.regression.sure * self.regression.error
         before = np.asarray(state["bank"]).reshape(-1, len(SlopeState._fields))[:-1].T
         push = road_push(self.road.at(self.dt), SlopeState(*map(ca.DM, before)), offsets_alone)
@@ -322,13 +319,16 @@ class AxleIdentifier(Method):
         ----------
         state : W (2, n), own (2, 3), UD (2, q (q + 1)/2) and excitation (2, 9).
         """
+        compliance, share, offset = state["own"].T.copy()
         return AxleModel(
             vehicle=vehicle,
             ladder=self.ladder,
             sway=self.sway,
             plausibility=self.plausibility,
             W=state["W"].copy(),
-            own=state["own"].copy(),
+            compliance=compliance,
+            sway_share=share,
+            offset=offset,
             covariance=unpacked(state["UD"], len(self.ladder) + 3),
             prior_covariance=self.prior.covariance(vehicle, self.ladder),
             excitation=state["excitation"].copy(),
@@ -336,11 +336,29 @@ class AxleIdentifier(Method):
         )
 
 
-def tracks(
-    ladder: tuple[float, ...], vehicle: Vehicle, W: Array, compliance: Array
+def resumed_units(start: TireModel, ladder: tuple[float, ...]) -> AxleModel:
+    """Return a stored model to begin with, in the units of a method."""
+    return resumed(start.in_units(ladder), AxleModel, OTHER_STRUCTURE, ladder=ladder)
+
+
+def curve_boxes(b: Bounds, *, stiffness: bool) -> dict[str, Any]:
+    """Return least and largest of what curve, lag and steering have, by name and unit."""
+    bounded_slope = {"stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness]}
+    return {
+        "grip_static_axle_loads": [b.least_grip, b.most_grip],
+        "weight_static_axle_loads": [-b.weight, b.weight],
+        **(bounded_slope if stiffness else {}),
+        "compliance_m": [0.0, b.compliance],
+        "steering_offset_rad": [-b.steering, b.steering],
+    }
+
+
+def curve_tracks(
+    vehicle: Vehicle, ladder: tuple[float, ...], W: Array, compliance: Array
 ) -> tuple[Track, ...]:
     """Return cornering stiffness, relaxation length, and the force that curves saturate at.
-    W : weights (k, 2, n) at each of k instants [static axle loads].   compliance : (k, 2) [m].
+    W : weights at each of k instants [static axle loads], (k, 2, n).
+    compliance : [m per load], (k, 2).
     """
     slope = (W / np.array(ladder)).sum(axis=2)
     lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase

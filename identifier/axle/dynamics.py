@@ -33,11 +33,12 @@ def curve_at_speed(
     return static.under(load_ratio(ca.DM(vehicle.downforce), v_x))
 
 
-def series_compliance(own: Array, roll_frequency: float) -> Array:
+def series_compliance(compliance: Array, share: Array, roll_frequency: float) -> Array:
     """Return the deflection of carcass and body per static axle load [m], (2,).
-    own : compliance, sway share and offset of the axles, (2, 3).   roll_frequency : ω [rad/s].
+    compliance : of the carcass [m per load], (2,).   share : of the sway [-], (2,).
+    roll_frequency : ω [rad/s].
     """
-    return own[:, 0] + GRAVITY / roll_frequency**2 * own[:, 1]
+    return compliance + GRAVITY / roll_frequency**2 * share
 
 
 def lagged_force(

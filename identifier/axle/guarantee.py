@@ -18,16 +18,18 @@ SciPy is imported where a band is asked for: that takes longer than to learn fro
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, Self, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
 from identifier.axle.learning import Bounds
+from identifier.band import Axle, ends, of_axle
+from models.recordings import Recording
 
 MEMORY = 0.3  # s: of the rate, and of slip that was beyond
 SECANTS = tuple(0.004 * 2.0**k for k in np.arange(0.0, 7.5, 0.5))  # rad, where a curve bends down
@@ -46,16 +48,8 @@ AT_ONCE = 256  # samples times all vertices: so many products stay in the cache
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceBound:
     """By how much a force may differ from the best curve, front and rear.
-
-    Parameters
-    ----------
-    error : e [static axle loads], (2,).
-    lateness : τ [s], by which a force may be late or early, (2,).
-
-    Raises
-    ------
-    ValueError
-        Where an error is not positive or beyond 10, or a lateness negative or beyond 1 s.
+    error : e [static axle loads], above 0 and at most 10, (2,).
+    lateness : τ [s], by which a force may be late or early, from 0 to 1, (2,).
     """
 
     error: tuple[float, float]
@@ -77,20 +71,13 @@ class ForceBound:
     @classmethod
     def of(cls, given: "float | ForceBound") -> "ForceBound":
         """Return a bound as given: a number is the error of both axles, nothing is late.
-
-        Parameters
-        ----------
         given : number [static axle loads], or the bound itself.
         """
         return given if isinstance(given, ForceBound) else cls(error=(float(given), float(given)))
 
     def allowed(self, beyond: Array, rate: Array) -> Array:
         """Return e (1 + β) + τ ρ [static axle loads], (k, 2).
-
-        Parameters
-        ----------
-        beyond : β of both axles, (k, 2).
-        rate : ρ of both axles [1/s], (k, 2).
+        beyond : β of both axles, (k, 2).   rate : ρ of both axles [1/s], (k, 2).
         """
         wide: Array = np.array(self.error) * (1.0 + beyond) + np.array(self.lateness) * rate
         return wide
@@ -104,13 +91,6 @@ class Doubt(NamedTuple):
     beyond: Array
     rate: Array
     lost: Array
-
-    @classmethod
-    def none(cls, n: int) -> Self:
-        """Return that of n steady forces within the slip that taught, along which nothing
-        pushes.
-        """
-        return cls(*np.zeros((3, n, 2)))
 
 
 class Strips(NamedTuple):
@@ -147,9 +127,6 @@ def prior_box(bounds: Bounds, ladder: tuple[float, ...]) -> HalfSpaces:
 
     Saturated force, stiffness at no slip and each weight are within bounds, and the secant
     stiffness φ(α)/α does not rise with slip, as of every brush and Magic Formula tire.
-
-    Parameters
-    ----------
     ladder : slip scales of the units [rad].
     """
     n, scales = len(ladder), np.array(ladder)
@@ -166,12 +143,7 @@ def prior_box(bounds: Bounds, ladder: tuple[float, ...]) -> HalfSpaces:
 
 def strip_sides(y: Array, h: Array, allowed: Array) -> HalfSpaces:
     """Return |y - h'w| <= allowed of one axle.
-
-    Parameters
-    ----------
-    y : (m,).
-    h : (m, n).
-    allowed : e (1 + β) + τ ρ (m,).
+    y : (m,).   h : (m, n).   allowed : e (1 + β) + τ ρ (m,).
     """
     return HalfSpaces(np.vstack([h, -h]), np.concatenate([allowed + y, allowed - y]))
 
@@ -259,20 +231,12 @@ def possible_weights(strips: Strips, axle: int, bound: ForceBound, box: HalfSpac
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Guarantee:
-    """What a drive leaves possible of both axles, under a bound of the errors.
-
-    Parameters
-    ----------
+class PossibleWeights:
+    """What a drive leaves possible of the curves of both axles, under a bound of the errors.
     given : whether the bound was given; else it was estimated from the drive.
     corners : vertices of the possible weights of front and rear, (k, n) each.
     speed : mean of the drive that taught [m/s].
     fastest : largest ρ of its means [static axle loads/s], (2,): beyond it the band opens.
-
-    Raises
-    ------
-    ValueError
-        Where there are no corners, one is not finite, or speed or rate is not positive.
     """
 
     bound: ForceBound
@@ -299,18 +263,12 @@ class Guarantee:
 
     def too_fast(self, rate: Array) -> Array:
         """Return by how much ρ is beyond that of the drive that taught, over it, (k, 2).
-
-        Parameters
-        ----------
         rate : ρ of both axles [1/s], (k, 2).
         """
-        return beyond_driven(rate, np.array(self.fastest))
+        return _beyond_driven(rate, np.array(self.fastest))
 
     def reach(self, units: Array) -> tuple[Array, Array]:
         """Return least and largest h'w of the possible weights, (k, 2) each [static axle loads].
-
-        Parameters
-        ----------
         units : h of both axles (k, 2, n).
         """
         of = [_extremes(units[:, i], corners) for i, corners in enumerate(self.corners)]
@@ -319,9 +277,6 @@ class Guarantee:
 
     def limits(self, units: Array, doubt: Doubt) -> tuple[Array, Array]:
         """Return least and largest force, (k, 2) each [static axle loads].
-
-        Parameters
-        ----------
         units : h of both axles (k, 2, n).
         """
         low, high = self.reach(units)
@@ -338,7 +293,7 @@ class Guarantee:
         return outside
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the guarantee as plain numbers, ready for JSON."""
+        """Return them as plain numbers, ready for JSON."""
         return {
             "error_static_axle_loads": list(self.bound.error),
             "lateness_s": list(self.bound.lateness),
@@ -349,8 +304,10 @@ class Guarantee:
         }
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], n: int) -> Self:
-        """Return the guarantee that `to_dict` describes."""
+    def from_dict(cls, data: Mapping[str, Any], n: int) -> Self:
+        """Return those that `to_dict` describes.
+        n : weights of each.
+        """
         pairs = []
         for name in (*PAIRS, "corners"):
             if not isinstance(data[name], list) or len(data[name]) != 2:
@@ -376,6 +333,53 @@ class Guarantee:
         )
 
 
+class Guarantee(NamedTuple):
+    """Between which forces the true ones lie, if the bound holds of which weights are possible.
+
+    possible : weights that the drive left.   ladder : slip scales of the units [rad].   driven :
+    largest slip of the drive [rad] (2,).   loads : of the axles, static [N] (2,).   min_speed :
+    below which forces read zero [m/s].   signals : over a drive units times load and cos δ (n, 2,
+    ladder), and what opens the band.
+    """
+
+    possible: PossibleWeights
+    ladder: tuple[float, ...]
+    driven: Array
+    loads: Array
+    min_speed: float
+    signals: Callable[[Recording], tuple[Array, Doubt]]
+
+    @overload
+    def at(self, alpha: float, axle: Axle, rate: float = ...) -> tuple[float, float]: ...
+    @overload
+    def at(
+        self, alpha: ArrayLike, axle: Axle | None = None, rate: ArrayLike = ...
+    ) -> tuple[Array, Array]: ...
+
+    def at(
+        self, alpha: ArrayLike, axle: Axle | None = None, rate: ArrayLike = 0.0
+    ) -> tuple[float, float] | tuple[Array, Array]:
+        """Return least and largest steady force under static loads [N], each as of `force`.
+        alpha, axle : as of `TireModel.force`.
+        rate : how fast the force changes, static axle loads per second, of the shape of `alpha` or
+            one number: a force may be late. 0 is steady.
+        """
+        slip = np.asarray(alpha, dtype=np.float64)
+        rates = np.tile(np.broadcast_to(np.abs(rate), slip.shape).ravel(), (2, 1)).T
+        units = np.tile(unit_matrix(slip.ravel(), self.ladder)[:, None], (1, 2, 1))
+        beyond = _beyond_driven(slip.reshape(-1, 1), self.driven) + self.possible.too_fast(rates)
+        sides = self.possible.limits(units, Doubt(beyond, rates, np.zeros_like(rates)))
+        low, high = (of_axle((side * self.loads).reshape(*slip.shape, 2), axle) for side in sides)
+        return ends(low, high)
+
+    def over(self, recording: Recording) -> tuple[Array, Array]:
+        """Return least and largest force over a drive, (n, 2) [N]; NaN below the lowest speed."""
+        low, high = self.possible.limits(*self.signals(recording))
+        stands = recording.v_x < self.min_speed
+        low[stands], high[stands] = np.nan, np.nan
+        return low * self.loads, high * self.loads
+
+
 def _extremes(rows: Array, corners: Array) -> tuple[Array, Array]:
     """Return least and largest product of each row (k, n) with corners (m, n), (k,) each."""
     least, most = np.empty(len(rows)), np.empty(len(rows))
@@ -392,9 +396,6 @@ def force_rate(
     """Return ρ (k, 2) [1/s]: the larger of |dφ/dt| and of its mean over the last 0.3 s.
 
     Of several curves that which changes most counts, at each instant.
-
-    Parameters
-    ----------
     units : tanh(x/α_j) of both axles (k, 2, n).
     curves : weights of front and rear, (m, n) each [static axle loads].
     dt : sampling interval [s].
@@ -419,11 +420,8 @@ def _faded(signal: Array, dt: float) -> Array:
     return mean
 
 
-def beyond_driven(slip: Array, driven: Array) -> Array:
+def _beyond_driven(slip: Array, driven: Array) -> Array:
     """Return by how much slip, or ρ, is beyond that of a drive, over it, (k, 2); 0 within.
-
-    Parameters
-    ----------
     slip : of both axles [rad], (k, 2), or (k, 1) where both have the same; or ρ [1/s].
     driven : largest of the drive (2,), positive, of the same unit.
     """
@@ -432,16 +430,12 @@ def beyond_driven(slip: Array, driven: Array) -> Array:
 
 def slip_beyond(slip: Array, driven: Array, dt: float, segments: Iterable[slice]) -> Array:
     """Return β (k, 2): the largest |x|/x_driven - 1 until now, each fading with 0.3 s; 0 within.
-
-    Parameters
-    ----------
-    slip : lagged x (k, 2) [rad].
-    driven : largest of the drive that taught (2,), positive [rad].
+    slip : lagged x (k, 2) [rad].   driven : largest of the drive that taught (2,), positive [rad].
     dt : sampling interval [s].
     """
     beyond = np.zeros_like(slip)
     for part in segments:
-        over = beyond_driven(slip[part], driven)
+        over = _beyond_driven(slip[part], driven)
         age = dt / MEMORY * np.arange(len(over))[:, None]
         with np.errstate(divide="ignore"):  # ln 0: nothing was beyond yet
             beyond[part] = np.exp(np.maximum.accumulate(np.log(over) + age, axis=0) - age)
@@ -452,9 +446,6 @@ def grip_lost(along: Array, grip: Array) -> Array:
     """Return which share of a side force a force along the car may cost, (k, 2).
 
     An ellipse: 1 - √(1 - (f/grip)²). Which axle is driven or braked nobody tells; each could be.
-
-    Parameters
-    ----------
     along : f, force along the car over the load of each axle (k, 2).
     grip : what the axle carries at least (2,) or (k, 2) [static axle loads].
     """
@@ -464,12 +455,7 @@ def grip_lost(along: Array, grip: Array) -> Array:
 
 def along_acceleration(v_x: Array, turning: Array, dt: float, segments: Iterable[slice]) -> Array:
     """Return dv_x/dt - v_y r over the last 0.3 s (k,) [m/s²].
-
-    Parameters
-    ----------
-    v_x : forward speed (k,) [m/s].
-    turning : v_y r (k,) [m/s²].
-    dt : sampling interval [s].
+    v_x : forward speed (k,) [m/s].   turning : v_y r (k,) [m/s²].   dt : sampling interval [s].
     """
     along = np.zeros_like(v_x)
     for part in segments:

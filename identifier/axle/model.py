@@ -1,28 +1,21 @@
 """The axle model, frozen: force curves of slip, their lag and sway, and where they are known."""
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, Self
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array, blocks
 from codegen.escape import shown
 from identifier.axle.band import (
-    CENTERS,
-    LEVEL,
     RELATIVE,
     BandCalibration,
-    BandSpread,
-    SpreadByRange,
     colored,
     colored_variance,
-    normal_quantile,
-    ranges_of,
+    declared_spread,
     root,
     sensor_noise,
 )
@@ -33,28 +26,44 @@ from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.guarantee import (
     Doubt,
     Guarantee,
+    PossibleWeights,
     along_acceleration,
-    beyond_driven,
     force_rate,
     grip_lost,
     slip_beyond,
 )
-from identifier.axle.prior import SD_FRICTION, friction_direction
+from identifier.axle.prior import friction_direction
 from identifier.axle.slip import SHORTEST, Sensors, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
+from identifier.band import (
+    LARGEST_SD,
+    LEVEL,
+    Band,
+    BandSpread,
+    normal_quantile,
+)
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
 from identifier.setup import Setup
-from identifier.tire_model import AXLES, GRIP, RELAXATION, STIFFNESS, Estimate, Fact, TireModel
+from identifier.tire_model import (
+    AXLES,
+    GRIP,
+    RELAXATION,
+    STIFFNESS,
+    Estimate,
+    Fact,
+    TireModel,
+    brisk_speed,
+)
 from models.recordings import Recording
 from models.rules import require_positive
 from models.schema import Table
 from models.vehicle import DOWNFORCE_SPEED, Vehicle
 
-ARRAYS = ("W", "own", "covariance", "prior_covariance", "excitation")
+BESIDE = ("compliance", "sway_share", "offset")  # the curve
+ARRAYS = ("W", *BESIDE, "covariance", "prior_covariance", "excitation")
 LARGEST = 1e9  # of the numbers in a file, SI and static axle loads
 LARGEST_WEIGHT = 100.0  # static axle loads: no unit of a tire carries more
 ROUNDING = 1e-6  # of correlations, as learning in float leaves them
-LARGEST_SD = 0.25  # standard deviation over the prior's, above which a slip is not known
 DECIDED = 0.5  # standard deviation over the prior's, up to which a drive decided a number
 DRAWS = 1000  # of weights, before a possible tire must have been among them
 EXACT = Sensors()
@@ -68,43 +77,39 @@ class AxleModel(TireModel):
     Odd in slip up to the sensor offsets, saturating at Σ w_j. Rows are axles, front and rear.
     Where the car has downforce, forces are those times λ = 1 + κ v_x² (`Vehicle.load_ratio`); what
     is given without a speed is of the static loads.
-
-    Parameters
-    ----------
-    ladder : slip scales α_j of the units [rad].
-    W : weights [static axle loads], (2, n).
-    own : [compliance [m per load], sway share [-], offset ([rad] front, [m/s] rear)], (2, 3).
-    covariance : of [W, own], (2, n + 3, n + 3).
+    ladder : slip scales α_j of the units [rad].   W : weights [static axle loads], (2, n).
+    compliance : deflection of the carcass [m per static axle load], (2,).
+    sway_share : of the sway of the body that the axle follows [-], (2,).
+    offset : zero of the steering in front [rad], bias of v_y at the rear [m/s], (2,).
+    covariance : of [W, compliance, sway_share, offset], (2, n + 3, n + 3).
     prior_covariance : `covariance` before the first sample.
     excitation : largest slip [rad], then time of learning above each of `EDGES` [s], (2, 9).
     sensors : errors that were known before it learnt, and stay.
     calibration : of the band, by segments that did not teach it; None where nobody calibrated.
     tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
-    guarantee : weights that the drive left possible; None where nobody asked.
+    possible : weights that the drive left; None where nobody asked for a guarantee.
     force_missed : share of the measured force that it misses of the drive that taught, rms, (2,);
         None where nobody looked.
-
-    Raises
-    ------
-    ValueError
-        Where a number has the wrong shape or is not finite.
     """
 
     kind = "axle"
+    scales_with_load = True
 
     vehicle: Vehicle
     ladder: tuple[float, ...]
     sway: Sway
     plausibility: Plausibility
     W: Array
-    own: Array
+    compliance: Array
+    sway_share: Array
+    offset: Array
     covariance: Array
     prior_covariance: Array
     excitation: Array
     sensors: Sensors = EXACT
     calibration: BandCalibration | None = None
     tells_v_y: bool = False
-    guarantee: Guarantee | None = None
+    possible: PossibleWeights | None = None
     force_missed: Array | None = None
 
     def __post_init__(self) -> None:
@@ -112,7 +117,7 @@ class AxleModel(TireModel):
         n = len(self.ladder)
         for name, shape in (
             ("W", (2, n)),
-            ("own", (2, 3)),
+            *((name, (2,)) for name in BESIDE),
             ("covariance", (2, n + 3, n + 3)),
             ("prior_covariance", (2, n + 3, n + 3)),
             ("excitation", (2, 1 + len(EDGES))),
@@ -140,21 +145,20 @@ class AxleModel(TireModel):
         """Refuse a lag, a share or an offset that no car has."""
         car, at_most = self.vehicle, self.plausibility
         for name, value, low, high in (
-            ("compliance [m]", self.own[:, 0], 0.0, car.wheelbase),
-            ("sway share", self.own[:, 1], 0.0, 1.0),
-            ("steering offset [rad]", self.own[0, 2], -at_most.max_steering, at_most.max_steering),
-            ("bias of v_y [m/s]", self.own[1, 2], -at_most.slow, at_most.slow),
+            ("compliance [m]", self.compliance, 0.0, car.wheelbase),
+            ("sway share", self.sway_share, 0.0, 1.0),
+            ("steering offset [rad]", self.offset[0], -at_most.max_steering, at_most.max_steering),
+            ("bias of v_y [m/s]", self.offset[1], -at_most.slow, at_most.slow),
         ):
             if not (np.less_equal(low, value).all() and np.less_equal(value, high).all()):
                 raise ValueError(f"{name} must be within {low:g} and {high:g}, it is {value}")
 
     @property
     def min_speed(self) -> float:
-        """Below this speed [m/s] the forces read zero."""
         return self.plausibility.min_speed
 
     @property
-    def cornering_stiffness(self) -> Array:
+    def stiffness(self) -> Array:
         """Slope of the force curves at zero, under static loads [N/rad], (2,): the linear part."""
         slope: Array = (self.W / np.array(self.ladder)).sum(axis=1)
         return slope * self._loads
@@ -162,139 +166,36 @@ class AxleModel(TireModel):
     @property
     def relaxation_length(self) -> Array:
         """Lag of slip at small slip, under static loads [m], (2,); it goes with the slope."""
-        slope: Array = (self.W / np.array(self.ladder)).sum(axis=1)
-        return self.own[:, 0] * np.maximum(slope, 0.0) + SHORTEST * self.vehicle.wheelbase
+        slope = np.maximum(self.stiffness / self._loads, 0.0)
+        return self.compliance * slope + SHORTEST * self.vehicle.wheelbase
 
     @property
-    def _loads(self) -> Array:
-        return np.array(self.vehicle.axle_loads)
+    def beside_curve(self) -> Array:
+        """[compliance, sway share, offset] of the axles, as steps carry them, (2, 3)."""
+        return np.column_stack([self.compliance, self.sway_share, self.offset])
+
+    def _steady(self, alpha: Array, v_x: float) -> Array:
+        force = unit_matrix(alpha, self.ladder) @ self.W.T * self._loads
+        return force * self.vehicle.load_ratio(v_x)
 
     @property
-    def curve_speed(self) -> float:
-        """Speed [m/s] of curves that are asked for without one: with downforce 0, static loads."""
-        return 0.0 if self.vehicle.has_downforce else self.reference_speed
-
-    def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles under static loads, (k, 2) [N]."""
-        force: Array = unit_matrix(alpha, self.ladder) @ self.W.T * self._loads
-        return force
-
-    def relative_sd(self, alpha: Array) -> Array:
-        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
-
-        Standard deviation of the force over that of the prior.
-        """
-        T, n = unit_matrix(alpha, self.ladder), len(self.ladder)
-        ratio = [
-            np.einsum("ki,ij,kj->k", T, now[:n, :n], T)
-            / np.einsum("ki,ij,kj->k", T, before[:n, :n], T)
-            for now, before in zip(self.covariance, self.prior_covariance, strict=True)
-        ]
-        relative_sd: Array = np.sqrt(np.maximum(np.stack(ratio, axis=1), 0.0))
-        return relative_sd
-
-    @property
-    def has_band(self) -> bool:
-        """Whether the model can tell how sure it is: by its covariance."""
-        return True
-
-    @property
-    def band_calibrated(self) -> bool:
-        """Whether the width of its band was found on parts of the drive that did not teach."""
-        return self.calibration is not None
-
-    def with_calibration(
-        self, calibration: BandCalibration | None, force_missed: Array | None = None
-    ) -> "AxleModel":
-        """Return the model, its band calibrated."""
-        return replace(self, calibration=calibration, force_missed=force_missed)
+    def band(self) -> "_AxleBand":
+        """How unsure it is, by its covariance."""
+        return _AxleBand(self)
 
     @property
     def known_slip(self) -> Array:
-        """Largest slip [rad] that was seen while learning and where the doubt is small, (2,)."""
         grid = np.linspace(0.0, 1.0, 201)[1:]
         known = np.zeros(2)
         for i, largest in enumerate(self.excitation[:, 0]):
             if largest > 0.0:
-                sure = self.relative_sd(largest * grid)[:, i] <= LARGEST_SD
+                sure = self.band.relative_sd(largest * grid)[:, i] <= LARGEST_SD
                 count = sure.size if sure.all() else int(np.argmin(sure))
                 known[i] = largest * count / grid.size
         return known
 
-    def half_band(
-        self, alpha: Array, level: float = LEVEL, *, v_x: float | Array | None = None
-    ) -> Array:
-        """Return half the width of the band around the steady forces, (k, 2) [N].
-
-        Without a calibration errors are taken to be as declared.
-
-        Raises
-        ------
-        ValueError
-            Where the level is impossible, or a speed is not positive.
-        """
-        speed = np.broadcast_to(
-            self.effective_calibration.speed if v_x is None else v_x, np.shape(alpha)
-        )
-        if not (speed > 0.0).all():
-            raise ValueError(f"v_x of a band must be positive, it is {speed.min()}")
-        factor = self.effective_calibration.factor(alpha, speed / self.vehicle.froude_speed)
-        pressed = self.vehicle.load_ratio(0.0 if v_x is None else speed)
-        return self.band_spread(alpha, speed, pressed).half_width(factor, level) * self._loads
-
-    def half_band_over(self, recording: Recording, level: float = LEVEL) -> Array:
-        """Return half the width of the band around `axle_force` of a drive, (n, 2) [N].
-
-        White noise of the drive's own sensors is in it, as far as the lag lets it pass; it is zero
-        where the forces read zero.
-        """
-        slip, noise = self.lagged_slip(recording), sensor_noise(recording, self.vehicle)
-        half = np.zeros_like(slip)
-        for part in blocks(len(slip)):
-            v_x = np.maximum(recording.v_x[part], self.min_speed)
-            curve = self.half_band_along(slip[part], v_x, level)
-            passed = self._noise_passed(slip[part], v_x[:, None], noise, recording.dt)
-            wide = np.hypot(curve, normal_quantile(level) * passed * self._loads)
-            half[part] = np.where(recording.v_x[part, None] >= self.min_speed, wide, 0.0)
-        return half
-
-    def half_band_along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
-        """Return half the width of the band where each axle has its own slip, (n, 2) [N].
-
-        Parameters
-        ----------
-        slip : of front and rear axle [rad], (n, 2).
-        v_x : speeds [m/s], positive, (n,).
-        """
-        both = [self.half_band(slip[:, i], level, v_x=v_x)[:, i] for i in range(2)]
-        return np.column_stack(both)
-
-    def half_band_of_curves(self, recording: Recording, level: float = LEVEL) -> Array:
-        """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N].
-
-        Of the steady forces, without noise of the drive's sensors.
-        """
-        speed = np.maximum(recording.v_x, self.min_speed)
-        return self.half_band_along(self.lagged_slip(recording), speed, level)
-
-    def _noise_passed(self, slip: Array, v_x: Array, noise: Array, dt: float) -> Array:
-        """Return what noise of sensors makes of the forces, through the lag [static loads], (n, 2).
-
-        White noise through a lag of first order leaves (1 - e)/(1 + e) of its variance.
-        """
-        sideways, steering = noise[:2] / v_x, np.array([noise[2], 0.0])
-        pressed = self.vehicle.load_ratio(v_x[:, 0])
-        slope = self.slope_at(slip) * pressed
-        slopes = np.maximum(slope, 0.02 * self.slope_at(np.zeros((1, 2))) * pressed)
-        e = np.exp(-v_x * dt / (self.own[:, 0] * slopes + SHORTEST * self.vehicle.wheelbase))
-        passed: Array = slope * np.hypot(sideways, steering) * np.sqrt((1.0 - e) / (1.0 + e))
-        return passed
-
     def slope_at(self, slip: Array) -> Array:
         """Return the slope of the curves under static loads at slips [static loads/rad], (n, 2).
-
-        Parameters
-        ----------
         slip : of front and rear axle [rad], (n, 2).
         """
         scales = np.array(self.ladder)
@@ -302,104 +203,12 @@ class AxleModel(TireModel):
         slope: Array = ((1.0 - units**2) * self.W / scales).sum(axis=-1)
         return slope
 
-    def slope_over(self, recording: Recording) -> Array:
-        """Return the slope of the curves over the slip of a drive [static loads/rad], (n, 2)."""
-        return self.slope_at(self.lagged_slip(recording)) * self.vehicle.load_ratio(recording.v_x)
-
     @property
-    def effective_calibration(self) -> BandCalibration:
-        """Calibration of the band; where there is none, of the declared errors."""
-        return self.calibration or BandCalibration.declared(self.reference_speed)
-
-    def band_spread(self, alpha: Array, v_x: Array, pressed: Array | float = 1.0) -> BandSpread:
-        """Return the variances of the steady forces that a band is made of, (k, 2).
-
-        Parameters
-        ----------
-        alpha : slip angles [rad], (k,).
-        v_x : speeds [m/s], positive, (k,).
-        pressed : loads of the axles over the static ones, (k, 2), or one for all [-].
-        """
-        T = unit_matrix(alpha, self.ladder)
-        scales, n = np.array(self.ladder), len(self.ladder)
-        slope = (1.0 - T * T) @ (self.W / scales).T
-        zero = slope * np.column_stack([np.ones_like(v_x), 1.0 / v_x])  # of slip, by its offset
-        h = np.zeros((2, len(T), n + 3))
-        h[:, :, :n], h[:, :, -1] = T, zero.T
-        load = np.broadcast_to(pressed, (len(T), 2))
-        h *= load.T[:, :, None]
-        left, before = (
-            np.einsum("aki,aij,akj->ka", h, both, h)
-            for both in (self.covariance, self.prior_covariance)
-        )
-        calibration = self.effective_calibration
-        left = colored_variance(left, before, calibration.color)
-        force = T @ self.W.T * load
-        return BandSpread.of(force, left, before, calibration.stretch(v_x)[:, None])
-
-    def spread_by_range(
-        self, recording: Recording, mean: Callable[[Array], Array]
-    ) -> SpreadByRange:
-        """Return the variances that a band is made of, by range of slip and window of a drive.
-
-        Parameters
-        ----------
-        mean : over the windows: signals (n, ...) -> (m, ...).
-        """
-        size, count = np.abs(self.lagged_slip(recording)), len(CENTERS)
-        within, v_x = ranges_of(size), np.tile(mean(recording.v_x), count)
-        share = np.array([mean(1.0 * (within == k)) for k in range(count)])
-        total = np.array([mean(size * (within == k)) for k in range(count)])
-        slip = np.divide(total, share, out=np.zeros_like(total), where=share > 0.0)
-        spread = BandSpread(np.empty_like(slip), np.empty_like(slip))
-        pressed = self.vehicle.load_ratio(v_x)
-        for axle in range(2):
-            at = self.band_spread(slip[..., axle].ravel(), v_x, pressed)
-            for into, values in zip(spread, at, strict=True):
-                into[..., axle] = values[:, axle].reshape(slip.shape[:2])
-        return SpreadByRange(share, *spread)
-
-    def on_another_road(self, sd_friction: float = SD_FRICTION) -> "AxleModel":
-        """Return the model for a road whose friction is not that of the drive that taught.
-
-        Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
-
-        Parameters
-        ----------
-        sd_friction : standard deviation of ln μ between the roads [-], as of `Prior`.
-        """
-        if not 0.0 <= sd_friction < np.inf:
-            raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
-        n, wider = len(self.ladder), self.covariance.copy()
-        change = sd_friction * self.W @ friction_direction(self.ladder).T
-        wider[:, :n, :n] += change[:, :, None] * change[:, None, :]
-        return replace(self, covariance=wider, guarantee=None)
-
-    def guaranteed_at(self, alpha: Array, rate: Array) -> tuple[Array, Array] | None:
-        """Return least and largest steady force at slip angles under static loads, (k, 2) [N].
-
-        None: none is stated.
-        """
-        if self.guarantee is None:
+    def guarantee(self) -> Guarantee | None:
+        if self.possible is None:
             return None
-        units = np.repeat(unit_matrix(alpha, self.ladder)[:, None], 2, axis=1)
-        beyond = beyond_driven(alpha[:, None], self.driven_slip)
-        rates = np.repeat(np.abs(rate)[:, None], 2, axis=1)
-        beyond = beyond + self.guarantee.too_fast(rates)
-        low, high = self.guarantee.limits(units, Doubt(beyond, rates, np.zeros_like(rates)))
-        return low * self._loads, high * self._loads
-
-    def guaranteed_force(self, recording: Recording) -> tuple[Array, Array] | None:
-        """Return least and largest axle force over a drive, (n, 2) [N], as `axle_force`.
-
-        NaN below the lowest speed; None where no guarantee is stated.
-        """
-        if self.guarantee is None:
-            return None
-        low, high = self.guarantee.limits(*self.signals_of(recording))
-        stands = recording.v_x < self.min_speed
-        low[stands], high[stands] = np.nan, np.nan
-        return low * self._loads, high * self._loads
+        at = (self.ladder, self.driven_slip, self._loads, self.min_speed)
+        return Guarantee(self.possible, *at, self.signals_of)
 
     def signals_of(self, recording: Recording) -> tuple[Array, Doubt]:
         """Return units times load and cos δ over a drive, (n, 2, ladder), and what opens a band.
@@ -413,13 +222,13 @@ class AxleModel(TireModel):
         pressed = self.vehicle.load_ratio(recording.v_x)
         T *= pressed[..., None]
         beyond = slip_beyond(slip, self.driven_slip, dt, segments)
-        if self.guarantee is None:
+        if self.possible is None:
             rate = force_rate(T, (self.W[:1], self.W[1:]), dt, segments)
         else:
-            rate = force_rate(T, self.guarantee.corners, dt, segments)
+            rate = force_rate(T, self.possible.corners, dt, segments)
             v_x = np.maximum(recording.v_x, self.min_speed)
-            rate *= np.maximum(self.guarantee.speed / v_x, 1.0)[:, None]
-            beyond += self.guarantee.too_fast(rate)
+            rate *= np.maximum(self.possible.speed / v_x, 1.0)[:, None]
+            beyond += self.possible.too_fast(rate)
         v_y = 0.0 if recording.v_y is None else recording.v_y
         along = along_acceleration(recording.v_x, v_y * recording.r, dt, segments)
         carried = (unit_matrix(self.driven_slip, self.ladder) * self.W).sum(axis=1) * pressed
@@ -440,26 +249,286 @@ class AxleModel(TireModel):
         driven: Array = np.maximum(self.excitation[:, 0], self.ladder[0])
         return driven
 
-    def _posterior(self, factors: Array | None = None) -> Array:
-        """Return the covariance of both axles, its noise as colored as it was."""
-        color = self.effective_calibration.color
-        size = np.ones(2) if factors is None else factors
-        both = zip(self.covariance, self.prior_covariance, color, size, strict=True)
-        return np.array([colored(P, prior, float(c), float(f)) for P, prior, c, f in both])
+    def estimates(self) -> tuple[Estimate, ...]:
+        """Return stiffness, grip, relaxation length and offset of each axle, with their doubt.
 
-    def samples(self, n: int, rng: np.random.Generator) -> tuple["AxleModel", ...]:
-        """Return models drawn from what learning left open, and from the errors of a model.
-
-        Raises
-        ------
-        ValueError
-            Where n is negative, or no tire is among what was drawn.
+        A number is learnt where its standard deviation is at most half of the prior's; the grip,
+        where the curve also bends within the known slip.
         """
-        if n < 0:
-            raise ValueError(f"n must not be negative, it is {n}")
-        factors = self.effective_calibration.factors
-        size = np.sqrt(np.mean(factors**2, axis=1))
-        roots = [root(P) for P in self._posterior(size)]
+        n, scales = len(self.ladder), np.array(self.ladder)
+        steep, level = np.zeros(n + 3), np.zeros(n + 3)
+        steep[:n], level[:n] = 1.0 / scales, 1.0
+        lag, zero = np.eye(n + 3)[n], np.eye(n + 3)[n + 2]
+        slope = (self.W / scales).sum(axis=1)
+        bends = self.slope_at(self.known_slip[None])[0] < BENT * slope
+        given = self.vehicle.bicycle[4:]
+        offset = (("zero of the steering", "deg", np.degrees(1.0)), ("bias of v_y", "m/s", 1.0))
+        listed = []
+        for i, (axle, load) in enumerate(zip(AXLES, self._loads, strict=True)):
+            name, unit, scale = offset[i]
+            rows = (
+                (STIFFNESS, steep, slope[i] * load, load, "N/rad", given[i], True),
+                (GRIP, level, self.W[i].sum(), 1.0, "static load", None, bends[i]),
+                (RELAXATION, lag, self.relaxation_length[i], max(slope[i], 0.0), "m",
+                 None, True),
+                (name, zero, scale * self.offset[i], scale, unit, 0.0, True),
+            )  # fmt: skip
+            for title, along, value, per, its_unit, before, seen in rows:
+                now, prior = (
+                    float(np.sqrt(along @ P[i] @ along))
+                    for P in (self.covariance, self.prior_covariance)
+                )
+                learnt = bool(seen and now <= DECIDED * prior)
+                listed.append(
+                    Estimate(title, axle, float(value), float(per) * now, its_unit, before, learnt)
+                )
+        return tuple(listed)
+
+    def facts(self) -> tuple[Fact, ...]:
+        known = self.known_slip
+        lines = list(TireModel.facts(self))
+        if (known > 0.0).all():
+            unsure = 100.0 * np.diag(self.band.relative_sd(known))
+            lines.append(Fact("standard deviation there over the prior's", unsure, "%"))
+        lines.append(Fact("time of learning", self.excitation[:, 1], "s"))
+        if self.vehicle.has_downforce:
+            more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
+            lines.append(Fact(f"more of all forces at {DOWNFORCE_SPEED:g} m/s", more, "%"))
+        return tuple(lines)
+
+    def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
+        # Both were shown of this car alone.
+        return replace(self, vehicle=vehicle, possible=None, force_missed=None)
+
+    def at_friction(self, ratio: float) -> "AxleModel":
+        require_positive(ValueError, ratio=ratio)
+        n = len(self.ladder)
+        unit = np.concatenate([np.full(n, ratio), np.ones(3)])
+        excitation = self.excitation.copy()
+        excitation[:, 0] *= ratio
+        return replace(
+            self,
+            ladder=tuple(ratio * scale for scale in self.ladder),
+            W=ratio * self.W,
+            covariance=self.covariance * np.outer(unit, unit),
+            prior_covariance=self.prior_covariance * np.outer(unit, unit),
+            excitation=excitation,
+            possible=None,  # of the road that taught, as is what is missed
+            force_missed=None,
+        )
+
+    @property
+    def lagged(self) -> bool:
+        return True
+
+    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
+        at = curve_at_speed(alpha, v_x, self.W, self.ladder, self.vehicle)
+        return at.force * ca.DM(self._loads)
+
+    def force_expression(
+        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
+    ) -> tuple[Any, Any]:
+        """Return the axle forces (2,) [N] and the rate of lagged slip (2,) [rad/s].
+        slip : lagged slip (2,) [rad].   x : [v_y, r] (2,), as the sensors read them while learning.
+        """
+        v_y = self.sensors.v_y(x[0], x[1], v_x)
+        return lagged_force(
+            Car(*car_numbers(self.vehicle).T),
+            curve_at_speed(slip, v_x, self.W, self.ladder, self.vehicle),
+            series_compliance(self.compliance, self.sway_share, self.sway.frequency),
+            self.offset,
+            slip=slip,
+            x=[v_y, x[1]],
+            delta=self.sensors.steering(delta),
+            v_x=v_x,
+            least_lag=least_lag,
+        )
+
+    def lagged_slip(self, recording: Recording) -> Array:
+        """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
+        return self.setup(recording.dt).output(recording, "lagged_slip")
+
+    def setup(self, dt: float) -> Setup:
+        return Setup(
+            scan=_frozen_scan(doublings(self.ladder), pressed=self.vehicle.has_downforce),
+            carry={
+                "gate": np.zeros(len(GateState._fields)),
+                "sway": np.zeros(len(SwayState._fields)),
+                "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),
+            },
+            constants={
+                "W": self.W,
+                "own": self.beside_curve,
+                "dt": np.array(dt),
+                "car": car_numbers(self.vehicle),
+                "scales": 1.0 / np.array(self.ladder)[None],
+                "plausibility": np.array(self.plausibility.numbers()),
+                "roll": np.array(self.sway.numbers()),
+                "sensors": np.array(self.sensors),
+                **downforce_numbers(self.vehicle),
+            },
+            ends_run=self.plausibility.rest(dt),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        return {
+            "format": FORMAT,
+            "kind": self.kind,
+            "units": {
+                "ladder": "rad",
+                "W": "static axle loads",
+                "compliance": "m per static axle load",
+                "sway_share": "-",
+                "offset": "rad (front), m/s (rear)",
+                "excitation": "rad, then s above the edges",
+                "edges": "rad",
+            },
+            "vehicle": vehicle_numbers(self.vehicle),
+            "sway": asdict(self.sway),
+            "plausibility": asdict(self.plausibility),
+            "ladder": list(self.ladder),
+            "edges": list(EDGES),
+            **{name: getattr(self, name).tolist() for name in ARRAYS},
+            "cornering_stiffness_N_rad": self.stiffness.tolist(),
+            "relaxation_length_m": self.relaxation_length.tolist(),
+            "known_slip_rad": self.known_slip.tolist(),
+            **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
+            **({} if self.possible is None else {"guarantee": self.possible.to_dict()}),
+            **({"sensors": self.sensors._asdict()} if any(self.sensors) else {}),
+            **({"tells_v_y": True} if self.tells_v_y else {}),
+            **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
+        }
+
+    @classmethod
+    def _read(cls, table: Table) -> Self:
+        if "own" in table:  # files of earlier versions: the three in one
+            three = dict(zip(BESIDE, table.array("own").T.tolist(), strict=False))
+            table = Table({**three, **table.data}, "", FrozenModelError)
+        numbers: dict[str, Any] = {name: table.array(name) for name in ("ladder", "edges", *ARRAYS)}
+        for name, values in numbers.items():
+            if (largest := np.abs(values).max(initial=0.0)) > LARGEST:
+                table.refuse(name, f"must hold numbers below {LARGEST:g}, it reaches {largest:g}")
+        ladder, edges = tuple(numbers.pop("ladder").tolist()), numbers.pop("edges").tolist()
+        if edges != list(EDGES):
+            table.refuse("edges", f"must be {list(EDGES)}, they are {edges}")
+        if "sensors" in table:
+            sensors = table.table("sensors")
+            numbers["sensors"] = Sensors(*(sensors.number(name) for name in Sensors._fields))
+        if "band" in table:
+            numbers["calibration"] = BandCalibration.from_dict(table.value("band"))
+        if "guarantee" in table:
+            data = table.table("guarantee").data
+            numbers["possible"] = PossibleWeights.from_dict(data, len(ladder))
+        tells = table.data.get("tells_v_y", False)
+        if not isinstance(tells, bool):
+            table.refuse("tells_v_y", f"must be true or false, it is {shown(tells)}")
+        if "force_missed" in table:
+            numbers["force_missed"] = table.array("force_missed")
+        return cls(
+            vehicle=vehicle_from(table.value("vehicle")),
+            ladder=ladder,
+            sway=Sway(**table.table("sway").record(Sway)),
+            plausibility=Plausibility(**table.table("plausibility").record(Plausibility)),
+            tells_v_y=tells,
+            **numbers,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _AxleBand(Band[AxleModel]):
+    """How unsure an axle model is: by its covariance, and errors that no curve can explain."""
+
+    @property
+    def calibrated(self) -> bool:
+        return self.model.calibration is not None
+
+    @property
+    def calibration(self) -> BandCalibration:
+        """That of the model; where there is none, of the declared errors."""
+        brisk = brisk_speed(self.model.vehicle, self.model.min_speed)
+        return self.model.calibration or BandCalibration.declared(brisk)
+
+    @property
+    def speed(self) -> float:
+        return self.calibration.speed
+
+    def factor(self, slip: Array, v_x: Array) -> Array:
+        relative = v_x / self.model.vehicle.froude_speed
+        return self.calibration.factor(slip, relative)
+
+    def spread(self, slip: Array, v_x: Array, pressed: Array) -> BandSpread:
+        model, n = self.model, len(self.model.ladder)
+        T = np.stack([unit_matrix(slip[:, i], model.ladder) for i in range(2)])
+        zero = model.slope_at(slip) * np.column_stack([np.ones_like(v_x), 1.0 / v_x])
+        h = np.zeros((2, len(slip), n + 3))
+        h[:, :, :n], h[:, :, -1] = T, zero.T  # the slip by its offset, too
+        h *= pressed.T[:, :, None]
+        left, before = (
+            np.einsum("aki,aij,akj->ka", h, both, h)
+            for both in (model.covariance, model.prior_covariance)
+        )
+        calibration = self.calibration
+        left = colored_variance(left, before, calibration.color)
+        force = np.einsum("aki,ai->ka", T, model.W) * pressed
+        return declared_spread(force, left, before, calibration.stretch(v_x)[:, None])
+
+    def relative_sd(self, alpha: Array) -> Array:
+        T, n = unit_matrix(alpha, self.model.ladder), len(self.model.ladder)
+        ratio = [
+            np.einsum("ki,ij,kj->k", T, now[:n, :n], T)
+            / np.einsum("ki,ij,kj->k", T, before[:n, :n], T)
+            for now, before in zip(self.model.covariance, self.model.prior_covariance, strict=True)
+        ]
+        relative_sd: Array = np.sqrt(np.maximum(np.stack(ratio, axis=1), 0.0))
+        return relative_sd
+
+    def over(self, recording: Recording, level: float = LEVEL) -> Array:
+        """Return half its width around the predicted forces of a drive, (n, 2) [N].
+
+        White noise of the drive's own sensors is in it, as far as the lag lets it pass.
+        """
+        model = self.model
+        slip, noise = model.lagged_slip(recording), sensor_noise(recording, model.vehicle)
+        half = np.zeros_like(slip)
+        for part in blocks(len(slip)):
+            v_x = np.maximum(recording.v_x[part], model.min_speed)
+            passed = self._noise_passed(slip[part], v_x[:, None], noise, recording.dt)
+            passed *= normal_quantile(level) * np.array(model.vehicle.axle_loads)
+            wide = np.hypot(self.along(slip[part], v_x, level), passed)
+            half[part] = np.where(recording.v_x[part, None] >= model.min_speed, wide, 0.0)
+        return half
+
+    def _noise_passed(self, slip: Array, v_x: Array, noise: Array, dt: float) -> Array:
+        """Return what noise of sensors makes of the forces, through the lag [static loads], (n, 2).
+
+        White noise through a lag of first order leaves (1 - e)/(1 + e) of its variance.
+        """
+        model, car = self.model, self.model.vehicle
+        sideways, steering = noise[:2] / v_x, np.array([noise[2], 0.0])
+        pressed = car.load_ratio(v_x[:, 0])
+        slope = model.slope_at(slip) * pressed
+        slopes = np.maximum(slope, 0.02 * model.slope_at(np.zeros((1, 2))) * pressed)
+        e = np.exp(-v_x * dt / (model.compliance * slopes + SHORTEST * car.wheelbase))
+        passed: Array = slope * np.hypot(sideways, steering) * np.sqrt((1.0 - e) / (1.0 + e))
+        return passed
+
+    def calibrated_by(
+        self, calibration: BandCalibration | None, force_missed: Array | None = None
+    ) -> AxleModel:
+        return replace(self.model, calibration=calibration, force_missed=force_missed)
+
+    def _opened(self, sd_friction: float) -> AxleModel:
+        model, n = self.model, len(self.model.ladder)
+        change = sd_friction * model.W @ friction_direction(model.ladder).T
+        wider = model.covariance.copy()
+        wider[:, :n, :n] += change[:, :, None] * change[:, None, :]
+        return replace(model, covariance=wider, possible=None)
+
+    def _samples(self, n: int, rng: np.random.Generator) -> tuple[AxleModel, ...]:
+        model, calibration = self.model, self.calibration
+        size = np.sqrt(np.mean(calibration.factors**2, axis=1))
+        both = zip(model.covariance, model.prior_covariance, calibration.color, size, strict=True)
+        roots = [root(colored(P, prior, float(c), float(f))) for P, prior, c, f in both]
         drawn: list[AxleModel] = []
         for _ in range(DRAWS * n):
             if len(drawn) == n:
@@ -475,266 +544,20 @@ class AxleModel(TireModel):
 
     def _drawn(
         self, roots: list[Array], scale: Array, rng: np.random.Generator
-    ) -> "AxleModel | None":
+    ) -> AxleModel | None:
         """Return a model drawn, offsets and lags within what is possible; None: no tire."""
-        n, car, at_most = len(self.ladder), self.vehicle, self.plausibility
+        model, n, at_most = self.model, len(self.model.ladder), self.model.plausibility
         away = np.array([root @ rng.standard_normal(len(root)) for root in roots])
-        W = (self.W + away[:, :n]) * scale[:, None]
-        slope = (W / np.array(self.ladder)).sum(axis=1)
+        W = (model.W + away[:, :n]) * scale[:, None]
+        slope = (W / np.array(model.ladder)).sum(axis=1)
         if not ((W.sum(axis=1) > 0.0) & (slope > 0.0)).all() or np.abs(W).max() > LARGEST_WEIGHT:
             return None
         zeros = np.array([at_most.max_steering, at_most.slow])
         low = np.column_stack([np.zeros((2, 2)), -zeros])
-        high = np.column_stack([np.full(2, car.wheelbase), np.ones(2), zeros])
-        own = np.clip(self.own + away[:, n:], low, high)
-        return replace(self, W=W, own=own, force_missed=None)
-
-    def estimates(self) -> tuple[Estimate, ...]:
-        """Return stiffness, grip, relaxation length and offset of each axle, with their doubt.
-
-        A number is learnt where its standard deviation is at most half of the prior's; the grip,
-        where the curve also bends within the known slip.
-        """
-        n, scales = len(self.ladder), np.array(self.ladder)
-        steep, level = np.zeros(n + 3), np.zeros(n + 3)
-        steep[:n], level[:n] = 1.0 / scales, 1.0
-        lag, zero = np.eye(n + 3)[n], np.eye(n + 3)[n + 2]
-        slope = (self.W / scales).sum(axis=1)
-        bends = self._slope_at_known() < BENT * slope
-        given = self.vehicle.bicycle[4:]
-        offset = (("zero of the steering", "deg", np.degrees(1.0)), ("bias of v_y", "m/s", 1.0))
-        listed = []
-        for i, (axle, load) in enumerate(zip(AXLES, self._loads, strict=True)):
-            name, unit, scale = offset[i]
-            rows = (
-                (STIFFNESS, steep, slope[i] * load, load, "N/rad", given[i], True),
-                (GRIP, level, self.W[i].sum(), 1.0, "static load", None, bends[i]),
-                (RELAXATION, lag, self.relaxation_length[i], max(slope[i], 0.0), "m",
-                 None, True),
-                (name, zero, scale * self.own[i, 2], scale, unit, 0.0, True),
-            )  # fmt: skip
-            for title, along, value, per, its_unit, before, seen in rows:
-                now, prior = (
-                    float(np.sqrt(along @ P[i] @ along))
-                    for P in (self.covariance, self.prior_covariance)
-                )
-                learnt = bool(seen and now <= DECIDED * prior)
-                listed.append(
-                    Estimate(title, axle, float(value), float(per) * now, its_unit, before, learnt)
-                )
-        return tuple(listed)
-
-    def _slope_at_known(self) -> Array:
-        """Return the slope of the curves where they end to be known [static loads/rad], (2,)."""
-        scales = np.array(self.ladder)
-        bent: Array = (self.W / (scales * np.cosh(self.known_slip[:, None] / scales) ** 2)).sum(1)
-        return bent
-
-    def facts(self) -> tuple[Fact, ...]:
-        """Return what `summary` says beside the estimates."""
-        known = self.known_slip
-        lines = list(TireModel.facts(self))
-        if (known > 0.0).all():
-            unsure = 100.0 * np.diag(self.relative_sd(known))
-            lines.append(Fact("standard deviation there over the prior's", unsure, "%"))
-        lines.append(Fact("time of learning", self.learning_time.sum(axis=1), "s"))
-        if self.vehicle.has_downforce:
-            more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
-            lines.append(Fact(f"more of all forces at {DOWNFORCE_SPEED:g} m/s", more, "%"))
-        return tuple(lines)
-
-    @property
-    def scales_with_load(self) -> bool:
-        """Whether forces are in static axle loads, so that another car's model scales to a car."""
-        return True
-
-    def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
-        """Return the tires on another car, their forces scaled by its static axle loads."""
-        # Both were shown of this car alone.
-        return replace(self, vehicle=vehicle, guarantee=None, force_missed=None)
-
-    def beside_v_y(self) -> "AxleModel":
-        """Return the model as one that the axle identifier goes on learning, which is given v_y."""
-        return replace(self, tells_v_y=False)
-
-    def at_friction(self, ratio: float) -> "AxleModel":
-        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays."""
-        require_positive(ValueError, ratio=ratio)
-        n = len(self.ladder)
-        unit = np.concatenate([np.full(n, ratio), np.ones(3)])
-        excitation = self.excitation.copy()
-        excitation[:, 0] *= ratio
-        return replace(
-            self,
-            ladder=tuple(ratio * scale for scale in self.ladder),
-            W=ratio * self.W,
-            covariance=self.covariance * np.outer(unit, unit),
-            prior_covariance=self.prior_covariance * np.outer(unit, unit),
-            excitation=excitation,
-            guarantee=None,  # of the road that taught, as is what is missed
-            force_missed=None,
-        )
-
-    @property
-    def lagged(self) -> bool:
-        """Whether the force follows a lagged slip, two more states."""
-        return True
-
-    def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression.
-
-        Parameters
-        ----------
-        v_x : longitudinal speed [m/s]; looked at where the car has downforce.
-        """
-        at = curve_at_speed(alpha, v_x, self.W, self.ladder, self.vehicle)
-        return at.force * ca.DM(self._loads)
-
-    def force_expression(
-        self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
-    ) -> tuple[Any, Any]:
-        """Return the axle forces (2,) [N] and the rate of lagged slip (2,) [rad/s].
-
-        Parameters
-        ----------
-        slip : lagged slip (2,) [rad].
-        x : [v_y, r] (2,), as the sensors read them while learning.
-        """
-        v_y = self.sensors.v_y(x[0], x[1], v_x)
-        return lagged_force(
-            Car(*car_numbers(self.vehicle).T),
-            curve_at_speed(slip, v_x, self.W, self.ladder, self.vehicle),
-            series_compliance(self.own, self.sway.frequency),
-            self.own[:, 2],
-            slip=slip,
-            x=[v_y, x[1]],
-            delta=self.sensors.steering(delta),
-            v_x=v_x,
-            least_lag=least_lag,
-        )
-
-    @property
-    def learning_time(self) -> Array:
-        """Time of learning in each range of slip between `EDGES`, the last open [s], (2, 8)."""
-        above = self.excitation[:, 1:]
-        return above - np.column_stack([above[:, 1:], np.zeros(2)])
-
-    def outside(self, recording: Recording) -> NDArray[np.bool_]:
-        """Return where the slip leaves the known range, (n, 2)."""
-        outside: NDArray[np.bool_] = (
-            self.setup(recording.dt).output(recording, "slip_size") > self.known_slip
-        )
-        return outside
-
-    def lagged_slip(self, recording: Recording) -> Array:
-        """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
-        return self.setup(recording.dt).output(recording, "lagged_slip")
-
-    def setup(self, dt: float) -> Setup:
-        """Return what a replay needs."""
-        return Setup(
-            scan=_frozen_scan(doublings(self.ladder), pressed=self.vehicle.has_downforce),
-            carry={
-                "gate": np.zeros(len(GateState._fields)),
-                "sway": np.zeros(len(SwayState._fields)),
-                "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),
-            },
-            constants={
-                "W": self.W,
-                "own": self.own,
-                "dt": np.array(dt),
-                "car": car_numbers(self.vehicle),
-                "scales": 1.0 / np.array(self.ladder)[None],
-                "plausibility": np.array(self.plausibility.numbers()),
-                "roll": np.array(self.sway.numbers()),
-                "sensors": np.array(self.sensors),
-                **downforce_numbers(self.vehicle),
-            },
-            ends_run=self.plausibility.rest(dt),
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the model as plain numbers and words, ready for JSON."""
-        return {
-            "format": FORMAT,
-            "kind": self.kind,
-            "units": {
-                "ladder": "rad",
-                "W": "static axle loads",
-                "own": "m per static axle load, -, rad (front) or m/s (rear)",
-                "excitation": "rad, then s above the edges",
-                "edges": "rad",
-            },
-            "vehicle": vehicle_numbers(self.vehicle),
-            "sway": asdict(self.sway),
-            "plausibility": asdict(self.plausibility),
-            "ladder": list(self.ladder),
-            "edges": list(EDGES),
-            **{name: getattr(self, name).tolist() for name in ARRAYS},
-            "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
-            "relaxation_length_m": self.relaxation_length.tolist(),
-            "known_slip_rad": self.known_slip.tolist(),
-            **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
-            **({} if self.guarantee is None else {"guarantee": self.guarantee.to_dict()}),
-            **({"sensors": self.sensors._asdict()} if any(self.sensors) else {}),
-            **({"tells_v_y": True} if self.tells_v_y else {}),
-            **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
-        }
-
-    @classmethod
-    def from_dict(cls, data: dict[str, Any], source: str) -> "AxleModel":
-        """Return the model that `to_dict` describes."""
-        _require_plausible(data, source)
-        try:
-            if list(data["edges"]) != list(EDGES):
-                raise ValueError(f"edges must be {list(EDGES)}, they are {data['edges']}")
-            return cls(
-                vehicle=vehicle_from(data["vehicle"]),
-                ladder=tuple(float(scale) for scale in data["ladder"]),
-                sway=Sway(**data["sway"]),
-                plausibility=Plausibility(**data["plausibility"]),
-                **{name: np.array(data[name], dtype=np.float64) for name in ARRAYS},
-                sensors=Sensors(**data.get("sensors", {})),
-                calibration=BandCalibration.from_dict(data["band"]) if "band" in data else None,
-                guarantee=(
-                    Guarantee.from_dict(data["guarantee"], len(data["ladder"]))
-                    if "guarantee" in data
-                    else None
-                ),
-                tells_v_y=bool(data.get("tells_v_y", False)),
-                force_missed=(
-                    np.array(data["force_missed"], dtype=np.float64)
-                    if "force_missed" in data
-                    else None
-                ),
-            )
-        except KeyError as error:
-            raise FrozenModelError(f"{source}: key {error} is missing") from error
-        except (TypeError, ValueError) as error:
-            raise FrozenModelError(f"{source}: {error}") from error
-
-
-def _require_plausible(data: dict[str, Any], source: str) -> None:
-    """Judge types and sizes of values before they become a model."""
-    table = Table(data, f"{source}: ", FrozenModelError)
-    for name, record in (("sway", Sway), ("plausibility", Plausibility)):
-        table.table(name).record(record)
-    if "tells_v_y" in data and not isinstance(data["tells_v_y"], bool):
-        table.refuse("tells_v_y", f"must be true or false, it is {shown(data['tells_v_y'])}")
-    if "sensors" in data:
-        for name in Sensors._fields:
-            table.table("sensors").number(name)
-    if "band" in data:
-        band = table.table("band")
-        for name in ("factors", "speeds", "color", "noise"):
-            band.array(name)
-        band.number("speed")
-    if "guarantee" in data:
-        table.table("guarantee")
-    for name in ("ladder", "edges", *ARRAYS):
-        largest = float(np.abs(table.array(name)).max(initial=0.0))
-        if largest > LARGEST:
-            table.refuse(name, f"must hold numbers below {LARGEST:g}, it reaches {largest:g}")
+        high = np.column_stack([np.full(2, model.vehicle.wheelbase), np.ones(2), zeros])
+        compliance, share, offset = np.clip(model.beside_curve + away[:, n:], low, high).T
+        changed = replace(model, W=W, compliance=compliance, sway_share=share, offset=offset)
+        return replace(changed, force_missed=None)
 
 
 def _is_covariance(P: Array) -> bool:

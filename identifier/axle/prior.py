@@ -12,12 +12,12 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
+from identifier.band import SD_FRICTION
 from models.rules import require_positive_fields
 from models.vehicle import Vehicle
 
 SLIPS = np.linspace(0.002, 0.6, 300)  # rad, where a curve and its projection must agree
 RIDGE = 0.3  # keeps projected weights small where units are alike
-SD_FRICTION = 0.3  # of ln μ from one road to another [-]
 STEP = 1.2  # ratio over which log-derivatives are taken
 
 

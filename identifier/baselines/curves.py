@@ -9,7 +9,7 @@ of the sensors taken off, lagged by the relaxation length; both may be zero.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
@@ -27,7 +27,6 @@ from identifier.baselines.ports import (
 )
 from identifier.frozen import (
     FORMAT,
-    FrozenModelError,
     require_min_speed,
     vehicle_from,
     vehicle_numbers,
@@ -214,7 +213,6 @@ class CurveModel(TireModel):
 
     @property
     def lagged(self) -> bool:
-        """Whether the force follows a lagged slip, two more states."""
         return bool((self.relaxation_length > 0.0).any())
 
     def facts(self) -> tuple[Fact, ...]:
@@ -222,7 +220,6 @@ class CurveModel(TireModel):
         return (*TireModel.facts(self), *((lag,) if self.lagged else ()))
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression."""
         del v_x
         return self._force(alpha, 0.0)
 
@@ -244,7 +241,6 @@ class CurveModel(TireModel):
         return CURVES[self.curve].force(q, loads, alpha, ca.vertcat(delta, 0))
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the model as plain numbers and words, ready for JSON."""
         names = CURVES[self.curve].parameters
         return {
             "format": FORMAT,
@@ -259,29 +255,23 @@ class CurveModel(TireModel):
         }
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], source: str) -> "CurveModel":
-        try:
-            table = Table(data, "", FrozenModelError)
-            curve = table.text("curve")
-            if curve not in CURVES:
-                raise ValueError(f"curve must be one of {list(CURVES)}, not {curve!r}")
-            names = CURVES[curve].parameters
-            axles = [
-                [table.table(axle).number(name) for name in names] for axle in ("front", "rear")
-            ]
-            return cls(
-                vehicle=vehicle_from(table.value("vehicle")),
-                curve=curve,
-                parameters=np.array(axles),
-                min_speed=table.number("min_speed_m_s"),
-                **{  # files of earlier versions have neither
-                    name: table.array(key)
-                    for name, key in (
-                        ("relaxation_length", "relaxation_length_m"),
-                        ("offset", "offset_rad_m_s"),
-                    )
-                    if key in table
-                },
-            )
-        except ValueError as error:
-            raise FrozenModelError(f"{source}: {error}") from error
+    def _read(cls, table: Table) -> Self:
+        curve = table.text("curve")
+        if curve not in CURVES:
+            raise ValueError(f"curve must be one of {list(CURVES)}, not {curve!r}")
+        names = CURVES[curve].parameters
+        axles = [[table.table(axle).number(name) for name in names] for axle in ("front", "rear")]
+        return cls(
+            vehicle=vehicle_from(table.value("vehicle")),
+            curve=curve,
+            parameters=np.array(axles),
+            min_speed=table.number("min_speed_m_s"),
+            **{  # files of earlier versions have neither
+                name: table.array(key)
+                for name, key in (
+                    ("relaxation_length", "relaxation_length_m"),
+                    ("offset", "offset_rad_m_s"),
+                )
+                if key in table
+            },
+        )

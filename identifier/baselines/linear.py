@@ -8,7 +8,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.baselines.curves import CurveModel
-from identifier.method import Method
+from identifier.method import Method, require_fresh
 from identifier.setup import Setup
 from identifier.tire_model import TireModel
 from models.rules import require_positive_fields
@@ -33,7 +33,7 @@ class LinearBaseline(Method):
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs; it begins afresh, with no stored model."""
-        self.require_fresh(start)
+        require_fresh(start)
         return self.frozen(vehicle, {}).setup(self.dt)
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:

@@ -98,7 +98,7 @@ class Course:
 
     def replays(self, model: TireModel) -> dict[str, AxleRmse]:
         """Return by recording the error of a frozen model."""
-        return {rec.name: self.error(rec, model.axle_force(rec)) for rec in self.recordings}
+        return {rec.name: self.error(rec, model.predict(rec)) for rec in self.recordings}
 
     def share(self, name: str, error: AxleRmse) -> float:
         """Return an error as a share of the true force, both axles together [%].
@@ -147,7 +147,9 @@ def cross_replay(
     estimated: dict[str, SideSlip] = {}
     for recording in course.recordings:
         history = identify(
-            recording if method.needs_v_y else replace(recording, v_y=None), course.vehicle, method
+            recording if "v_y" in method.needs else replace(recording, v_y=None),
+            course.vehicle,
+            method,
         )
         end = float(recording.t[-1])
         if seen is not None:

@@ -44,7 +44,7 @@ def cannot_learn(
     """Return by method why it cannot learn on all of the recordings; without those that can."""
     lacking = [recording.name for recording in recordings if recording.a_y is None]
     why = f"left out, it learns from ay and {', '.join(lacking)} has none"
-    return {name: why for name in names if lacking and make_method(name, vehicle).needs_a_y}
+    return {name: why for name in names if lacking and "a_y" in make_method(name, vehicle).needs}
 
 
 def run_comparison(

@@ -129,7 +129,7 @@ def fit(
         parted=parted,
         a_y_late=late,
     )
-    least = model.force_at(np.array([0.05, 1.0]) * PROBE).min(axis=0)
+    least = np.min(model.force(np.array([0.05, 1.0]) * PROBE), axis=0)
     falling = [
         f"residual{j}_{axle}"
         for axle, force in zip("fr", least, strict=True)

@@ -8,7 +8,7 @@ from identifier.axle.gate import GATE_PORT
 from identifier.estimate.fit import fit
 from identifier.estimate.model import FittedModel
 from identifier.estimate.poor import on_time
-from identifier.method import CannotFreezeError, Method
+from identifier.method import CannotFreezeError, Method, WholeLog
 from identifier.motion.model import REPLAYED
 from identifier.setup import AXLE_FORCE, Port, Setup
 from identifier.tire_model import TireModel
@@ -48,40 +48,22 @@ class FitMethod(Method):
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of the step of what it learnt, axle_force first."""
         return PORTS
 
     @property
-    def tells_v_y(self) -> bool:
-        """Whether it estimates the lateral velocity of a log without one: of a whole log."""
-        return True
+    def whole(self) -> WholeLog:
+        return WholeLog(on_time, self._fitted)
 
-    @property
-    def whole(self) -> bool:
-        """Whether it learns from a whole log at once."""
-        return True
-
-    def reads(self, recording: Recording, vehicle: Vehicle) -> Recording:
-        """Return a log whose v_y is on time, also where it was rare or noisy (`estimate.poor`)."""
-        return on_time(recording, vehicle)
-
-    def fitted(
+    def _fitted(
         self,
         recording: Recording,
         vehicle: Vehicle,
-        start: TireModel | None = None,
-        *,
-        progress: Callable[[float], None] | None = None,
+        start: TireModel | None,
+        progress: Callable[[float], None] | None,
     ) -> FittedModel:
-        """Return the tires that a log taught.
-        start : a fit, or the prior of a fleet, that is believed before; None believes the table.
+        """Return the tires of a log.
 
-        Raises
-        ------
-        ValueError
-            Where it shall go on from a model of another method, or no sample is fast enough.
-        RecordingError
-            Where there is neither v_y nor a_y.
+        start : a fit, or the prior of a fleet, that is believed before; None believes the table.
         """
         if start is not None and not isinstance(start, FittedModel):
             raise ValueError(
@@ -92,13 +74,6 @@ class FitMethod(Method):
         return fit([recording], vehicle, priors, progress=progress).model
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
-        """Refuse: what its step carries are no tires.
-
-        Raises
-        ------
-        CannotFreezeError
-            Always.
-        """
         del vehicle, state
         raise CannotFreezeError(
             "the tires of a fit stay as they are: without --method fit the axle identifier goes on "
@@ -106,13 +81,7 @@ class FitMethod(Method):
         )
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what the step of learnt tires needs, which stay as they are.
-
-        Raises
-        ------
-        ValueError
-            Where there are none: sample by sample it does not learn.
-        """
+        """Return what the step of learnt tires needs, which stay as they are."""
         if not isinstance(start, FittedModel):
             raise ValueError(
                 "the method fit learns from whole logs: sample by sample it outputs the forces "

@@ -4,24 +4,30 @@ import math
 from collections import deque
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from codegen.arrays import Array, blocks, large
-from identifier.axle.band import LEVEL, BandCalibration, normal_quantile
-from identifier.axle.curve import EDGES, LADDER, unit_matrix
+from identifier.axle.car import Car
+from identifier.axle.car import car_numbers as axle_numbers
+from identifier.axle.curve import EDGES, Curve, unit_matrix
+from identifier.axle.dynamics import lagged_force, series_compliance
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.model import AxleModel
-from identifier.axle.prior import SD_FRICTION
 from identifier.axle.slip import SHORTEST, Sensors, Sway
+from identifier.band import (
+    LARGEST_SD,
+    Band,
+    BandSpread,
+)
 from identifier.estimate.drive import Drive
 from identifier.estimate.latent import TRUST, LateralVelocity, estimate_v_y
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import ERROR_SIZE, car_numbers, simulate
-from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from identifier.frozen import FORMAT, vehicle_from, vehicle_numbers
 from identifier.motion.model import (
     LEAST_GRIP,
     REPLAYED,
@@ -38,15 +44,17 @@ from identifier.tire_model import (
     RELAXATION,
     STIFFNESS,
     Axle,
+    Drives,
     Estimate,
     Fact,
     Reached,
     TireModel,
+    brisk_speed,
 )
 from models.recordings import Recording
 from models.rules import require_positive
 from models.schema import Table
-from models.vehicle import DOWNFORCE_SPEED, GRAVITY, LIGHTEST, Vehicle
+from models.vehicle import DOWNFORCE_SPEED, GRAVITY, LIGHTEST, Vehicle, load_ratio
 
 UNITS = (0.008, 0.016, 0.032, 0.064, 0.128, 0.256)  # rad, of the projection
 LEAST_REACH = 0.032  # rad, up to which it follows the curves at least
@@ -54,7 +62,6 @@ WIDEST = 0.6  # rad, as far as it is fitted
 LEAST_VARIANCE = 1e-10  # of weights, lag and zeros, so that no covariance is singular
 BEYOND = 0.3  # weight of a slip that no drive reached, in that fit
 DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided a number
-LARGEST_SD = 0.25  # of the force over the prior's, above which a slip is not known
 BOUNDED = (("ln_stiffness", "cornering stiffness", True), ("ln_grip", "grip", True))
 ELSEWHERE = 2.25
 # times what the drives that taught miss, on others; chosen on recordings of three real cars and two
@@ -66,6 +73,14 @@ SURELY, NOTED_GAIN = 3.0, 0.08  # standard deviations, and error of the steering
 WARM = 300  # samples before a part of a long drive, over which lag and sway settle
 LEAST_DOUBT = 1e-6  # of a prior, in variances of the usual one
 LARGEST = 1e6  # of the numbers in a file
+_KEYS = {  # of arrays in a file
+    "covariance": "covariance",
+    "driven": "driven_slip_rad",
+    "speeds": "speeds_m_s",
+    "a_x": "a_x_m_s2",
+    "unexplained": "unexplained",
+    "force_missed": "force_missed",
+}
 
 
 class Segment(NamedTuple):
@@ -80,9 +95,6 @@ class Segment(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class FittedModel(TireModel):
     """Axle forces of the forward model (`motion.model`) at estimated parameters.
-
-    Parameters
-    ----------
     p : parameters, as `motion.parameters` lists them (p,).
     covariance : of them (p, p); zero of what was not estimated.
     driven : largest slip of each axle that the drives reached [rad], (2,).
@@ -97,6 +109,7 @@ class FittedModel(TireModel):
     """
 
     kind = "fit"
+    scales_with_load = True
 
     vehicle: Vehicle
     p: Array
@@ -138,12 +151,7 @@ class FittedModel(TireModel):
 
     @property
     def min_speed(self) -> float:
-        """Below this speed [m/s] the forces read zero."""
         return self.vehicle.lowest_speed
-
-    @property
-    def _loads(self) -> Array:
-        return np.array(self.vehicle.axle_loads)
 
     # The curve.
 
@@ -153,9 +161,6 @@ class FittedModel(TireModel):
 
     def curve_at(self, alpha: Array) -> tuple[Array, Array, Array]:
         """Return φ and dφ/dα (k, 2) [static loads], and slopes of φ over curve numbers (2, k, 9).
-
-        Parameters
-        ----------
         alpha : slip angles of each axle [rad], (k, 2).
         """
         phi, slope, J = [], [], []
@@ -168,15 +173,9 @@ class FittedModel(TireModel):
             J.append(values[2].T)
         return np.column_stack(phi), np.column_stack(slope), np.array(J)
 
-    def force_at(self, alpha: Array) -> Array:
-        """Return the steady axle forces at slip angles under static loads, (k, 2) [N].
-
-        Parameters
-        ----------
-        alpha : [rad], (k,).
-        """
+    def _steady(self, alpha: Array, v_x: float) -> Array:
         phi, _, _ = self.curve_at(np.column_stack([alpha, alpha]))
-        return phi * self._loads
+        return phi * self._loads * self.vehicle.load_ratio(v_x)
 
     def force(  # type: ignore[override]
         self,
@@ -187,9 +186,6 @@ class FittedModel(TireModel):
         a_x: float | None = None,
     ) -> float | Array:
         """Return the steady lateral force at slip angles, the wheels straight ahead [N].
-
-        Parameters
-        ----------
         a_x : longitudinal acceleration [m/s²]: braking and power take of the lateral force, and
             shift load between the axles. None is of tires that push nothing lengthwise, as those
             of a car that coasts.
@@ -197,7 +193,7 @@ class FittedModel(TireModel):
         found = np.asarray(TireModel.force(self, alpha, axle, v_x=v_x))
         if a_x is None:
             return found if found.ndim else float(found)
-        speed = self.curve_speed if v_x is None else v_x
+        speed = self._curve_speed if v_x is None else v_x
         coasting = -self.vehicle.drag * speed**2
         moving, plain = self.ratio(np.full(2, speed), np.array([a_x, coasting]))
         ratio = moving / plain
@@ -206,73 +202,57 @@ class FittedModel(TireModel):
 
     def ratio(self, v_x: Array, a_x: Array) -> Array:
         """Return λ G, load and ellipse: force over that at static load of one that coasts, (k, 2).
-
-        Parameters
-        ----------
-        v_x : speeds [m/s], (k,).
-        a_x : longitudinal accelerations [m/s²], (k,).
+        v_x : speeds [m/s], (k,).   a_x : longitudinal accelerations [m/s²], (k,).
         """
         car = self.vehicle
         f = (np.asarray(a_x) + car.drag * np.square(v_x)) / GRAVITY
         moved = self["load_transfer"] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
         load = 1.0 + np.outer(f, moved) + np.outer(np.square(v_x), car.downforce)
-        drive = np.array([self["driving_f"], self["driving_r"]])
-        brake = np.array([self["braking_f"], self["braking_r"]])
-        use = np.where(f[:, None] > 0.0, drive, brake) * f[:, None]
+        use = np.where(f[:, None] > 0.0, self._pair("driving"), self._pair("braking")) * f[:, None]
         left = np.sqrt(np.maximum(1.0 - use**2, LEAST_GRIP))
         product: Array = np.maximum(load, LIGHTEST) * left
         return product
 
-    @property
-    def curve_speed(self) -> float:
-        """Speed [m/s] of curves that are asked for without one: with downforce 0, static loads."""
-        return 0.0 if self.vehicle.has_downforce else self.reference_speed
+    def _pair(self, name: str) -> Array:
+        """Return a parameter of both axles, (2,)."""
+        return np.array([self[f"{name}_f"], self[f"{name}_r"]])
+
+    def _curve(self, slip: Any, v_x: Any) -> Curve:
+        """Return the force curve at a slip (2,) [rad] and a speed, in static axle loads."""
+        numbers = [self._curve_numbers(axle) for axle in "fr"]
+        found = [_curve_expression(slip[i], one) for i, one in enumerate(numbers)]
+        phi, slope = (ca.vertcat(*both) for both in zip(*found, strict=True))
+        at_least = 0.02 * ca.DM([math.exp(one[0]) for one in numbers])
+        static = Curve(ca.DM(2, 0), phi, slope, ca.fmax(slope, at_least), ca.DM(2, 1))
+        if not self.vehicle.has_downforce:
+            return static
+        return static.under(load_ratio(ca.DM(self.vehicle.downforce), v_x))
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
-        """Return the steady axle forces (2,) [N] as a CasADi expression."""
-        forces = []
-        for i, axle in enumerate("fr"):
-            phi, _ = _curve_expression(alpha[i], self._curve_numbers(axle))
-            forces.append(phi * self._loads[i] * self._load_at(i, v_x))
-        return ca.vertcat(*forces)
-
-    def _load_at(self, i: int, v_x: Any) -> Any:
-        if not self.vehicle.has_downforce:
-            return 1.0
-        load = 1 + self.vehicle.downforce[i] * v_x**2
-        return ca.fmax(load, LIGHTEST)
+        return self._curve(alpha, v_x).force * ca.DM(self._loads)
 
     def force_expression(
         self, slip: Any, x: Any, delta: Any, v_x: Any, least_lag: Any = 0.0
     ) -> tuple[Any, Any]:
         """Return the axle forces (2,) [N] and the rate of lagged slip (2,) [rad/s].
-
-        The sway gives way in series with the carcass, without its inertia (`axle.dynamics`); the
-        speed is held. x is read by the sensors of the drives.
+        x : [v_y, r] (2,), as the sensors of the drives read them.
         """
-        car = self.vehicle
-        yaw = x[1]
-        v_y = x[0] - self["v_y_bias"] - self["v_y_angle"] * v_x - self["v_y_lever"] * yaw
-        wheel = (1.0 + self["steering_gain"]) * delta + self["steering_zero"]
-        omega = self._sway.frequency
-        forces, rates = [], []
-        for i, (axle, arm) in enumerate((("f", car.l_f), ("r", -car.l_r))):
-            angle = wheel if i == 0 else 0.0
-            alpha = angle - ca.atan((v_y + arm * yaw) / v_x)
-            numbers = self._curve_numbers(axle)
-            phi, slope = _curve_expression(slip[i], numbers)
-            load = self._load_at(i, v_x)
-            gives = self[f"compliance_{axle}"] + GRAVITY / omega**2 * self[f"sway_share_{axle}"]
-            sigma = gives * load * ca.fmax(slope, 0.02 * math.exp(numbers[0]))
-            sigma += SHORTEST * car.wheelbase
-            across = 1 - angle**2 / 2 + angle**4 / 24 if i == 0 else 1.0
-            forces.append(phi * load * self._loads[i] * across)
-            rates.append((alpha - slip[i]) / ca.fmax(sigma / v_x, least_lag))
-        return ca.vertcat(*forces), ca.vertcat(*rates)
+        v_y = x[0] - self["v_y_bias"] - self["v_y_angle"] * v_x - self["v_y_lever"] * x[1]
+        shares = self._pair("compliance"), self._pair("sway_share")
+        return lagged_force(
+            Car(*axle_numbers(self.vehicle).T),
+            self._curve(slip, v_x),
+            series_compliance(*shares, self._sway.frequency),
+            np.zeros(2),
+            slip=slip,
+            x=[v_y, x[1]],
+            delta=(1.0 + self["steering_gain"]) * delta + self["steering_zero"],
+            v_x=v_x,
+            least_lag=least_lag,
+        )
 
     @property
     def lagged(self) -> bool:
-        """Whether the force follows a lagged slip, two more states."""
         return True
 
     @property
@@ -282,7 +262,7 @@ class FittedModel(TireModel):
 
     # Over a drive.
 
-    def axle_force(self, recording: Recording) -> Array:
+    def predict(self, recording: Recording) -> Array:
         """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
 
         Signals go through a zero-phase mean of 0.07 s (`estimate.drive`); where the car is slower
@@ -329,31 +309,21 @@ class FittedModel(TireModel):
                 slip[kept] = out["slip"][part.start - first :]
         return force, slip
 
-    def slope_over(self, recording: Recording) -> Array:
-        """Return the slope of the force curves over the slip of a drive [static loads/rad]."""
-        _, slope, _ = self.curve_at(self.lagged_slip(recording))
-        return slope * self.vehicle.load_ratio(recording.v_x)
+    def slope_at(self, slip: Array) -> Array:
+        """Return the slope of the curves under static loads at slips [static loads/rad], (n, 2)."""
+        return self.curve_at(slip)[1]
 
     @property
-    def known_speeds(self) -> Array:
-        """Least and largest speed [m/s] of the drives that taught, (2,)."""
-        return self.speeds
+    def drives(self) -> Drives:
+        return Drives(
+            speeds=self.speeds,
+            lengthwise=(self.p, self.covariance),
+            elsewhere=tuple((one.begin, one.end) for one in self.segments),
+            notes=self._notes(),
+            at_bounds=self._at_bounds(),
+        )
 
-    @property
-    def lengthwise(self) -> tuple[Array, Array]:
-        """Its parameters (p,) and their covariance (p, p)."""
-        return self.p, self.covariance
-
-    def road_differs(self, t: Array) -> NDArray[np.bool_]:
-        """Return at which times [s] of the drive that taught the road was another one, (n,)."""
-        found = np.zeros(t.shape, dtype=bool)
-        for one in self.segments:
-            found |= (t >= one.begin) & (t <= one.end)
-        return found
-
-    @property
-    def notes(self) -> tuple[tuple[str, str], ...]:
-        """What the drives that taught showed beside the tires: code and one line of each."""
+    def _notes(self) -> tuple[tuple[str, str], ...]:
         listed = [
             (
                 "another_road",
@@ -391,7 +361,7 @@ class FittedModel(TireModel):
             )
         return tuple(listed)
 
-    def at_bounds(self) -> tuple[Reached, ...]:
+    def _at_bounds(self) -> tuple[Reached, ...]:
         """Return the numbers of the tires that rest at the bounds of what tires have."""
         priors, listed = Priors.of(self.vehicle), []
         for i, axle in enumerate(AXLES):
@@ -411,39 +381,10 @@ class FittedModel(TireModel):
                 )
         return tuple(listed)
 
-    def outside(self, recording: Recording) -> NDArray[np.bool_]:
-        """Return where the slip leaves the known range, (n, 2)."""
-        beyond: NDArray[np.bool_] = np.abs(self.lagged_slip(recording)) > self.known_slip
-        return beyond
-
-    # How sure.
-
-    def _curve_sd(self, alpha: Array) -> tuple[Array, Array]:
-        """Return the standard deviation of φ at slips, and that before learning, (k, 2) each."""
-        _, _, J = self.curve_at(alpha)
-        sd = []
-        for P in (self.covariance, _covariance_before(self)):
-            found = [
-                np.einsum("ki,ij,kj->k", J[i], P[np.ix_(index, index)], J[i])
-                for i, index in enumerate(map(curve_index, "fr"))
-            ]
-            sd.append(np.sqrt(np.maximum(np.column_stack(found), 0.0)))
-        return sd[0], sd[1]
-
-    def relative_sd(self, alpha: Array) -> Array:
-        """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
-
-        Parameters
-        ----------
-        alpha : [rad], (k,).
-        """
-        return self._relative_sd(np.column_stack([alpha, alpha]))
-
-    def _relative_sd(self, alpha: Array) -> Array:
-        """Return the same at slips of each axle, (k, 2)."""
-        sd, prior = self._curve_sd(alpha)
-        ratio: Array = sd / np.maximum(prior, 1e-12)
-        return ratio
+    @property
+    def band(self) -> "_FittedBand":
+        """How unsure it is, by its covariance and its error on the drives that taught."""
+        return _FittedBand(self)
 
     @property
     def known_slip(self) -> Array:
@@ -453,150 +394,10 @@ class FittedModel(TireModel):
         """
         return _known_slip(self).copy()
 
-    @property
-    def has_band(self) -> bool:
-        """Whether the model can tell how sure it is: by its covariance."""
-        return True
-
-    @property
-    def band_origin(self) -> str:
-        """Where the width of the band comes from, in words."""
-        front, rear = 100.0 * np.hypot(self.error_share, self.error_floor / TYPICAL)
-        return (
-            f"what the drives leave open, and an error of the model of {front:.0f} / {rear:.0f} % "
-            f"at {TYPICAL:g} static loads, from its error on them and a mass known to "
-            f"{100.0 * SURE_MASS:.0f} %"
-        )
-
-    @property
-    def load_doubt(self) -> Array:
-        """Relative standard deviation of the static loads: mass and center of gravity, (2,)."""
-        car = self.vehicle
-        arms = np.array([car.l_r, car.l_f])
-        doubt: Array = np.hypot(SURE_MASS, SURE_CENTER * car.wheelbase / arms)
-        return doubt
-
-    @property
-    def error_share(self) -> Array:
-        """Standard deviation of the model's own error, the part that goes with the force, (2,)."""
-        return np.hypot(self.load_doubt, ELSEWHERE * ERROR_SIZE[1] * self.unexplained)
-
-    @property
-    def error_floor(self) -> Array:
-        """The part of it that is there without a force [static loads], (2,)."""
-        floor: Array = ELSEWHERE * ERROR_SIZE[0] * self.unexplained
-        return floor
-
-    @property
-    def band_calibrated(self) -> bool:
-        """Whether the width of its band is more than noise of the sensors: always."""
-        return True
-
-    def with_calibration(
-        self, calibration: BandCalibration | None, force_missed: Array | None = None
-    ) -> "FittedModel":
-        """Return the model with what it misses of the drives that taught.
-
-        Parameters
-        ----------
-        force_missed : share of the force [-], (2,).
-        """
-        del calibration
-        return replace(self, force_missed=force_missed)
-
-    def half_band(
-        self, alpha: Array, level: float = LEVEL, *, v_x: float | Array | None = None
-    ) -> Array:
-        """Return half the width of the band around the steady forces, (k, 2) [N].
-
-        It has the doubt of the curve and of the sensors' zeros, and the model's own error.
-
-        Parameters
-        ----------
-        alpha : [rad], (k,).
-        v_x : [m/s].
-
-        Raises
-        ------
-        ValueError
-            Where the level is impossible, or a speed is not positive.
-        """
-        speed = np.broadcast_to(self.reference_speed if v_x is None else v_x, np.shape(alpha))
-        if not (speed > 0.0).all():
-            raise ValueError(f"v_x of a band must be positive, it is {speed.min()}")
-        both = np.column_stack([alpha, alpha])
-        wide = self._sd_along(both, speed)
-        return normal_quantile(level) * wide * self._loads * self._pressed(v_x, speed)
-
-    def _pressed(self, v_x: float | Array | None, speed: Array) -> Array:
-        return self.vehicle.load_ratio(np.zeros_like(speed) if v_x is None else speed)
-
-    def half_band_along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
-        """Return half the width of the band where each axle has its own slip, (n, 2) [N].
-
-        Parameters
-        ----------
-        slip : [rad], (n, 2).
-        v_x : [m/s], (n,).
-        """
-        pressed = self.vehicle.load_ratio(v_x)
-        return normal_quantile(level) * self._sd_along(slip, v_x) * self._loads * pressed
-
-    def _sd_along(self, slip: Array, v_x: Array) -> Array:
-        """Return the standard deviation of the forces over static loads, (k, 2)."""
-        phi, slope, J = self.curve_at(slip)
-        variance = np.empty_like(phi)
-        for i, axle in enumerate("fr"):
-            index = [*curve_index(axle), *_OFFSETS]
-            zero = slope[:, i, None] * np.column_stack(
-                [
-                    np.full(len(phi), 1.0 if i == 0 else 0.0),
-                    1.0 / v_x,
-                    np.ones(len(phi)),
-                ]
-            )
-            h = np.hstack([J[i], zero])
-            variance[:, i] = np.einsum("ki,ij,kj->k", h, self.covariance[np.ix_(index, index)], h)
-        own = self.error_floor**2 + (self.error_share * phi) ** 2
-        return np.sqrt(np.maximum(variance, 0.0) + own)
-
-    def half_band_of_curves(self, recording: Recording, level: float = LEVEL) -> Array:
-        """Return half the width of `band` at the slip and speed of a drive, (n, 2) [N]."""
-        speed = np.maximum(recording.v_x, self.min_speed)
-        return self.half_band_along(self.lagged_slip(recording), speed, level)
-
-    def half_band_over(self, recording: Recording, level: float = LEVEL) -> Array:
-        """Return half the width of the band around `axle_force` of a drive, (n, 2) [N]."""
-        half = self.half_band_of_curves(recording, level)
-        return np.where(recording.v_x[:, None] >= self.min_speed, half, 0.0)
-
-    def samples(self, n: int, rng: np.random.Generator) -> "tuple[FittedModel, ...]":
-        """Return models drawn from what the drives left open.
-
-        Raises
-        ------
-        ValueError
-            Where n is negative.
-        """
-        if n < 0:
-            raise ValueError(f"n must not be negative, it is {n}")
-        priors = Priors.of(self.vehicle)
-        share = np.hypot(self.error_share, self.error_floor / TYPICAL)
-        values, vectors = np.linalg.eigh(self.covariance)
-        root = vectors * np.sqrt(np.maximum(values, 0.0))
-        drawn = []
-        for _ in range(n):
-            p = self.p + root @ rng.standard_normal(len(self.p))
-            for i, axle in enumerate("fr"):
-                p[INDEX[f"ln_stiffness_{axle}"]] += share[i] * rng.standard_normal()
-                p[INDEX[f"ln_grip_{axle}"]] += share[i] * rng.standard_normal()
-            drawn.append(replace(self, p=np.clip(p, priors.low, priors.high)))
-        return tuple(drawn)
-
     # What it says of itself.
 
     @property
-    def cornering_stiffness(self) -> Array:
+    def stiffness(self) -> Array:
         """Slope of the force curves at zero, under static loads [N/rad], (2,)."""
         _, slope, _ = self.curve_at(np.zeros((1, 2)))
         stiffness: Array = slope[0] * self._loads
@@ -605,67 +406,54 @@ class FittedModel(TireModel):
     @property
     def relaxation_length(self) -> Array:
         """Lag of slip at small slip, under static loads [m], (2,); it goes with the slope."""
-        give = np.array([self["compliance_f"], self["compliance_r"]])
-        stiff = np.maximum(self.cornering_stiffness / self._loads, 0.0)
-        length: Array = give * stiff + SHORTEST * self.vehicle.wheelbase
+        stiff = np.maximum(self.stiffness / self._loads, 0.0)
+        length: Array = self._pair("compliance") * stiff + SHORTEST * self.vehicle.wheelbase
         return length
 
     def estimates(self) -> tuple[Estimate, ...]:
-        """Return stiffness, grip, relaxation length and zeros of sensors, with their doubt."""
         before = _covariance_before(self)
         given = self.vehicle.bicycle[4:]
-        zero = np.zeros((1, 2))
-        stiff = [sd[0] / SMALL for sd in self._curve_sd(np.full((1, 2), SMALL))]
-        _, at_zero, _ = self.curve_at(zero)
+        band, loads, lag = self.band, self._loads, self.relaxation_length
+        stiff = [sd[0] / SMALL for sd in band.of_phi(np.full((1, 2), SMALL))]
+        stiffness = self.stiffness
+        C = stiffness / loads
         slip = np.linspace(0.0, WIDEST, 201)
         slip = np.column_stack([slip, slip])
         phi = self.curve_at(slip)[0]
         peak = np.take_along_axis(slip, phi.argmax(axis=0)[None], axis=0)
-        top = phi.max(axis=0)
-        wide = self._curve_sd(peak)
-        listed = []
-        for i, (axle, short) in enumerate(zip(AXLES, "fr", strict=True)):
-            load, s = float(self._loads[i]), INDEX[f"compliance_{short}"]
-            lag = float(self.relaxation_length[i])
-            C = float(at_zero[0, i])
-            sd = stiff[0][i]
-            whole = math.hypot(sd, C * float(self.load_doubt[i]))
-            listed.append(
-                Estimate(
-                    STIFFNESS, axle, C * load, whole * load, "N/rad", given[i],
-                    bool(sd <= DECIDED * stiff[1][i]),
-                )
-            )  # fmt: skip
-            sd = float(wide[0][0, i])
-            doubt = math.hypot(sd, top[i] * float(self.load_doubt[i]))
-            reached = bool(sd <= DECIDED * wide[1][0, i])
-            listed.append(Estimate(GRIP, axle, float(top[i]), doubt, "static load", None, reached))
-            now, prior = (float(np.sqrt(P[s, s])) for P in (self.covariance, before))
-            listed.append(
-                Estimate(RELAXATION, axle, lag, C * now, "m", None, now <= DECIDED * prior)
-            )
+        top, wide = phi.max(axis=0), [sd[0] for sd in band.of_phi(peak)]
+        sd_C, sd_top = (
+            np.hypot(sd[0], size * band.load_doubt) for sd, size in ((stiff, C), (wide, top))
+        )
+
+        def sd_of(name: str) -> tuple[float, float]:
+            """Return the standard deviation of a parameter, and the prior's."""
+            k = INDEX[name]
+            return math.sqrt(self.covariance[k, k]), math.sqrt(before[k, k])
+
+        rows: list[tuple[str, Axle, float, float, str, float | None, bool]] = []
+        for i, axle in enumerate(AXLES):
+            now, prior = sd_of(f"compliance_{axle[0]}")
+            known = [sd[0][i] <= DECIDED * sd[1][i] for sd in (stiff, wide)]
+            rows += [
+                (STIFFNESS, axle, stiffness[i], sd_C[i] * loads[i], "N/rad", given[i], known[0]),
+                (GRIP, axle, top[i], sd_top[i], "static load", None, known[1]),
+                (RELAXATION, axle, lag[i], C[i] * now, "m", None, now <= DECIDED * prior),
+            ]
         zeros: tuple[tuple[str, Axle, str, str, float], ...] = (
             ("zero of the steering", "front", "steering_zero", "deg", math.degrees(1.0)),
             ("bias of v_y", "rear", "v_y_bias", "m/s", 1.0),
         )
-        for title, of, name, unit, scale in zeros:
-            k = INDEX[name]
-            now, prior = (scale * float(np.sqrt(P[k, k])) for P in (self.covariance, before))
-            listed.append(
-                Estimate(
-                    title,
-                    of,
-                    scale * self[name],
-                    now,
-                    unit,
-                    0.0,
-                    now <= DECIDED * prior,
-                )
-            )
-        return tuple(listed)
+        for title, axle, name, unit, scale in zeros:
+            now, prior = sd_of(name)
+            known_zero, value = now <= DECIDED * prior, scale * self[name]
+            rows.append((title, axle, value, scale * now, unit, 0.0, known_zero))
+        return tuple(
+            Estimate(title, axle, float(value), float(sd), unit, declared, bool(known))
+            for title, axle, value, sd, unit, declared, known in rows
+        )
 
     def facts(self) -> tuple[Fact, ...]:
-        """Return what `summary` says beside the estimates."""
         lines = [Fact("identified up to a slip of", np.degrees(self.known_slip), "deg")]
         if self.vehicle.has_downforce:
             more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
@@ -674,37 +462,15 @@ class FittedModel(TireModel):
 
     # Another car, another road, another form.
 
-    @property
-    def scales_with_load(self) -> bool:
-        """Whether forces are in static axle loads, so that another car's model scales to a car."""
-        return True
-
     def mounted_on(self, vehicle: Vehicle) -> "FittedModel":
-        """Return the tires on another car, their forces scaled by its static axle loads."""
         return replace(self, vehicle=vehicle, segments=(), force_missed=None)
 
     def at_friction(self, ratio: float) -> "FittedModel":
-        """Return the tires on a road of another friction, φ(α) → μ φ(α/μ); the stiffness stays."""
         require_positive(ValueError, ratio=ratio)
         p = self.p.copy()
         p[INDEX["ln_road"]] += math.log(ratio)
         driven = ratio * self.driven
         return replace(self, p=p, driven=driven, segments=(), force_missed=None)
-
-    def on_another_road(self, sd_friction: float = SD_FRICTION) -> "FittedModel":
-        """Return the model for a road whose friction is not that of the drive that taught.
-
-        Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
-
-        Parameters
-        ----------
-        sd_friction : standard deviation of ln μ between the roads [-].
-        """
-        if not 0.0 <= sd_friction < math.inf:
-            raise ValueError(f"sd_friction must be finite, not negative, it is {sd_friction}")
-        covariance, k = self.covariance.copy(), INDEX["ln_road"]
-        covariance[k, k] += sd_friction**2
-        return replace(self, covariance=covariance)
 
     def as_prior(self, vehicle: Vehicle) -> Priors:
         """Return what it leaves to believe of a car: its numbers, as sure as they are."""
@@ -715,17 +481,10 @@ class FittedModel(TireModel):
         information[where] = np.linalg.inv(sure[where])
         return replace(usual, mean=self.p, information=information, typed=())
 
-    def beside_v_y(self) -> AxleModel:
-        """Return the model as the axle identifier goes on learning from it."""
-        return self.in_units(LADDER)
-
     def in_units(self, ladder: tuple[float, ...] | None = None) -> AxleModel:
         """Return the tires in the hidden units of the axle identifier.
 
         Curve, lag, sway and errors of the sensors; without load transfer and ellipse.
-
-        Parameters
-        ----------
         ladder : slip scales of the units [rad]; None takes `UNITS`, whose curves are within
             0.3 % of the static load.
         """
@@ -738,14 +497,7 @@ class FittedModel(TireModel):
             ]
         )
         limits = Plausibility.for_vehicle(self.vehicle)
-        own = np.array(
-            [
-                [self["compliance_f"], self["sway_share_f"], self["steering_zero"]],
-                [self["compliance_r"], self["sway_share_r"], self["v_y_bias"]],
-            ]
-        )
-        own[0, 2] = np.clip(own[0, 2], -limits.max_steering, limits.max_steering)
-        own[1, 2] = np.clip(own[1, 2], -limits.slow, limits.slow)
+        zeros, most = self.p[_OFFSETS[:2]], np.array([limits.max_steering, limits.slow])
         excitation = np.zeros((2, 1 + len(EDGES)))
         excitation[:, 0] = self.driven
         return AxleModel(
@@ -754,7 +506,9 @@ class FittedModel(TireModel):
             sway=self._sway,
             plausibility=limits,
             W=W,
-            own=own,
+            compliance=self._pair("compliance"),
+            sway_share=self._pair("sway_share"),
+            offset=np.clip(zeros, -most, most),
             covariance=self._units_covariance(fits, self.covariance),
             prior_covariance=self._units_covariance(fits, _covariance_before(self)),
             excitation=excitation,
@@ -767,7 +521,7 @@ class FittedModel(TireModel):
         return np.maximum(self.known_slip, LEAST_REACH)
 
     def _units_covariance(self, fits: list[tuple[Array, Array]], covariance: Array) -> Array:
-        """Return the covariance of [W, own] (2, n + 3, n + 3), never singular."""
+        """Return the covariance of weights, lag and zeros (2, n + 3, n + 3), never singular."""
         n = len(fits[0][1])
         found = np.empty((2, n + 3, n + 3))
         for i, (axle, (slip, pseudo)) in enumerate(zip("fr", fits, strict=True)):
@@ -786,7 +540,6 @@ class FittedModel(TireModel):
         return found
 
     def setup(self, dt: float) -> Setup:
-        """Return what a replay sample by sample needs."""
         limits = Plausibility.for_vehicle(self.vehicle)
         return Setup(
             scan=replay_scan(),
@@ -807,7 +560,6 @@ class FittedModel(TireModel):
     # As a file.
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the model as plain numbers and words, ready for JSON."""
         return {
             "format": FORMAT,
             "kind": self.kind,
@@ -818,53 +570,146 @@ class FittedModel(TireModel):
                     PARAMETERS, self.p, np.maximum(np.diag(self.covariance), 0.0), strict=True
                 )
             },
-            "covariance": self.covariance.tolist(),
-            "driven_slip_rad": self.driven.tolist(),
-            "speeds_m_s": self.speeds.tolist(),
-            "a_x_m_s2": self.a_x.tolist(),
-            "unexplained": self.unexplained.tolist(),
+            **{
+                key: value.tolist()
+                for name, key in _KEYS.items()
+                if (value := getattr(self, name)) is not None
+            },
             "segments": [one._asdict() for one in self.segments],
-            **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
             **({"parted_rad": self.parted} if self.parted else {}),
             **({"a_y_late_s": self.a_y_late} if self.a_y_late else {}),
-            "cornering_stiffness_N_rad": self.cornering_stiffness.tolist(),
+            "cornering_stiffness_N_rad": self.stiffness.tolist(),
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
         }
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], source: str) -> "FittedModel":
-        """Return the model that `to_dict` describes."""
-        table = Table(data, f"{source}: ", FrozenModelError)
+    def _read(cls, table: Table) -> Self:
         parameters = table.table("parameters")
-        p = np.array([parameters.table(name).number("value") for name in NAMES])
-        arrays = {
-            "covariance": "covariance",
-            "driven": "driven_slip_rad",
-            "speeds": "speeds_m_s",
-            "a_x": "a_x_m_s2",
-            "unexplained": "unexplained",
+        found = {
+            "p": np.array([parameters.table(name).number("value") for name in NAMES]),
+            **{name: table.array(key) for name, key in _KEYS.items() if name != "force_missed"},
         }
         if "force_missed" in table:
-            arrays["force_missed"] = "force_missed"
-        found = {name: table.array(key) for name, key in arrays.items()}
-        for name, value in (("parameters", p), *found.items()):
+            found["force_missed"] = table.array("force_missed")
+        for name, value in found.items():
             if np.abs(value).max(initial=0.0) > LARGEST:
-                table.refuse(name, f"must hold numbers below {LARGEST:g}")
-        segments = tuple(
-            Segment(*(one.number(name) for name in Segment._fields))
-            for one in (table.tables("segments") if "segments" in table else [])
-        )
+                table.refuse(_KEYS.get(name, "parameters"), f"must hold numbers below {LARGEST:g}")
+        segments = table.tables("segments") if "segments" in table else []
         parted, late = (
             table.number(key) if key in table else 0.0 for key in ("parted_rad", "a_y_late_s")
         )
-        try:
-            car = vehicle_from(data["vehicle"])
-            return cls(vehicle=car, p=p, segments=segments, parted=parted, a_y_late=late, **found)
-        except KeyError as error:
-            raise FrozenModelError(f"{source}: key {error} is missing") from error
-        except (TypeError, ValueError) as error:
-            raise FrozenModelError(f"{source}: {error}") from error
+        return cls(
+            vehicle=vehicle_from(table.value("vehicle")),
+            segments=tuple(
+                Segment(*(one.number(name) for name in Segment._fields)) for one in segments
+            ),
+            parted=parted,
+            a_y_late=late,
+            **found,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _FittedBand(Band[FittedModel]):
+    """How unsure a fit is: by its covariance, and its error on the drives that taught."""
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether its width is more than noise of the sensors: always."""
+        return True
+
+    @property
+    def origin(self) -> str:
+        front, rear = 100.0 * self._error_at(TYPICAL)
+        return (
+            f"what the drives leave open, and an error of the model of {front:.0f} / {rear:.0f} % "
+            f"at {TYPICAL:g} static loads, from its error on them and a mass known to "
+            f"{100.0 * SURE_MASS:.0f} %"
+        )
+
+    @property
+    def speed(self) -> float:
+        return brisk_speed(self.model.vehicle, self.model.min_speed)
+
+    @property
+    def load_doubt(self) -> Array:
+        """Relative standard deviation of the static loads: mass and center of gravity, (2,)."""
+        car = self.model.vehicle
+        arms = np.array([car.l_r, car.l_f])
+        doubt: Array = np.hypot(SURE_MASS, SURE_CENTER * car.wheelbase / arms)
+        return doubt
+
+    @property
+    def error_share(self) -> Array:
+        """Standard deviation of the model's own error, the part that goes with the force, (2,)."""
+        return np.hypot(self.load_doubt, ELSEWHERE * ERROR_SIZE[1] * self.model.unexplained)
+
+    @property
+    def error_floor(self) -> Array:
+        """The part of it that is there without a force [static loads], (2,)."""
+        floor: Array = ELSEWHERE * ERROR_SIZE[0] * self.model.unexplained
+        return floor
+
+    def _error_at(self, force: float) -> Array:
+        """Return that error over a force [static loads], (2,)."""
+        return np.hypot(self.error_share, self.error_floor / force)
+
+    def spread(self, slip: Array, v_x: Array, pressed: Array) -> BandSpread:
+        """Return the variances of the steady forces, (n, 2): of curve, zeros and the own error."""
+        phi, slope, J = self.model.curve_at(slip)
+        variance = np.empty_like(phi)
+        for i, axle in enumerate("fr"):
+            index = [*curve_index(axle), *_OFFSETS]
+            steered = np.full(len(phi), 1.0 if i == 0 else 0.0)
+            zeros = np.column_stack([steered, 1.0 / v_x, np.ones(len(phi))])
+            h = np.hstack([J[i], slope[:, i, None] * zeros])
+            P = self.model.covariance[np.ix_(index, index)]
+            variance[:, i] = np.einsum("ki,ij,kj->k", h, P, h)
+        own = self.error_floor**2 + (self.error_share * phi) ** 2
+        total = (np.maximum(variance, 0.0) + own) * pressed**2
+        return BandSpread(total, np.zeros_like(total))
+
+    def of_phi(self, slip: Array) -> tuple[Array, Array]:
+        """Return the standard deviation of φ at slips (n, 2), and that before learning."""
+        _, _, J = self.model.curve_at(slip)
+        sd = []
+        for P in (self.model.covariance, _covariance_before(self.model)):
+            found = [
+                np.einsum("ki,ij,kj->k", J[i], P[np.ix_(index, index)], J[i])
+                for i, index in enumerate(map(curve_index, "fr"))
+            ]
+            sd.append(np.sqrt(np.maximum(np.column_stack(found), 0.0)))
+        return sd[0], sd[1]
+
+    def relative_sd(self, alpha: Array) -> Array:
+        sd, prior = self.of_phi(np.column_stack([alpha, alpha]))
+        ratio: Array = sd / np.maximum(prior, 1e-12)
+        return ratio
+
+    def calibrated_by(self, calibration: Any, force_missed: Array | None = None) -> FittedModel:
+        """Return the model with what it misses of the drives that taught."""
+        del calibration
+        return replace(self.model, force_missed=force_missed)
+
+    def _opened(self, sd_friction: float) -> FittedModel:
+        covariance, k = self.model.covariance.copy(), INDEX["ln_road"]
+        covariance[k, k] += sd_friction**2
+        return replace(self.model, covariance=covariance)
+
+    def _samples(self, n: int, rng: np.random.Generator) -> tuple[FittedModel, ...]:
+        model, priors = self.model, Priors.of(self.model.vehicle)
+        share = self._error_at(TYPICAL)
+        values, vectors = np.linalg.eigh(model.covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        drawn = []
+        for _ in range(n):
+            p = model.p + root @ rng.standard_normal(len(model.p))
+            for i, axle in enumerate("fr"):
+                p[INDEX[f"ln_stiffness_{axle}"]] += share[i] * rng.standard_normal()
+                p[INDEX[f"ln_grip_{axle}"]] += share[i] * rng.standard_normal()
+            drawn.append(replace(model, p=np.clip(p, priors.low, priors.high)))
+        return tuple(drawn)
 
 
 # A run, its verdict and its report ask about the same drive: the last few answers are kept.
@@ -895,7 +740,8 @@ def _curve_expression(slip: Any, numbers: Array) -> tuple[Any, Any]:
 def _known_slip(model: FittedModel) -> Array:
     """Return `FittedModel.known_slip`, which a verdict asks for many times."""
     grid = np.linspace(0.0, 1.0, 101)[1:]
-    sure = model._relative_sd(np.outer(grid, model.driven)) <= LARGEST_SD
+    sd, prior = model.band.of_phi(np.outer(grid, model.driven))
+    sure = sd <= LARGEST_SD * np.maximum(prior, 1e-12)
     known: Array = model.driven * np.max(grid[:, None] * sure, axis=0)
     return known
 

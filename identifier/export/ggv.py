@@ -11,16 +11,16 @@ which that diamond lies within the diagram: min over f of g f/(1 - a_y(f)/a_y(0)
 ends of theirs that leave less. Each is right or too low in 95 % of cases.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from codegen.arrays import Array
 from codegen.escape import visible
-from identifier.axle.band import LEVEL, normal_quantile
+from identifier.band import LEVEL, Band, normal_quantile
 from identifier.estimate.priors import Priors
 from identifier.motion.parameters import INDEX
-from identifier.tire_model import AXLES, TireModel
+from identifier.tire_model import AXLES, TireModel, brisk_speed, require_band
 from models.vehicle import GRAVITY, LIGHTEST
 
 SPEEDS, PUSHES, SLIPS = 13, 200, 200  # of the table, of a diagram, of a curve
@@ -42,16 +42,15 @@ def limits(model: TireModel) -> Limits:
     Load transfer and ellipse of a model that has none are what is believed of its car. A model
     that cannot tell how sure it is, or is sure at no slip of an axle, is refused.
     """
-    car, known, own = model.vehicle, model.known_slip, model.lengthwise
-    if known is None or not model.has_band:
-        raise ValueError(f"a {type(model).__name__} cannot tell how sure it is: no proven limits")
-    grip = np.array([_lowest_grip(model, i, float(known[i])) for i in range(2)])
+    band, car, known, drives = require_band(model), model.vehicle, model.known_slip, model.drives
+    assert known is not None
+    grip = np.array([_lowest_grip(band, i, float(known[i])) for i in range(2)])
     priors, index = Priors.of(car), [INDEX[name] for name in NUMBERS]
-    mean, covariance = (priors.mean, priors.covariance) if own is None else own
+    mean, covariance = drives.lengthwise or (priors.mean, priors.covariance)
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     ends = (mean + normal_quantile(LEVEL) * sd)[index]
     transfer = ends[0] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
-    top = model.reference_speed if model.known_speeds is None else float(model.known_speeds[1])
+    top = brisk_speed(car, model.min_speed) if drives.speeds is None else float(drives.speeds[1])
     v_x = np.linspace(0.0, top, SPEEDS)
     pressed = car.load_ratio(v_x)
     a_y = (grip * pressed).min(axis=1)
@@ -62,14 +61,14 @@ def limits(model: TireModel) -> Limits:
     return Limits(v_x, *(GRAVITY * np.array([a_y, *sides])))
 
 
-def _lowest_grip(model: TireModel, i: int, known: float) -> float:
+def _lowest_grip(band: Band[Any], i: int, known: float) -> float:
     """Return the largest force of the lower end of an axle's band, in static loads."""
     alpha = np.linspace(0.0, known, SLIPS + 1)[1:]
-    half = model.half_band(alpha, LEVEL)
-    low = 0.0 if half is None else float((model.force_at(alpha) - half)[:, i].max())
+    half, model = band.half(alpha), band.model
+    low = float((model.force(alpha) - half)[:, i].max())
     if known <= 0.0 or low <= 0.0:
         raise ValueError(f"the force of the {AXLES[i]} axle is not known at any slip: drive harder")
-    return low / model.vehicle.axle_loads[i]
+    return low / float(model.vehicle.axle_loads[i])
 
 
 def _side(a_y: float, pressed: Array, transfer: Array, grip: Array, use: Array) -> float:

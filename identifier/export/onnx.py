@@ -19,14 +19,13 @@ from identifier.axle.band import (
     AT_SPEEDS,
     CENTERS,
     FLOOR,
-    LEVEL,
     RELATIVE,
     UNKNOWN,
-    normal_quantile,
     root,
 )
 from identifier.axle.band_step import LEAST_BEFORE, hinges
 from identifier.axle.model import AxleModel
+from identifier.band import LEVEL, normal_quantile
 from identifier.estimate.model import FittedModel
 from identifier.export.specialize import INPUTS, Signal
 from identifier.own_network import OnnxModel
@@ -235,8 +234,8 @@ def _band_of_fit(source: FittedModel, graph: _Graph, axle: int, units: str) -> N
     load = model.vehicle.axle_loads[axle]
     h = _sensitivity(graph, model, axle, units, float(source.speeds.mean()))
     left = _variance(graph, model, h, model.covariance[axle])
-    share = node("Mul", _FORCES[axle].name, number(source.error_share[axle] / load))
-    own = node("Add", graph.square(share), number(source.error_floor[axle] ** 2))
+    share = node("Mul", _FORCES[axle].name, number(source.band.error_share[axle] / load))
+    own = node("Add", graph.square(share), number(source.band.error_floor[axle] ** 2))
     sd, size = node("Sqrt", node("Add", left, own)), number(load * normal_quantile(LEVEL))
     node("Mul", sd, size, result=_HALF_BANDS[axle].name)
 
@@ -246,7 +245,7 @@ def _band_of_axle(model: AxleModel, graph: _Graph, axle: int, units: str) -> Non
     axle : 0 in front, 1 at the rear.   units : name of t (batch, n).
     """
     node, number = graph.node, graph.number
-    load, calibration = model.vehicle.axle_loads[axle], model.effective_calibration
+    load, calibration = model.vehicle.axle_loads[axle], model.band.calibration
     speed = calibration.speed
     h = _sensitivity(graph, model, axle, units, speed)
     left, before = (

@@ -200,7 +200,7 @@ def run_in_virtual_machine(
     nowhere = np.where(absent, np.nan, 0.0)
     nowhere[:2] = NOWHERE, np.nan if specialized.tells_v_y else 0.0
     for sample in samples:
-        if limits.accept(*sample[:5], needs_v_y=method.needs_v_y):
+        if limits.accept(*sample[:5], needs_v_y="v_y" in method.needs):
             anew = specialized.believed is None and missed > 0
             if anew if started else specialized.rests_first:
                 rest = np.where(absent, np.nan, sample)

@@ -15,7 +15,7 @@ import numpy as np
 
 from codegen.escape import visible
 from identifier.export.tir import magic_curve
-from identifier.tire_model import AXLES, RELAXATION, Axle, TireModel
+from identifier.tire_model import AXLES, RELAXATION, Axle, TireModel, require_band
 
 HEAD = 'schema_version: "0.2.0"\n'
 DRAWN = 100  # models, for standard deviations
@@ -33,7 +33,7 @@ def slipx_files(model: TireModel, rng: np.random.Generator, today: date) -> dict
         if not low < (value := float(getattr(car, key))) <= high:
             rule = f"{key} within {low:g} and {high:g}"
             raise ValueError(f"slipx describes cars of 1:10, {rule}: {car.name!r} has {value:.4g}")
-    drawn = model.samples(DRAWN, rng)
+    drawn = require_band(model).samples(DRAWN, rng)
     height, front = car.lengthwise("cg_height"), car.lengthwise("drive_front_share")
     layout = "4WD" if front is None else {0.0: "2WD_rear", 1.0: "2WD_front"}.get(front, "4WD")
     origin = f"""\

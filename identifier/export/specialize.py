@@ -95,7 +95,7 @@ class SpecializedStep(NamedTuple):
     @property
     def tells_v_y(self) -> bool:
         """Whether v_y is an output, so that it may be NaN as an input."""
-        return not self.method.needs_v_y
+        return "v_y" not in self.method.needs
 
     @property
     def side_slip(self) -> tuple[str, ...]:
@@ -122,7 +122,10 @@ def specialize(
     with_a_y : whether a_y is an input of a method that goes without it as well.
     with_band : whether half the width of the band is an output, calibrated as `start` is.
     """
-    setup = (method.setup_with_band if with_band else method.setup)(vehicle, start)
+    making = method.setup_with_band if with_band else method.setup
+    if making is None:
+        raise ValueError(f"{type(method).__name__} cannot tell how sure it is: it has no band")
+    setup = making(vehicle, start)
     if not setup.scan.step.is_a("SXFunction"):
         raise ValueError(
             f"{type(method).__name__} cannot be exported: its step solves a problem by many calls, "
@@ -130,7 +133,7 @@ def specialize(
         )
     if with_a_y and "a_y" not in setup.scan.over:
         raise ValueError(f"{type(method).__name__} has no use for a_y")
-    with_a_y = with_a_y or method.needs_a_y
+    with_a_y = with_a_y or "a_y" in method.needs
     step, left_out = setup.scan.step, () if with_a_y else setup.only_with_a_y
     carry = {port: one for port, one in setup.carry.items() if port not in left_out}
     parts = _specialized(setup, list(carry), name, with_a_y=with_a_y)
@@ -158,7 +161,7 @@ def specialize(
 
 def _measured(method: Method) -> tuple[Signal, ...]:
     """Return the inputs that every step has; v_y may be missing where the method tells it."""
-    if method.needs_v_y:
+    if "v_y" in method.needs:
         return INPUTS
     absent = "; NaN where there is none"
     return tuple(

@@ -46,7 +46,7 @@ def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -
     slip = np.concatenate([side, -side])
     inside = np.abs(slip) <= reach
     weight, load = np.where(inside, 1.0, BEYOND), model.vehicle.axle_loads[i]
-    phi = model.force_at(slip)[:, i] / load
+    phi = model.force(slip)[:, i] / load
     peak = float(np.abs(phi[inside]).max())
 
     def errors(z: Array, power: float = 1.0, size: float = 1.0) -> Array:
@@ -66,7 +66,7 @@ def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -
         )
     moved = [formula(slip, z + h) - formula(slip, z - h) for h in 1e-5 * np.eye(4)]
     step = np.linalg.pinv(weight[:, None] * np.column_stack(moved) / 2e-5, rcond=1e-6) * weight
-    steps = [step @ (one.force_at(slip)[:, i] / load - phi) for one in drawn]
+    steps = [step @ (one.force(slip)[:, i] / load - phi) for one in drawn]
     scale = np.array([*np.exp(z[:2]), 1.0, 1.0])
     sd = scale * np.std(steps, axis=0) if steps else np.zeros(4)
     return _MagicCurve(np.array([*scale[:2], *z[2:]]), sd, reach, missed)
@@ -96,9 +96,9 @@ def tire_properties(model: TireModel, axle: Axle) -> str:
     K, mu, C, E = (float(one) for one in found.numbers)
     load, u = 0.5 * model.vehicle.axle_loads[i], 1.0 / PROPORTIONAL
     slips = found.reach * np.array([0.25, 0.5, 0.75, 1.0])
-    half, force = model.half_band(slips), model.force_at(slips)
-    band = "the model cannot tell how sure it is"
-    if half is not None:
+    force, band = model.force(slips), "the model cannot tell how sure it is"
+    if model.band is not None:
+        half = model.band.half(slips)
         band = ", ".join(
             f"{F:.4g} +- {h:.3g} N at {a:.3g} deg"
             for a, F, h in zip(np.degrees(slips), 0.5 * force[:, i], 0.5 * half[:, i], strict=True)

@@ -13,15 +13,13 @@ from codegen.arrays import Array
 from identifier.axle.car import car_numbers, downforce_numbers
 from identifier.axle.covariance import packed, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
-from identifier.axle.design import AxleIdentifier, tracks
+from identifier.axle.design import AxleIdentifier, curve_boxes, curve_tracks, resumed_units
 from identifier.axle.gate import Plausibility
-from identifier.axle.guarantee import HalfSpaces, prior_box
+from identifier.axle.guarantee import prior_box
 from identifier.axle.learning import Bounds, inward, rising_shares
 from identifier.axle.model import EXACT, AxleModel
 from identifier.axle.prior import Prior
 from identifier.axle.slip import FASTEST, Sensors, Sway
-from identifier.certificate import Certificate
-from identifier.driving import Driving
 from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
 from identifier.inertial.motion import MOVING, SENSORS, Along, Laws, Learnt
@@ -32,10 +30,15 @@ from identifier.inertial.step import (
     LearntLimits,
     build_step,
 )
-from identifier.method import OTHER_STRUCTURE, Method, Track, fits, resumed
+from identifier.method import (
+    Accelerometer,
+    Limits,
+    Method,
+    Track,
+)
 from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
-from models.rules import require_within
+from models.rules import require_positive, require_within
 from models.vehicle import GRAVITY, Vehicle
 
 RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
@@ -62,6 +65,8 @@ class InertialIdentifier(Method):
     dt : sampling interval T_s [s].
     """
 
+    needs = ("a_y",)
+
     prior: Prior
     plausibility: Plausibility
     bounds: Bounds
@@ -83,8 +88,7 @@ class InertialIdentifier(Method):
         object.__setattr__(self, "sensor_position", tuple(self.sensor_position))
         object.__setattr__(self, "doubt", tuple(self.doubt))
         doublings(self.ladder)
-        if not 0.0 < self.dt < math.inf:
-            raise ValueError(f"dt must be positive, it is {self.dt}")
+        require_positive(ValueError, dt=self.dt)
         require_within(ValueError, 0.5, 100.0, roll_frequency=self.roll_frequency)
         require_within(ValueError, 0.01, 10.0, roll_damping=self.roll_damping)
         require_within(ValueError, -1.0, 1.0, a_y_late=self.a_y_late)
@@ -120,13 +124,13 @@ class InertialIdentifier(Method):
         dt : sampling interval [s].
         """
         usual, tires = cls.for_vehicle(vehicle, dt=dt), model.in_units(LADDER)
-        share = max(float(tires.own[:, 1].mean()), LEAST_SHARE)
+        share = max(float(tires.sway_share.mean()), LEAST_SHARE)
         return replace(
             usual,
             held=True,
             prior=replace(usual.prior, sway_share=share),
             roll_frequency=tires.sway.frequency * vehicle.froude_time,
-            doubt=(float(model.error_floor[1]), float(model.error_share[1])),
+            doubt=(float(model.band.error_floor[1]), float(model.band.error_share[1])),
             a_y_late=model.a_y_late,
             along=Along(
                 load_f=-model["load_transfer"] * vehicle.wheelbase / vehicle.l_r,
@@ -152,77 +156,46 @@ class InertialIdentifier(Method):
             return cls.holding(model, vehicle, dt=dt), model
         usual = cls.for_vehicle(vehicle, dt=dt)
         tires = None if model is None else model.in_units(usual.ladder)
-        if model is None or not isinstance(tires, AxleModel) or not usual.resumes(model):
+        if not isinstance(tires, AxleModel) or tires.ladder != usual.ladder:
             return usual, None
         return replace(usual, sensors=tires.sensors), model
 
     @property
     def min_speed(self) -> float:
-        """Below this speed [m/s] forces read zero; learning rests below `learning_speed`."""
         return self.plausibility.min_speed
 
     @property
-    def needs_v_y(self) -> bool:
-        """Whether it learns nothing without a lateral velocity, which it tells: no."""
-        return False
+    def accelerometer(self) -> Accelerometer:
+        """Bias and roll in a_y, by which it estimates v_y."""
+        return Accelerometer(self._bias_and_roll, self._body)
 
     @property
-    def needs_a_y(self) -> bool:
-        """Whether it learns nothing from a recording without an accelerometer: so it is."""
-        return True
-
-    def resumes(self, model: TireModel) -> bool:
-        """Return whether a run can begin with a stored model."""
-        return fits(model.in_units(self.ladder), AxleModel, ladder=self.ladder)
-
-    def possible_tires(self) -> HalfSpaces:
-        """Return the weights that the curve of a tire can have, within the bounds."""
-        return prior_box(self.bounds, self.ladder)
+    def limits(self) -> Limits:
+        boxes = curve_boxes(self.bounds, stiffness=True) | {
+            "roll_rad_per_g": [0.0, MOST["roll"]],
+            "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
+            "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
+        }
+        return Limits(boxes, prior_box(self.bounds, self.ladder))
 
     @property
     def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
         return PORTS
 
-    def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
-        """Return what is proven of it: the boxes of what is learnt hold after every sample."""
-        del vehicle, driving
-        b = self.bounds
-        return Certificate(
-            limits={
-                "grip_static_axle_loads": [b.least_grip, b.most_grip],
-                "weight_static_axle_loads": [-b.weight, b.weight],
-                "stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness],
-                "compliance_m": [0.0, b.compliance],
-                "roll_rad_per_g": [0.0, MOST["roll"]],
-                "steering_offset_rad": [-b.steering, b.steering],
-                "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
-                "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
-            }
-        )
-
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
-        """Return what a run needs.
-        start : stored weights to begin with, which know how sure they are; None takes the prior.
-
-        Raises
-        ------
-        ValueError
-            Where stored weights are those of another structure.
-        """
-        W, own = self.prior.means(vehicle, self.ladder)
+        W, beside = self.prior.means(vehicle, self.ladder)
+        compliance = beside[:, 0]
         P = self._prior_covariance(vehicle)
         excitation = np.zeros((2, 1 + len(EDGES)))
         sensors = np.zeros(len(SENSORS))
         sensors[SENSORS.index("roll")] = self.beliefs.roll
         if start is not None:
-            stored = resumed(
-                start.in_units(self.ladder), AxleModel, OTHER_STRUCTURE, ladder=self.ladder
-            )
-            W, own, P, excitation = stored.W, stored.own, stored.covariance, stored.excitation
-            sensors[SENSORS.index("steering")] = own[0, 2]
+            stored = resumed_units(start, self.ladder)
+            W, P, excitation = stored.W, stored.covariance, stored.excitation
+            compliance = stored.compliance
+            sensors[SENSORS.index("steering")] = stored.offset[0]
         trust = self.trust.at(self.dt, vehicle.wheelbase, vehicle.froude_time)
-        curves, compliance = self._directions(W), own[:, 0]
+        curves = self._directions(W)
         known = self._known(vehicle, P, curves, compliance)
         pressed = vehicle.has_downforce
         scan = _scan(doublings(self.ladder), tires=not self.held, pressed=pressed)
@@ -231,7 +204,7 @@ class InertialIdentifier(Method):
             carry={
                 **scan.zeros(),  # the covariance of what moves begins with the first sample
                 "W": W,
-                "own": own[:, 0],
+                "own": compliance,
                 "sensors": sensors,
                 "UD": packed(known[None]),
                 "readings": np.concatenate(
@@ -259,8 +232,8 @@ class InertialIdentifier(Method):
             ends_run=self.plausibility.rest(self.dt),
         )
 
-    def body_prior(self, vehicle: Vehicle) -> Body:
-        """Return how the body rolls: as a chassis tells it, or else as is believed of any."""
+    def _body(self, vehicle: Vehicle) -> Body:
+        """Return how the body rolls: by its chassis, or else as is believed of any."""
         frequency = self._sway(vehicle).frequency
         believed = Body(frequency, self.roll_damping, self.beliefs.roll, self.beliefs.sd_roll)
         return Body.of_chassis(vehicle) or believed
@@ -311,7 +284,7 @@ class InertialIdentifier(Method):
         return np.asarray(found.T, np.float64)
 
     def _into(self, curves: Array, compliance: Array) -> Array:
-        """Return what steps of what is learnt move of each axle's [W, own], (2, n + 3, k)."""
+        """Return what steps of what is learnt move of each axle's numbers, (2, n + 3, k)."""
         n = len(self.ladder)
         moved = self._learnt.into(n, ca.DM(curves), ca.DM(compliance))[MOVING:, MOVING:]
         *weights, own, sensors = np.split(np.array(ca.evalf(moved)), [n, 2 * n, 2 * n + 2])
@@ -320,7 +293,7 @@ class InertialIdentifier(Method):
         return np.array([front, np.vstack([weights[1], own[1], nothing, nothing])])
 
     def _known(self, vehicle: Vehicle, P: Array, curves: Array, compliance: Array) -> Array:
-        """Return the covariance of what is learnt of covariances of both axles' [W, own], (k, k).
+        """Return the covariance of what is learnt of covariances of both axles' numbers, (k, k).
 
         The axles' doubts of their compliance are one.
         """
@@ -349,15 +322,11 @@ class InertialIdentifier(Method):
         return P
 
     def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
-        """Return cornering stiffness, relaxation length, and the force that curves saturate at.
-        state : W (k, 2, n) and own (k, 2) at each of k instants.
-        """
-        return tracks(self.ladder, vehicle, state["W"], state["own"].reshape(-1, 2))
+        compliance = state["own"].reshape(-1, 2)
+        return curve_tracks(vehicle, self.ladder, state["W"], compliance)
 
-    def beside_force(self, state: Mapping[str, Array]) -> Array:
-        """Return bias and roll in what the accelerometer showed, (n,) [weights].
-        state : sensors (n + 1, 4) and body (n + 1, 2).
-        """
+    def _bias_and_roll(self, state: Mapping[str, Array]) -> Array:
+        """Return bias and roll in the measured a_y, (n,) [car weights]."""
         sensors = state["sensors"].reshape(-1, len(SENSORS))[1:]
         tilt = state["body"].reshape(-1, 2)[1:, 0]
         bias, roll = (sensors[:, SENSORS.index(name)] for name in ("bias", "roll"))
@@ -369,13 +338,11 @@ class InertialIdentifier(Method):
         state : W (2, n), own (2,), sensors (4,), UD of both and excitation (2, 9).
         """
         prior = self._prior_covariance(vehicle)
-        own = np.zeros((2, 3))
-        own[:, 0] = np.ravel(state["own"])
-        own[0, 2] = np.ravel(state["sensors"])[SENSORS.index("steering")]
-        own[:, 1] = self.prior.sway_share
+        compliance = np.array(state["own"]).ravel()
+        steering = np.ravel(state["sensors"])[SENSORS.index("steering")]
         (P,) = unpacked(state["UD"].reshape(1, -1), len(self._learnt.names))
         after = np.empty_like(prior)
-        into = self._into(self._directions(state["W"]), own[:, 0])
+        into = self._into(self._directions(state["W"]), compliance)
         for one, E, before in zip(after, into, prior, strict=True):
             back = np.linalg.pinv(E)  # what weights tell of what is learnt
             gain = before @ back.T @ np.linalg.pinv(back @ before @ back.T)
@@ -386,7 +353,9 @@ class InertialIdentifier(Method):
             sway=self._sway(vehicle),
             plausibility=self.plausibility,
             W=state["W"].copy(),
-            own=own,
+            compliance=compliance,
+            sway_share=np.full(2, self.prior.sway_share),
+            offset=np.array([steering, 0.0]),
             covariance=after,
             prior_covariance=prior,
             excitation=state["excitation"].copy(),

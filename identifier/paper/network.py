@@ -7,7 +7,7 @@ There is no bias: f̂ is odd in x̄, as the residual of a symmetric tire is, and
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
@@ -18,7 +18,6 @@ from codegen.elementary import tanh
 from identifier.driving import REFERENCE_WHEELBASE
 from identifier.frozen import (
     FORMAT,
-    FrozenModelError,
     require_min_speed,
     vehicle_from,
     vehicle_numbers,
@@ -237,7 +236,6 @@ class NetworkModel(StaticModel):
         return _build_frozen(self.network)(W, V, x, u, v_x, ca.vertcat(*vehicle), unit)[1]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the model as plain numbers and words, ready for JSON."""
         return {
             "format": FORMAT,
             "kind": self.kind,
@@ -251,18 +249,14 @@ class NetworkModel(StaticModel):
         }
 
     @classmethod
-    def from_dict(cls, data: dict[str, Any], source: str) -> "NetworkModel":
-        try:
-            table = Table(data, "", FrozenModelError)
-            return cls(
-                vehicle=vehicle_from(table.value("vehicle")),
-                network=Network(**table.table("network").record(Network)),
-                weights=Weights(W=table.array("W"), V=table.array("V")),
-                force_unit=table.number("force_unit_N"),
-                min_speed=table.number("min_speed_m_s"),
-            )
-        except ValueError as error:
-            raise FrozenModelError(f"{source}: {error}") from error
+    def _read(cls, table: Table) -> Self:
+        return cls(
+            vehicle=vehicle_from(table.value("vehicle")),
+            network=Network(**table.table("network").record(Network)),
+            weights=Weights(W=table.array("W"), V=table.array("V")),
+            force_unit=table.number("force_unit_N"),
+            min_speed=table.number("min_speed_m_s"),
+        )
 
 
 def first_weights(

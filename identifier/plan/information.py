@@ -24,7 +24,7 @@ _MATTERING = 12  # slips at which the curve is asked, up to where it is flat
 
 
 def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array:
-    """Return the covariance of weights and own after a maneuver, (m, k, 2, q, q).
+    """Return the covariance of all numbers of an axle after a maneuver, (m, k, 2, q, q).
     tires : k pairs of axles; their covariance is that before.   v_x : speed [m/s].
     """
     ladder, numbers = np.array(tires.method.ladder), tires.method.regression

@@ -119,7 +119,7 @@ def simulate(
     W = tires.W.transpose(2, 1, 0)[:, :, None, :]  # (units, 2, 1, k)
     inverse = scales[:, None, None, None]
     flattest = LEAST_SLOPE * (W * inverse).sum(axis=0)
-    s, share = (tires.own[:, i][:, None, None] for i in (0, 1))
+    s, share = (one[:, None, None] for one in (tires.compliance, tires.sway_share))
     loads = np.array(car.axle_loads)
     to_v, to_r = loads / car.mass, np.array([car.l_f, -car.l_r]) * loads / car.yaw_inertia
     arm = np.array([car.l_f, -car.l_r])[:, None, None]

@@ -42,8 +42,8 @@ class PlausibleTires:
     """k cars, the first of which is taken for the truth until more is known.
     W : weights [static axle loads], (k, 2, n).
     steering_lag : of the front wheels behind what is asked of them [s], (k,).
-    own : compliance [m per load], sway share [-], offset (2, 3), of all.
-    covariance : of weights and own before the maneuver, (2, n + 3, n + 3).
+    compliance : [m per load], and share of the sway [-], of all, (2,) each.
+    covariance : of all numbers of an axle before the maneuver, (2, n + 3, n + 3).
     prior : that of a car that never drove, (2, n + 3, n + 3).
     """
 
@@ -51,7 +51,8 @@ class PlausibleTires:
     method: AxleIdentifier
     W: Array
     steering_lag: Array
-    own: Array
+    compliance: Array
+    sway_share: Array
     covariance: Array
     prior: Array
 
@@ -80,13 +81,14 @@ class PlausibleTires:
         W = [[fiala_weights(c, mu, ladder) for c in (f, r)] for f, r, mu, _ in cases]
         lag = _steering_lag_of(vehicle, steering_lag) * np.array([late for *_, late in cases])
         P = prior.covariance(vehicle, ladder)
-        own = prior.means(vehicle, ladder)[1]
+        compliance, share, _ = prior.means(vehicle, ladder)[1].T
         return cls(
             vehicle=vehicle,
             method=method,
             W=np.array(W),
             steering_lag=lag,
-            own=own,
+            compliance=compliance,
+            sway_share=share,
             covariance=P,
             prior=P,
         )
@@ -96,14 +98,15 @@ class PlausibleTires:
         cls, model: AxleModel, rng: np.random.Generator, *, steering_lag: float | None = None
     ) -> Self:
         """Return the tires that a car may have of which a model was learnt."""
-        drawn = model.samples(DRAWN, rng)
+        drawn = model.band.samples(DRAWN, rng)
         late = 1.0 + SPREAD * np.array([0.0, *np.resize([-1.0, 1.0], DRAWN)])
         return cls(
             vehicle=model.vehicle,
             method=replace(AxleIdentifier.for_vehicle(model.vehicle), ladder=model.ladder),
             W=np.array([model.W, *(one.W for one in drawn)]),
             steering_lag=_steering_lag_of(model.vehicle, steering_lag) * late,
-            own=model.own * [1.0, 1.0, 0.0],
+            compliance=model.compliance,
+            sway_share=model.sway_share,
             covariance=model.covariance,
             prior=model.prior_covariance,
         )
@@ -149,6 +152,6 @@ class PlausibleTires:
 
     def after(self, covariance: Array) -> Self:
         """Return the same tires when more is known of them.
-        covariance : of weights and own, (2, n + 3, n + 3).
+        covariance : of all numbers of an axle, (2, n + 3, n + 3).
         """
         return replace(self, covariance=covariance)

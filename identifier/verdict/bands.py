@@ -8,7 +8,7 @@ stay alike says how many of them tell something new.
 """
 
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,16 +18,15 @@ from identifier.axle.band import (
     AT_SPEEDS,
     CENTERS,
     LEAST,
-    LEVEL,
     MOST,
     MOST_COLOR,
     SPEEDS,
     BandCalibration,
-    BandSpread,
-    normal_quantile,
+    ranges_of,
     sensor_noise,
 )
 from identifier.axle.learning import Regression
+from identifier.band import LEVEL, Band, BandSpread, normal_quantile
 from identifier.run import History
 from identifier.tire_model import TireModel
 from identifier.verdict.judging import judge
@@ -51,13 +50,10 @@ def within_band(model: TireModel, recording: Recording, level: float = LEVEL) ->
     is driven.
     """
     recording = portion(recording).recording
-    half = model.half_band_of_curves(recording, level)
-    if half is None:
-        return None
     found = evidence(model, recording)
-    if found is None:
+    if found is None or model.band is None:
         return None
-    half = half / np.array(model.vehicle.axle_loads)
+    half = model.band.of_curves(recording, level) / np.array(model.vehicle.axle_loads)
     noise = normal_quantile(level) ** 2 * found.noise
     wide = np.sqrt(found.windows.mean(half) ** 2 + noise)
     share: Array = np.mean(np.abs(found.measured - found.modelled) <= wide, axis=0)
@@ -68,7 +64,7 @@ class Missed(NamedTuple):
     """What was missed where a model was not taught, window by window, axle by axle.
 
     error : [static axle loads], nan where no part was left out (m, 2).   share : of the window in
-    which the slip was in each range (6, m, 2).   scaled, held : variances of the model that was
+    which the slip was in each range (6, m, 2).   scaled, fixed : variances of the model that was
     asked, as `BandSpread` has them, at the mean of the slip there (6, m, 2).   within : range of
     speed of the window (m,).
     """
@@ -76,7 +72,7 @@ class Missed(NamedTuple):
     error: Array
     share: Array
     scaled: Array
-    held: Array
+    fixed: Array
     within: NDArray[np.intp]
 
 
@@ -89,13 +85,15 @@ def calibrated(
     t : time of the freeze in the recording's own clock [s]; None is the end.
     verdict : what `judge` said of that time; None asks it where it is needed.
     """
+    model = history.freeze(t)
+    if (band := model.band) is None:
+        return model
     if history.design.whole:
         share = (verdict or judge(history, t)).force_missed
-        return history.freeze(t).with_calibration(None, None if share is None else np.array(share))
+        whole: TireModel = band.calibrated_by(None, None if share is None else np.array(share))
+        return whole
     run = asked_run(history, t)
-    model, recording = run.model, run.portion.recording
-    if not model.has_band:
-        return model
+    recording = run.portion.recording
     found = evidence(model, recording, run.road)
     if found is None:
         return model
@@ -108,22 +106,36 @@ def calibrated(
     missed = Missed(np.full(one, np.nan), empty[0], empty[1], empty[2], within)
     given = BandCalibration.declared(speed)
     for mine, other in taught_elsewhere(run.taught, recording, found):
-        if other is None:
+        if other is None or other.band is None:
             continue
-        asked_of = _missed(other.with_calibration(given), recording, found)
+        asked_of = _missed(other.band.calibrated_by(given), recording, found)
         for into, values in zip(missed[:-1], asked_of, strict=True):
             into[..., mine, :] = values[..., mine, :]
     given = replace(given, noise=sensor_noise(recording, model.vehicle))
     judged, _ = found.but_a_segment()
-    return model.with_calibration(
-        calibration(missed, found.noise, found.windows, given), judged.missed
-    )
+    found_of = calibration(missed, found.noise, found.windows, given)
+    tires: TireModel = band.calibrated_by(found_of, judged.missed)
+    return tires
 
 
 def _missed(model: TireModel, recording: Recording, found: Evidence) -> tuple[Array, ...]:
-    """Return error, share, scaled and held of `Missed` in all windows, of a model with a band."""
-    spread = model.spread_by_range(recording, found.windows.mean)
+    """Return error, share, scaled and fixed of `Missed` in all windows, of a model with a band."""
+    assert model.band is not None
+    spread = _spread_by_range(model.band, recording, found.windows)
     return found.measured - modelled_force(model, recording, found.windows), *spread
+
+
+def _spread_by_range(
+    band: Band[Any], recording: Recording, windows: Windows
+) -> tuple[Array, Array, Array]:
+    """Return share, scaled and fixed of `Missed`, (6, m, 2) each."""
+    size, count = np.abs(band.model.lagged_slip(recording)), len(CENTERS)
+    within, v_x = ranges_of(size), np.tile(windows.mean(recording.v_x), count)
+    share = np.array([windows.mean(1.0 * (within == k)) for k in range(count)])
+    total = np.array([windows.mean(size * (within == k)) for k in range(count)])
+    slip = np.divide(total, share, out=np.zeros_like(total), where=share > 0.0)
+    spread = band.spread(slip.reshape(-1, 2), v_x, band.model.vehicle.load_ratio(v_x))
+    return share, spread.scaled.reshape(slip.shape), spread.fixed.reshape(slip.shape)
 
 
 def calibration(

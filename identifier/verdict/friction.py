@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.axle.band import LEVEL, normal_quantile
+from identifier.band import LEVEL, normal_quantile
 from identifier.measured import with_doubt
 from identifier.tire_model import GRIP, TireModel
 from identifier.verdict.motion import evidence, modelled_force
@@ -115,11 +115,8 @@ def road_friction(
         [weights]; None where nobody knows of it.
     """
     asked = portion(recording)
-    band = model.half_band_of_curves(asked.recording)
-    if band is None or not model.band_calibrated:
-        return None
-    found = evidence(model, asked.recording, road)
-    if found is None:
+    band, found = model.band, evidence(model, asked.recording, road)
+    if band is None or not band.calibrated or found is None:
         return None
     windows = found.windows
     grid = np.log(np.geomspace(LEAST, MOST, COUNT))
@@ -129,9 +126,11 @@ def road_friction(
     away, slope = np.empty((2, grid.size, *found.measured.shape))
     for k, mu in enumerate(np.exp(grid)):
         tires = model.at_friction(float(mu))
+        assert tires.band is not None
         away[k] = found.measured - modelled_force(tires, asked.recording, windows)
-        slope[k] = windows.mean(tires.slope_over(asked.recording))
-    sd = windows.mean(band / np.array(model.vehicle.axle_loads)) / normal_quantile(LEVEL)
+        slope[k] = windows.mean(tires.band.slope_over(asked.recording))
+    half = band.of_curves(asked.recording) / np.array(model.vehicle.axle_loads)
+    sd = windows.mean(half) / normal_quantile(LEVEL)
     beside = BESIDE if recording.logged_v_y is not None else math.hypot(BESIDE, _OF_ESTIMATE)
     variance = sd**2 + found.noise + beside**2 + (_OF_FORCE * found.measured) ** 2
     t = recording.t[asked.samples[windows.starts + windows.n]]

@@ -18,8 +18,8 @@ from codegen.arrays import Array
 from codegen.errors import TireidError
 from identifier.axle.guarantee import (
     ForceBound,
-    Guarantee,
     HalfSpaces,
+    PossibleWeights,
     Strips,
     least_bound,
     possible_weights,
@@ -104,9 +104,10 @@ def guaranteed(
     """
     given = None if bound is None else ForceBound.of(bound)
     run = asked_run(history, t)
-    carries, box = run.model if model is None else model, history.design.possible_tires()
-    if box is None or not isinstance(carries, AxleModel):
+    carries, limits = run.model if model is None else model, history.design.limits
+    if limits is None or not isinstance(carries, AxleModel):
         return carries
+    box = limits.curves
     strips = strips_of(run.model, run.portion.recording, run.road)
     if strips is not None and run.until is not None:
         strips = strips.until(int(np.searchsorted(strips.t, run.until - WINDOW, side="right")))
@@ -119,14 +120,14 @@ def guaranteed(
         if found is None:
             raise _violated(strips, axle, chosen, box)
         corners.append(found)
-    guarantee = Guarantee(
+    possible = PossibleWeights(
         bound=chosen,
         given=given is not None,
         corners=(corners[0], corners[1]),
         speed=float(strips.v_x.mean()),
         fastest=fastest(strips),
     )
-    return replace(carries, guarantee=guarantee)
+    return replace(carries, possible=possible)
 
 
 def fastest(strips: Strips) -> tuple[float, float]:
@@ -176,4 +177,4 @@ def contradictions(
     strips = strips_of(model, recording, road)
     if strips is None:
         return None
-    return strips.t, model.guarantee.contradicted(strips)
+    return strips.t, model.guarantee.possible.contradicted(strips)

@@ -93,8 +93,8 @@ def judge(history: History, t: float | None = None) -> Verdict:
     """
     model, whole = history.freeze(t), history.recording
     end = float(whole.t[-1]) if t is None else t
-    state = {} if history.design.whole else history.state_at(end)
-    reached = history.design.reached(history.vehicle, state) if state else model.at_bounds()
+    limits = history.design.limits
+    reached = model.drives.at_bounds if limits is None else limits.active(history.state_at(end))
     return judge_identification(model, whole, state_index(whole, end), reached)
 
 
@@ -111,8 +111,8 @@ def judge_identification(
     asked = _asked(model, recording, own=True, frozen=frozen)
     if asked is None:
         return _too_short(model)
-    bounds = model.at_bounds() if reached is None else reached
-    notes = [Objection(code, None, text, False) for code, text in model.notes]
+    bounds = model.drives.at_bounds if reached is None else reached
+    notes = [Objection(code, None, text, False) for code, text in model.drives.notes]
     return _verdict(asked, [*_findings(asked), *map(_at_bound, bounds), *notes], recording)
 
 
@@ -139,7 +139,7 @@ def _asked(
     part = portion(recording) if frozen is None else portion(recording, frozen)
     found = evidence(model, part.recording, _road(part.recording, model))
     if own and found is not None:
-        other = model.road_differs(recording.t[part.samples])
+        other = model.drives.road_differs(recording.t[part.samples])
         found = found.where(~other[found.windows.starts])
     if found is None or len(found.windows) < FEWEST:
         return None
@@ -223,14 +223,12 @@ def _left_out(asked: _Asked) -> Iterator[Objection]:
 
 
 def _unsure(asked: _Asked) -> Iterator[Objection]:
-    if not asked.own:
+    if not asked.own or (band := asked.model.band) is None:
         return
     car, windows = asked.model.vehicle, asked.found.windows
     slip = np.abs(windows.mean(np.asarray(asked.recording.alpha(car.l_f, car.l_r))))
     for i, axle in enumerate(AXLES):
-        doubt = asked.model.relative_sd(np.maximum(slip[:, i], 1e-4))
-        if doubt is None:
-            return
+        doubt = band.relative_sd(np.maximum(slip[:, i], 1e-4))
         power = asked.found.measured[:, i] ** 2
         mean = float(np.sqrt(np.sum(power * doubt[:, i] ** 2) / max(float(power.sum()), 1e-12)))
         if not (mean <= RULES.doubt or asked.forceless[i]):
@@ -243,7 +241,7 @@ def _unsure(asked: _Asked) -> Iterator[Objection]:
 
 def _no_tire(asked: _Asked) -> Iterator[Objection]:
     loads = np.array(asked.model.vehicle.axle_loads)
-    stiffness = asked.model.force_at(np.array([_SECANT]))[0] / _SECANT
+    stiffness = asked.model.force(np.array([_SECANT]))[0] / _SECANT
     least, most = RULES.stiffness
     for axle, each, C in zip(AXLES, stiffness / loads, stiffness, strict=True):
         if not least <= each <= most:
@@ -328,7 +326,7 @@ def _verdict(asked: _Asked, listed: list[Objection], whole: Recording) -> Verdic
         listed.append(Objection("portion", None, text.format(*minutes), False))
     listed.sort(key=lambda finding: not finding.refuses)
     motion = motion_error(
-        model.axle_force(recording), recording, model.vehicle, recording.v_x >= model.min_speed
+        model.predict(recording), recording, model.vehicle, recording.v_x >= model.min_speed
     )
     lateral, yaw = (None, None) if motion is None else motion.explained
     measures: dict[str, tuple[float, ...] | float | None] = {
@@ -361,7 +359,7 @@ def _verdict(asked: _Asked, listed: list[Objection], whole: Recording) -> Verdic
 
 def _reach(model: TireModel, recording: Recording) -> str:
     """Return in which range of speed and slip a model is known, in words; empty: unknown."""
-    speeds, known = model.known_speeds, model.known_slip
+    speeds, known = model.drives.speeds, model.known_slip
     if known is None:
         return ""
     if speeds is None:

@@ -105,7 +105,7 @@ def impulse_signals(
 def modelled_force(model: TireModel, recording: Recording, windows: Windows) -> Array:
     """Return mean axle forces of a model over the same windows [static axle loads], (m, 2)."""
     loads = np.array(model.vehicle.axle_loads)
-    return windows.mean(model.axle_force(recording) / loads)
+    return windows.mean(model.predict(recording) / loads)
 
 
 def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> Array:

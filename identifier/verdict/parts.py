@@ -62,16 +62,15 @@ _felt: WeakKeyDictionary[History, dict[int, Array | None]] = WeakKeyDictionary()
 
 def _road_felt(history: History, asked: Portion) -> Array | None:
     """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
-    if history.design.needs_v_y == (asked.recording.logged_v_y is None):
+    method = history.design
+    without = asked.recording.logged_v_y is None
+    if method.accelerometer is None or ("v_y" in method.needs) == without:
         return None  # it was learnt of another motion than that which is asked
     pushes = []
     for block in history.blocks(asked.samples):
         first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
         mine = asked.samples[first:last] - block.part.start
-        push = history.design.beside_force(block.state)
-        if push is None:
-            return None
-        pushes.append(push[mine])
+        pushes.append(method.accelerometer.beside_force(block.state)[mine])
     return np.concatenate(pushes)
 
 

@@ -87,7 +87,7 @@ def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
         "SHORTEST": (shortest, "lag that is always there [m]"),
     }
     if model.tells_v_y:  # beside it the share of the sway is none of what is learnt
-        share = repr(float(model.own[0, 1]))
+        share = repr(float(model.sway_share[0]))
         numbers |= {
             "SWAY_SHARE": (share, "of the sway of the body, not identified"),
             "STEERING": (f"{SENSORS.index('steering')}U", "which of the sensors' errors it is"),

@@ -92,12 +92,12 @@ class LateralVelocity:
         body: Body | None = None,
     ) -> None:
         method = identifier.method
-        believed = method.body_prior(identifier.vehicle)
-        if believed is None:
+        sensor = method.accelerometer
+        if sensor is None or sensor.body is None:
             raise ValueError(f"{type(method).__name__} tells no v_y")
         self.identifier, self.trust = identifier, localization or Localization()
         self._dt = method.dt
-        self._body = body or believed
+        self._body = body or sensor.body(identifier.vehicle)
         self._rolls = (0.0, 0.0)  # ä and its rate [m/s²], [m/s³]
         self._place: Array | None = None  # X, Y [m], dead reckoned
         self._v_y, self._bias, self._roll = math.nan, 0.0, self._body.roll

@@ -12,13 +12,14 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
+from identifier.axle.dynamics import series_compliance
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
 from identifier.estimate.model import FittedModel
 from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
-from models.vehicle import GRAVITY, Vehicle, load_ratio
+from models.vehicle import Vehicle, load_ratio
 from mpc.tires.tire import DOUBT_STEP, N_DOUBTS, Pair, Point, PredictionTire, TireStructure
 
 _N_COMMON = 3
@@ -149,7 +150,8 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     """
     load, ladder = np.array(model.vehicle.axle_loads), np.array(model.ladder)
     W, shortest = model.W * load[:, None], SHORTEST * model.vehicle.wheelbase
-    compliance = (model.own[:, 0] + GRAVITY / model.sway.frequency**2 * model.own[:, 1]) / load
+    gives = series_compliance(model.compliance, model.sway_share, model.sway.frequency)
+    compliance = gives / load
     slope = np.maximum((model.W / ladder).sum(axis=1), 0.1) * load
     weights = ladder_weights(
         ladder,
@@ -157,13 +159,13 @@ def axle_tire(model: AxleModel) -> PredictionTire:
         compliance=compliance,
         least=compliance * 0.02 * slope + shortest,  # the slope is held up as when it was learnt
         shortest=shortest,
-        offset=(model.own[0, 2], model.own[1, 2]),
+        offset=(model.offset[0], model.offset[1]),
         downforce=_downforce(model.vehicle),
     )
     mounted = any((model.sensors.v_y_angle, model.sensors.steering_gain))
     if mounted:
         weights = np.append(weights, [model.sensors.v_y_angle, model.sensors.steering_gain])
-    doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
+    doubt = model.band.half(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
     pressed = model.vehicle.has_downforce
     structure = LadderAxles(units=ladder.size, pressed=pressed, mounted=mounted)
     return PredictionTire(structure, weights, model.vehicle, doubt)
@@ -173,7 +175,7 @@ def fit_tire(model: FittedModel) -> PredictionTire:
     """Return the prediction tire of a fit: its curves in hidden units, read by its sensors.
     model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out.
     """
-    doubt = model.half_band(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
+    doubt = model.band.half(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
     return axle_tire(model.in_units())._replace(doubt=doubt)
 
 

@@ -40,7 +40,7 @@ def log(drive):
 
 def test_the_error_is_that_of_the_frozen_model_in_percent_of_the_rms_force(drive, log):
     found = answer(log, drive.car.told, drive.exact)
-    force = ti.identify(blind(log), drive.car.told).freeze().axle_force(drive.exact)
+    force = ti.identify(blind(log), drive.car.told).freeze().predict(drive.exact)
     truth = drive.exact.axle_force
     by_hand = 100.0 * np.linalg.norm(force - truth, axis=0) / np.linalg.norm(truth, axis=0)
     np.testing.assert_allclose(found.error, by_hand, rtol=1e-9)
@@ -184,7 +184,7 @@ def test_an_exception_and_a_stiffness_of_nothing_are_found(monkeypatch):
     class Tire:
         stiffness = np.array([1e5, 0.0])
 
-        def axle_force(self, log):
+        def predict(self, log):
             return log.x
 
     class History:

@@ -28,6 +28,6 @@ def test_what_the_default_method_learns_on_the_plant_is_that_recorded():
     slalom, method = plant_recordings(car)[0], make_method(LIVE, car)
     course = Course(vehicle=car, recordings=(slalom,), min_speed=method.min_speed)
     model = identify(slalom, car, method).freeze(float(slalom.t[-1]))
-    error = course.error(slalom, model.axle_force(slalom))
+    error = course.error(slalom, model.predict(slalom))
     found = recorded()["learn_and_extrapolate"]["plant/in_sample/exact"]
     assert max(error.front, error.rear) / 1e3 == pytest.approx(found, rel=1e-3)

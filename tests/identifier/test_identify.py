@@ -192,6 +192,6 @@ def test_weights_keep_their_forces_in_a_design_of_another_force_unit(car, drive)
     model = identify(recording, car, design).freeze(5.0)
     other = replace(design, force_unit=4.0 * design.force_unit)
     start = identify(recording, car, other, start=model).freeze(float(recording.t[0]))
-    expected = model.axle_force(recording)
+    expected = model.predict(recording)
     assert np.abs(expected).max() > 100.0
-    np.testing.assert_allclose(start.axle_force(recording), expected, rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(start.predict(recording), expected, rtol=1e-9, atol=1e-6)

@@ -40,7 +40,7 @@ def test_only_the_leakage_forgets_a_slalom_on_five_minutes_of_a_straight_road(ke
     exact, (brisk, calm) = drives
 
     def missed(model):
-        return np.sqrt(np.mean((model.axle_force(exact) - exact.axle_force) ** 2))
+        return np.sqrt(np.mean((model.predict(exact) - exact.axle_force) ** 2))
 
     design = kept(keeping)
     learnt = identify(brisk, CAR, design).freeze(60.0)

@@ -83,7 +83,7 @@ def test_a_freeze_within_a_block_or_at_its_ends_is_that_of_one_piece(whole, requ
             np.testing.assert_array_equal(value, found[port], err_msg=f"{port} at {index}")
     assert blocks.freeze(7.0).to_dict() == model.to_dict()
     assert learn(whole, CAR, design, t=7.0).to_dict() == model.to_dict()
-    np.testing.assert_array_equal(model.axle_force(whole), piece.freeze(7.0).axle_force(whole))
+    np.testing.assert_array_equal(model.predict(whole), piece.freeze(7.0).predict(whole))
 
 
 @pytest.mark.parametrize("method", ["axle", "integral"])

@@ -53,7 +53,7 @@ def error(force, truth):
 @pytest.mark.parametrize("name", [one for one in METHODS if not make_method(one, CAR).whole])
 def test_a_gap_of_refused_samples_costs_less_than_two_percent(name, slalom):
     rows, truth, method = rows_of(slalom), slalom.axle_force, make_method(name, CAR)
-    a_y = slalom.a_y if method.needs_a_y else None
+    a_y = slalom.a_y if "a_y" in method.needs else None
     clean = driven(method, rows, a_y)[0]
     for begin, gap in itertools.product((BEGIN, BEGIN + 30, BEGIN + 70), (20, 50, 100, 200)):
         broken = rows.copy()

@@ -31,7 +31,7 @@ def a_history(car, drive):
 def test_frozen_and_online_force_agree_at_the_instant_of_freezing(history):
     for t in (1.0, 3.21):
         k = round(t / 0.01)
-        frozen = history.freeze(t).axle_force(history.recording)
+        frozen = history.freeze(t).predict(history.recording)
         np.testing.assert_allclose(frozen[k], history.axle_force[k], rtol=1e-12)
         assert np.abs(frozen[k - 50] - history.axle_force[k - 50]).max() > 1.0
 
@@ -43,7 +43,7 @@ def test_frozen_force_is_the_network_by_hand(history, car):
     v_y, r, v_x = recording.v_y, recording.r, recording.v_x
     alpha = recording.u - np.column_stack([v_y + p.l_f * r, v_y - p.l_r * r]) / v_x[:, None]
     expected = alpha * [p.C_f, p.C_r] + 1000.0 * f_hat
-    np.testing.assert_allclose(model.axle_force(recording), expected, rtol=1e-9, atol=1e-7)
+    np.testing.assert_allclose(model.predict(recording), expected, rtol=1e-9, atol=1e-7)
 
 
 def test_freezing_at_the_end_takes_the_weights_after_the_last_sample(history):
@@ -90,7 +90,7 @@ def axles(error):
 def test_a_freeze_parts_the_past_from_what_comes_after(history):
     """The paper's measure counts t < T_freeze and compares with what was said online."""
     result, truth = reproduce(history, 4.0), history.recording.axle_force
-    frozen = history.freeze(4.0).axle_force(history.recording)
+    frozen = history.freeze(4.0).predict(history.recording)
     sides = result.reproduction
     assert axles(sides.past_against_online) == by_hand(frozen, history.axle_force, 0, 400)
     assert axles(sides.past_against_truth) == by_hand(frozen, truth, 0, 400)
@@ -127,7 +127,7 @@ def test_a_law_that_does_not_learn_reproduces_its_past_exactly(history, car):
 
 def test_sides_count_from_the_asked_time_on(history):
     sides = reproduce(history, 4.0, since=2.0).reproduction
-    frozen = history.freeze(4.0).axle_force(history.recording)
+    frozen = history.freeze(4.0).predict(history.recording)
     assert axles(sides.past_against_online) == by_hand(frozen, history.axle_force, 200, 400)
     nothing_before = reproduce(history, 4.0, since=4.5).reproduction
     assert nothing_before.past_against_online is None
@@ -166,7 +166,7 @@ def test_a_model_comes_back_from_its_file(history, tmp_path):
     model.save(tmp_path / "weights.json")
     again = load_model(tmp_path / "weights.json")
     np.testing.assert_array_equal(
-        again.axle_force(history.recording), model.axle_force(history.recording)
+        again.predict(history.recording), model.predict(history.recording)
     )
     assert (again.vehicle, again.network) == (model.vehicle, model.network)
 

@@ -35,7 +35,7 @@ def learnt(words, out):
 
 @pytest.fixture(scope="module")
 def in_si(log):
-    return ti.identify(log, CAR).freeze().cornering_stiffness
+    return ti.identify(log, CAR).freeze().stiffness
 
 
 def test_mdf_with_three_rates_a_gap_and_a_hand_wheel(log, car, in_si, tmp_path, capsys):

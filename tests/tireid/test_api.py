@@ -104,7 +104,7 @@ def test_python_m_tireid_is_the_command_line():
 
 def test_the_shortest_way_learns_the_tires(run, log):
     tire = run.freeze()
-    assert np.array_equal(tire.predict(log), run.freeze(t=log.t[-1]).axle_force(log))
+    assert np.array_equal(tire.predict(log), run.freeze(t=log.t[-1]).predict(log))
     missed = ti.replay(log, tire)
     rms = np.sqrt(np.mean((tire.predict(log) - log.axle_force) ** 2, axis=0))
     assert np.allclose([missed.against_truth.front, missed.against_truth.rear], rms)
@@ -127,14 +127,14 @@ def test_the_command_and_the_function_write_the_same_model(logs, run, tmp_path, 
 def test_the_tire_of_a_run_is_what_it_freezes_to_with_a_calibrated_band(log, car):
     run = ti.identify(log, car, "axle")
     tire, frozen = run.tire, run.freeze()
-    assert tire.band_calibrated and "calibrated on the drive" in tire.summary()
-    assert not frozen.band_calibrated and "run.tire calibrates it" in frozen.summary()
+    assert tire.band.calibrated and "calibrated on the drive" in tire.summary()
+    assert not frozen.band.calibrated and "run.tire calibrates it" in frozen.summary()
     checked = {name: tire.to_dict()[name] for name in ("band", "force_missed")}
     assert tire.to_dict() == frozen.to_dict() | checked
     surely = run.guarantee(0.3)
     slip = np.array([0.02])
     assert surely.guarantee is not None
-    assert np.array_equal(surely.half_band(slip), tire.half_band(slip))
+    assert np.array_equal(surely.band.half(slip), tire.band.half(slip))
 
 
 def test_a_run_says_once_whether_it_is_good(log, car, monkeypatch):
@@ -384,9 +384,7 @@ def test_force_is_what_a_straight_drifting_car_would_be_told(tires, car, name):
     small = name in ("integral", "linear")  # their slip angle is that of (3)
     v_y = -v_x * (alpha if small else np.tan(alpha))
     steering, bias = 0.0, 0.0  # of the sensors, where a model takes them off
-    if name == "axle":
-        steering, bias = tire.own[:, 2]
-    elif isinstance(tire, CurveModel):
+    if name == "axle" or isinstance(tire, CurveModel):
         steering, bias = tire.offset
     v_y += bias
     drifting = ti.Recording(

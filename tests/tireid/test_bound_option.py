@@ -28,13 +28,13 @@ def result(words, tmp_path_factory):
 
 def test_the_files_hold_what_is_guaranteed(result):
     model = load_model(result / "weights.json")
-    assert model.calibration is not None and not model.guarantee.given
+    assert model.calibration is not None and not model.guarantee.possible.given
     head, *rows = (result / "curve.csv").read_text(encoding="utf-8").splitlines()
     names = head.split(",")
     table = np.array([[float(cell) for cell in row.split(",")] for row in rows])
     ends = ["Fyf_least_N", "Fyr_least_N", "Fyf_most_N", "Fyr_most_N"]
     assert names[-4:] == ends
-    limits = np.hstack(model.guaranteed_band(table[:, 0]))
+    limits = np.hstack(model.guarantee.at(table[:, 0]))
     np.testing.assert_allclose(table[:, -4:], limits, rtol=1e-6, atol=1e-3)
     page = (result / "report.html").read_text(encoding="utf-8")
     assert "Guaranteed at the end of the known slip" in page and "estimated from the drive" in page
@@ -61,7 +61,7 @@ def test_another_drive_is_set_against_the_guarantee(result, logs, tmp_path, caps
 def test_a_bound_that_is_told_is_taken_or_refused_in_one_line(words, tmp_path, capsys, undrawn):
     out = tmp_path / "out"
     assert main([*words, "axle", "--bound", "0.3", "0.02", "--out", str(out)]) == 0
-    bound = load_model(out / "weights.json").guarantee.bound
+    bound = load_model(out / "weights.json").guarantee.possible.bound
     assert bound.error == (0.3, 0.3) and bound.lateness == (0.02, 0.02)
     for numbers, said in (
         (["0.0005"], "is violated at the"),

@@ -55,7 +55,7 @@ def add_parser(commands):
 
 def run(options):
     slip = np.linspace(-0.1, 0.1, 21)
-    force = load_model(options.model).force_at(slip)
+    force = load_model(options.model).force(slip)
     np.savetxt(options.out, np.column_stack([slip, force]), delimiter=",")
 '''
 
@@ -95,7 +95,7 @@ def test_an_exporter_is_a_command_that_reads_a_model(tmp_path, capsys):
     tire.save(tmp_path / "model.json")
     assert main(["points", str(tmp_path / "model.json"), str(tmp_path / "points.csv")]) == 0
     points = np.loadtxt(tmp_path / "points.csv", delimiter=",")
-    np.testing.assert_allclose(points[:, 1:], tire.force_at(points[:, 0]), rtol=1e-12)
+    np.testing.assert_allclose(points[:, 1:], tire.force(points[:, 0]), rtol=1e-12)
     listed = build_parser([]).format_help()
     assert "the curves of a model as points" in listed
     assert "their_command" in sys.modules

@@ -280,7 +280,7 @@ def test_every_axle_has_its_own_curves_in_the_slip_figure() -> None:
             -np.arctan((recording.v_y - 1.5 * recording.r) / recording.v_x),
         ]
     )
-    frozen = model.axle_force(recording)
+    frozen = model.predict(recording)
     assert recording.axle_force is not None
     for axle, axes in enumerate(figure.axes[:2]):
         drawn = {
@@ -332,7 +332,7 @@ def test_the_band_is_drawn_around_the_curve_of_each_axle() -> None:
         (band,) = [one for one in axes.collections if one.get_label() == "band of 90 %"]
         corners = np.array(band.get_paths()[0].vertices)
         slip = np.radians(np.unique(corners[:, 0])[20:-20:10])
-        sides = [f[:, axle] / 1e3 for f in model.band(slip) or ()]
+        sides = [f[:, axle] / 1e3 for f in model.band.at(slip)]
         for at, low, high in zip(slip, *sides, strict=True):
             drawn = corners[np.isclose(np.radians(corners[:, 0]), at), 1]
             assert drawn.min() == pytest.approx(low) and drawn.max() == pytest.approx(high)
@@ -484,7 +484,7 @@ def test_below_the_curve_stands_what_the_model_misses_of_the_truth() -> None:
     model = unlike_axles()
     figure = slip_figure(model, history.recording)
     assert history.recording.axle_force is not None
-    missed = (model.axle_force(history.recording) - history.recording.axle_force) / 1e3
+    missed = (model.predict(history.recording) - history.recording.axle_force) / 1e3
     for axle, axes in enumerate(figure.axes[2:]):
         _, cloud = axes.lines
         above = figure.axes[axle].lines[0]

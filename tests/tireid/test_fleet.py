@@ -365,7 +365,7 @@ def test_a_row_tells_how_its_log_was_driven_and_what_was_learnt(store, logs):
     assert row.seconds == log.t[-1] - log.t[0] and row.estimated_v_y is False
     model = row.frozen
     for i, axle in enumerate(("front", "rear")):
-        assert getattr(row, f"stiffness_{axle}") == model.cornering_stiffness[i]
+        assert getattr(row, f"stiffness_{axle}") == model.stiffness[i]
         assert getattr(row, f"grip_{axle}") == pytest.approx(math.exp(model[f"ln_grip_{axle[0]}"]))
         assert getattr(row, f"relaxation_{axle}") == model.relaxation_length[i]
         assert getattr(row, f"known_{axle}") == model.known_slip[i]
@@ -591,7 +591,7 @@ def test_models_are_merged_by_what_logs_have_in_common(store, tmp_path, capsys):
     ]  # fmt: skip
     assert sum(one["logs"] for one in told) >= 4 * DAYS
     model = load_model(out / told[0]["file"])
-    assert model.cornering_stiffness == pytest.approx(told[0]["cornering_stiffness_N_rad"])
+    assert model.stiffness == pytest.approx(told[0]["cornering_stiffness_N_rad"])
     assert "blue 2026-W09" in capsys.readouterr().out
 
 
@@ -613,7 +613,7 @@ def test_stiffness_of_a_small_car_has_digits_in_the_table(store):
     small = replace(group.model, vehicle=replace(group.model.vehicle, **loads))
     words = command._table([replace(group, model=small)]).split("kN/rad")[0].replace(",", "")
     told = [float(one) for one in re.findall(r"([\d.]+) ±", words)[-2:]]
-    assert told == pytest.approx(small.cornering_stiffness / 1e3, rel=0.02)
+    assert told == pytest.approx(small.stiffness / 1e3, rel=0.02)
 
 
 def test_cars_of_another_kind_are_not_merged(store):
@@ -636,14 +636,14 @@ def test_the_next_car_starts_where_the_fleet_is(store, tmp_path):
     assert main(words) == 0
     prior = load_model(out)
     groups = merge(lambda: used(Store(store).rows()), ["vehicle"])
-    fleet = np.mean([one.model.cornering_stiffness for one in groups], axis=0)
-    told = fleet_model(sedan()).cornering_stiffness
-    assert np.abs(prior.cornering_stiffness - fleet).max() < 0.8 * np.abs(told - fleet).max()
+    fleet = np.mean([one.model.stiffness for one in groups], axis=0)
+    told = fleet_model(sedan()).stiffness
+    assert np.abs(prior.stiffness - fleet).max() < 0.8 * np.abs(told - fleet).max()
     recording = read_recording("red/summer/2026-03-01-quick.csv")
     short = recording[0.0:1.5]
     begun = identify(short, prior.vehicle, start=prior, check=False).tire
     afresh = identify(short, prior.vehicle, check=False).tire
-    away = [np.abs(one.cornering_stiffness - fleet).max() for one in (begun, afresh)]
+    away = [np.abs(one.stiffness - fleet).max() for one in (begun, afresh)]
     assert away[0] < away[1]
     with pytest.raises(MergeError, match="no log of the store can be used"):
         fleet_prior([])

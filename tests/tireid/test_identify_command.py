@@ -71,7 +71,7 @@ def test_summary_has_the_documented_keys_and_the_right_numbers(result, logs):
     else:
         assert certificate["verdict"] in ("pass", "warn", "fail")
     quick = read_recording(logs / "quick.csv")
-    force = load_model(result / "weights.json").axle_force(quick)
+    force = load_model(result / "weights.json").predict(quick)
     front, rear = np.sqrt(np.mean((force - quick.axle_force) ** 2, axis=0))
     assert rmse["frozen"]["8"]["quick"] == pytest.approx({"front": front, "rear": rear})
     rms = np.sqrt(np.mean(quick.axle_force**2, axis=0))
@@ -165,9 +165,7 @@ def test_slip_angles_and_forces_of_every_axle_are_in_its_own_column(result, logs
         np.testing.assert_allclose(
             written, np.column_stack([truth["Fyf"], truth["Fyr"]]), rtol=1e-6, atol=1e-3
         )
-        frozen = load_model(result / "weights_4s.json").axle_force(
-            read_recording(logs / f"{log}.csv")
-        )
+        frozen = load_model(result / "weights_4s.json").predict(read_recording(logs / f"{log}.csv"))
         written = np.column_stack([told["Fyf_frozen_4s_N"], told["Fyr_frozen_4s_N"]])
         np.testing.assert_allclose(written, frozen, rtol=1e-6, atol=1e-3)
 
@@ -269,7 +267,7 @@ def test_the_curve_is_that_of_the_model_and_says_where_it_is_known(result):
     names = head.split(",")
     assert names[:3] == ["slip_rad", "Fyf_N", "Fyr_N"]
     slip = table[:, 0]
-    np.testing.assert_allclose(table[:, 1:3], model.force_at(slip), rtol=1e-6, atol=1e-3)
+    np.testing.assert_allclose(table[:, 1:3], model.force(slip), rtol=1e-6, atol=1e-3)
     assert (names[3:5] == ["front_known", "rear_known"]) == (model.known_slip is not None)
     if model.known_slip is not None:
         for axle, known in enumerate(model.known_slip):
@@ -277,15 +275,15 @@ def test_the_curve_is_that_of_the_model_and_says_where_it_is_known(result):
             inside = np.abs(slip) <= known
             np.testing.assert_array_equal((table[:, 3 + axle] == 1.0)[clear], inside[clear])
             assert 0.0 < table[:, 3 + axle].mean() < 1.0
-    band = model.band(slip)
     ends = ["Fyf_low_N", "Fyr_low_N", "Fyf_high_N", "Fyr_high_N"]
-    assert (names[5:] == ends) == (band is not None)
-    if band is not None:
-        np.testing.assert_allclose(table[:, 5:], np.hstack(band), rtol=1e-6, atol=1e-3)
-        assert model.band_calibrated  # the weights file keeps it
+    assert (names[5:] == ends) == (model.band is not None)
+    if model.band is not None:
+        sides = np.hstack(model.band.at(slip))
+        np.testing.assert_allclose(table[:, 5:], sides, rtol=1e-6, atol=1e-3)
+        assert model.band.calibrated  # the weights file keeps it
         page = (result / "report.html").read_text()
         assert "nine of ten forces of other drives" in page
-        assert model.band_origin in page
+        assert model.band.origin in page
 
 
 def test_a_log_without_forces_has_no_error_against_them(logs, tmp_path, laid_out):
@@ -554,7 +552,7 @@ def test_every_method_with_a_model_writes_all_of_its_files(logs, tmp_path, name,
             assert len(columns) == np.size(values) * (values is not None)
         else:
             assert columns == ["own_1", "own_2"]
-            assert [told[one][-1] for one in columns] == pytest.approx(model.own[:, 0], rel=1e-3)
+            assert [told[one][-1] for one in columns] == pytest.approx(model.compliance, rel=1e-3)
 
 
 def verdict_of(out):
@@ -562,12 +560,12 @@ def verdict_of(out):
 
 
 def test_an_axle_that_does_not_push_is_not_handed_on(logs, tmp_path, monkeypatch, laid_out):
-    whole = FittedModel.axle_force
+    whole = FittedModel.predict
     words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
     for number, share in enumerate(([1.0, 0.004], [1.0, -1.0])):
         dying = np.array(share)
         monkeypatch.setattr(
-            FittedModel, "axle_force", lambda self, drive, dying=dying: whole(self, drive) * dying
+            FittedModel, "predict", lambda self, drive, dying=dying: whole(self, drive) * dying
         )
         out = tmp_path / str(number)
         assert main([*words, "--out", str(out)]) == 3
@@ -579,10 +577,9 @@ def test_an_axle_that_does_not_push_is_not_handed_on(logs, tmp_path, monkeypatch
 def test_what_cannot_be_read_back_as_tires_is_refused_by_the_name_of_its_log(
     logs, tmp_path, monkeypatch, capsys
 ):
-    whole = FittedModel.force_at
-    monkeypatch.setattr(
-        FittedModel, "force_at", lambda self, alpha: whole(self, alpha) * [1.0, -1.0]
-    )
+    whole = FittedModel._steady
+    turned = lambda self, alpha, v_x: whole(self, alpha, v_x) * [1.0, -1.0]  # noqa: E731
+    monkeypatch.setattr(FittedModel, "_steady", turned)
     words = ["identify", logs / "slalom.csv", "--vehicle", logs / "car.toml"]
     line = refusal(capsys, [*words, "--out", tmp_path / "out"])
     assert "slalom: at 8 s no tires were identified: axle forces must rise with slip" in line
@@ -629,7 +626,7 @@ def test_the_stiffness_of_a_slide_is_the_slope_of_the_steady_curve(law):
     car = sedan()
     method = make_method(law, car)
     model = method.frozen(car, method.setup(car).carry)
-    force = model.force_at(np.array([-SLIP, SLIP]))
+    force = model.force(np.array([-SLIP, SLIP]))
     slope = (force[1] - force[0]) / (2.0 * SLIP)
     assert steady_stiffness(model, 10.0) == pytest.approx(slope, rel=0.02)
     assert (slope > 1e4).all()

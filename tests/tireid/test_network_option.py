@@ -83,7 +83,7 @@ def test_what_a_learnt_model_leaves_is_left_too(words, logs, tmp_path):
     out, quick = tmp_path / "out", read_recording(logs / "quick.csv")
     for name in ("slip", "slip_quick", "replay_slalom", "replay_quick", "inputs"):
         assert (out / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-    stored = load_model(out / "weights.json").axle_force(quick)
+    stored = load_model(out / "weights.json").predict(quick)
     curves = np.genfromtxt(out / "forces_quick.csv", delimiter=",", names=True)
     np.testing.assert_allclose(curves["Fyf_network_N"], stored[:, 0], rtol=1e-6, atol=1e-2)
     assert "Fyr_online_N" in curves.dtype.names
@@ -141,7 +141,7 @@ def test_a_model_of_ours_comes_back_as_a_network(logs, tmp_path, rng):
     recording = read_recording(logs / "quick.csv")
     method = FrozenMethod(model=back)
     history = identify(recording, CAR, method)
-    expected = model.axle_force(recording)
+    expected = model.predict(recording)
     assert np.abs(history.axle_force - expected).max() < 1e-9 * np.abs(expected).max()
     assert history.freeze(5.0) is back
     assert history.diverged_at is None
@@ -151,7 +151,7 @@ def test_a_network_cannot_be_learnt_on_from_a_model():
     method = make_method("linear", CAR)
     with pytest.raises(ValueError, match="dt must be positive"):
         FrozenMethod(model=method, dt=0.0)
-    with pytest.raises(ValueError, match="learns nothing"):
+    with pytest.raises(ValueError, match="learns no tire"):
         FrozenMethod(model=method).setup(CAR, start=object())
 
 

@@ -102,8 +102,8 @@ def test_another_angle_is_the_only_new_question_that_a_second_step_can_ask():
         delta_f=-recording.delta_f,
         delta_r=-recording.delta_r,
     )
-    force = model.axle_force(recording)
-    np.testing.assert_array_equal(model.axle_force(mirrored), -force)
+    force = model.predict(recording)
+    np.testing.assert_array_equal(model.predict(mirrored), -force)
     assert np.abs(force[recording.t < 28.0]).max() < 1.0  # N
 
 

@@ -84,7 +84,7 @@ def remarks(comparison: Comparison) -> list[str]:
         if name in methods():
             method = make_method(name, comparison.course.vehicle, comparison.seed)
             notes.setdefault(method.remark, []).append(name)
-            if not method.needs_v_y:
+            if "v_y" not in method.needs:
                 notes.setdefault(_NOT_SHOWN, []).append(name)
     for name, why in comparison.left_out.items():
         notes.setdefault(why, []).append(name)

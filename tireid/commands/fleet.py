@@ -267,7 +267,7 @@ def _merge(options: argparse.Namespace) -> int:
         for k, one in enumerate(groups):
             file = f"model-{k:04d}.json"
             one.model.save(folder / file)
-            C = one.model.cornering_stiffness
+            C = one.model.stiffness
             table.append(
                 {
                     **dict(one.key),

@@ -206,7 +206,8 @@ def _require_model(law: str, design: Method, vehicle: Vehicle) -> None:
 def _require_tires(learnt: History, t: float) -> None:
     """Refuse what was learnt of a log that no tires made: it could not be read back."""
     try:
-        require_alive(FrozenModelError, learnt.freeze(t))
+        tires = learnt.freeze(t)
+        require_alive(FrozenModelError, tires.force, tires.vehicle)
     except FrozenModelError as error:
         raise FrozenModelError(
             f"{learnt.recording.name}: at {freeze_key(t)} s no tires were identified: {error}"

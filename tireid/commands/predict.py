@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks
 from codegen.escape import visible
+from identifier.band import UNCALIBRATED
 from identifier.frozen import vehicle_numbers
 from identifier.prediction import Prediction
 from identifier.reproducibility import beyond_known
-from identifier.tire_model import UNCALIBRATED, TireModel
+from identifier.tire_model import TireModel
 from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
 from identifier.verdict.verdict import PERCENT
 from models.files import digest
@@ -151,7 +152,9 @@ class _Facts(NamedTuple):
     @classmethod
     def of(cls, prediction: Prediction) -> "_Facts":
         model, recording = prediction.model, prediction.recording
-        half, truth, held = model.half_band_over(recording), recording.axle_force, None
+        half, truth, held = None, recording.axle_force, None
+        if model.band is not None:
+            half = model.band.over(recording)
         if half is not None and truth is not None and (half > 0.0).any():
             inside = (np.abs(prediction.axle_force - truth) <= half) & (half > 0.0)
             held = inside.sum(axis=0) / np.maximum((half > 0.0).sum(axis=0), 1)
@@ -248,7 +251,7 @@ def _prediction_text(prediction: Prediction, friction: RoadFriction | None, fact
         )
     if facts.against is not None:
         lines.append(_contradiction_line(*facts.against))
-    if model.has_band and not model.band_calibrated:
+    if model.band is not None and not model.band.calibrated:
         lines.append(f"friction: not observable, the band is {UNCALIBRATED}")
     if friction is not None and not friction.roads:
         lines.append(

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from codegen import find_compiler
+from identifier.axle import AxleIdentifier, AxleModel
+from identifier.axle.curve import LADDER
 from identifier.inertial import InertialIdentifier
 from identifier.methods import continuing
 from identifier.run import OnlineIdentifier
@@ -101,11 +103,13 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
 
     v_y is there, measured or estimated: what was learnt without it goes on by the axle identifier.
     """
-    learnt = learnt.beside_v_y()
+    learnt = learnt.in_units(LADDER)
     try:
         method = continuing(learnt, vehicle, PERIOD)
     except ValueError as error:
         raise ValueError(f"--tires learning: {error}") from None
+    if learnt.kind == AxleModel.kind:
+        method = AxleIdentifier.for_vehicle(vehicle, dt=PERIOD)
     identifier = OnlineIdentifier(method, vehicle, PERIOD, learnt)
     return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)))
 
@@ -210,7 +214,7 @@ def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> Prediction
     if label == ORACLE:
         return setup.oracle()
     assert learnt is not None
-    return prediction_tire(learnt.beside_v_y() if label == LEARNING else learnt, setup.vehicle)
+    return prediction_tire(learnt.in_units(LADDER) if label == LEARNING else learnt, setup.vehicle)
 
 
 def run_drive(

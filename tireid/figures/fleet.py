@@ -69,7 +69,7 @@ def curves_figure(groups: Sequence[Merged]) -> Figure:
         for i, axes in enumerate(panels):
             known = float(one.model.known_slip[i])
             slip = np.linspace(0.0, known or _SLIP, 100)
-            force = one.model.force_at(slip)[:, i] / one.model.vehicle.axle_loads[i]
+            force = np.asarray(one.model.force(slip))[:, i] / one.model.vehicle.axle_loads[i]
             style = "-" if known else ":"
             axes.plot(np.degrees(slip), force, style, color=color, label=label)
     for axes in panels:

@@ -8,8 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from codegen.arrays import Array
-from identifier.axle.band import LEVEL, BandSpread
+from identifier.axle.band import declared_spread
 from identifier.axle.curve import unit_matrix
+from identifier.band import LEVEL
 from identifier.plan import Plan
 from tireid.figures import style
 
@@ -98,4 +99,4 @@ def _half_band(units: Array, force: Array, P: Array, prior: Array) -> Array:
     """Return half the width of the band [static axle loads], (k,)."""
     n = units.shape[1]
     left, before = (np.einsum("ki,ij,kj->k", units, Q[:n, :n], units) for Q in (P, prior))
-    return BandSpread.of(force, left, before).half_width(np.ones(units.shape[0]), LEVEL)
+    return declared_spread(force, left, before).half_width(1.0, LEVEL)

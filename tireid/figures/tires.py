@@ -48,7 +48,7 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         )
     if not (recording.v_x >= model.min_speed).any():
         raise ValueError(f"{recording.name}: v_x never reaches {model.min_speed:g} m/s")
-    vehicle, force = model.vehicle, model.axle_force(recording)
+    vehicle, force = model.vehicle, model.predict(recording)
     known, color, label = recording.axle_force, style.BLACK, "truth"
     if known is None and online is not None:
         known, color, label = online.axle_force, style.BLUE, "online"
@@ -101,13 +101,12 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
     """Draw the steady curve of an axle, in its band where it has one."""
     degrees = np.linspace(float(ends[0]), float(ends[1]), 200)
     slip = np.deg2rad(degrees)
-    band = model.band(slip)
-    if band is not None:  # under the points, which it would make grey
+    if model.band is not None:  # under the points, which it would make grey
         edge: Mapping[str, Any] = {"edgecolor": style.BLUE, "linewidth": 0.4, "zorder": 1.5}
-        low, high = (force[:, axle] / newtons for force in band)
+        low, high = (force[:, axle] / newtons for force in model.band.at(slip))
         axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=_BAND, **edge)
     look: Mapping[str, Any] = {"color": style.PURPLE, "linewidth": 0.9, "linestyle": "--"}
-    for side in model.guaranteed_band(slip) or ():
+    for side in () if model.guarantee is None else model.guarantee.at(slip):
         axes.plot(degrees, side[:, axle] / newtons, label=_GUARANTEED, **look)
     label = f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}"
     look = {"color": style.BLUE, "linewidth": 1.2, "zorder": 4, "label": label}

@@ -373,7 +373,7 @@ def _judged(model: FittedModel, recording: Recording) -> dict[str, Any]:
 
 def _of_model(model: FittedModel) -> dict[str, Any]:
     numbers = {
-        "stiffness": model.cornering_stiffness,
+        "stiffness": model.stiffness,
         "grip": np.exp([model["ln_grip_f"], model["ln_grip_r"]]),
         "relaxation": model.relaxation_length,
         "known": model.known_slip,

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from identifier.axle.guarantee import Guarantee
 from identifier.doctor import Diagnosis
 from identifier.measured import with_doubt
 from identifier.reproducibility import (
@@ -215,27 +214,26 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
 
 def band_sentence(model: TireModel) -> str:
     """Return how wide the band is where slip is known, in words; empty where there is none."""
-    known = model.known_slip
-    half = None if known is None else model.half_band(known)
-    if known is None or half is None or not (known > 0.0).all():
+    known, band = model.known_slip, model.band
+    if known is None or band is None or not (known > 0.0).all():
         return ""
-    at = model.force(known)
+    at, half = model.force(known), band.half(known)
     shares = [100.0 * float(half[i, i]) / max(abs(float(at[i, i])), 1.0) for i in range(2)]
     return (
         "The band is where nine of ten forces of other drives are to be expected: at the end of "
         f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear). Its "
-        f"width: {model.band_origin}. Where slip is not known it widens to the prior."
+        f"width: {band.origin}. Where slip is not known it widens to the prior."
     )
 
 
 def guaranteed_sentence(model: TireModel) -> str:
     """Return which forces are guaranteed where slip is known, in words; empty where none are."""
-    known, given = model.known_slip, getattr(model, "guarantee", None)
-    limits = None if known is None else model.guaranteed_band(known)
-    if known is None or not isinstance(given, Guarantee) or limits is None:
+    known, guarantee = model.known_slip, model.guarantee
+    if known is None or guarantee is None:
         return ""
-    low, high = (np.diag(side) / model.vehicle.axle_loads for side in limits)
+    low, high = (np.diag(side) / model.vehicle.axle_loads for side in guarantee.at(known))
     ends = [f"{least:.2f} to {most:.2f}" for least, most in zip(low, high, strict=True)]
+    given = guarantee.possible
     front, rear = given.bound.error
     late_front, late_rear = (1e3 * tau for tau in given.bound.lateness)
     fast_front, fast_rear = given.fastest

@@ -269,8 +269,7 @@ class HorizonEstimator(Method):
     """
 
     ports = _OWN_PORTS
-    needs_v_y = False  # it tells one
-    needs_a_y = True
+    needs = ("a_y",)  # it estimates v_y
 
     filter: SlipFilter
     window: float

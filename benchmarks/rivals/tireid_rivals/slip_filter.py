@@ -21,7 +21,7 @@ from codegen.arrays import Array
 from identifier.baselines.curves import CURVES, CurveModel
 from identifier.baselines.kalman import corrected
 from identifier.baselines.ports import WITH_A_Y, axle_loads, given_ports
-from identifier.method import Method, resumed
+from identifier.method import Method, require_fresh, resumed
 from identifier.setup import AXLE_FORCE, COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters
@@ -176,8 +176,7 @@ class SlipFilter(Method):
 
     ports = PORTS
     estimates = "lateral velocity"
-    needs_v_y = False  # it tells one
-    needs_a_y = True
+    needs = ("a_y",)  # it estimates v_y
 
     tire: str
     r_noise: float
@@ -235,7 +234,7 @@ class SlipFilter(Method):
         """Return what a run needs; a frozen curve of its kind may begin it, else the prior does."""
         theta = np.zeros(TIRES[self.tire].unknowns)
         if not self.learns:
-            self.require_fresh(start)
+            require_fresh(start)
         elif start is not None:
             refusal = "the stored model is not a curve 'dugoff'"
             stored = resumed(start, CurveModel, refusal, curve="dugoff").parameters

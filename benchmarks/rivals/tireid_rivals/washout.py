@@ -15,7 +15,7 @@ import numpy as np
 from codegen import Scan
 from identifier.baselines.curves import CURVES
 from identifier.baselines.ports import WITH_A_Y, given_ports
-from identifier.method import Method
+from identifier.method import Method, require_fresh
 from identifier.setup import AXLE_FORCE, Port, Setup
 from identifier.tire_model import TireModel
 from models.rules import require_positive_fields
@@ -79,8 +79,7 @@ class Washout(Method):
     ports = PORTS
     remark = "by integration, and below its cutoff on the vehicle's linear tires"
     estimates = "lateral velocity"
-    needs_v_y = False  # it tells one
-    needs_a_y = True
+    needs = ("a_y",)  # it estimates v_y
 
     cutoff: float
     dt: float = 0.01
@@ -100,7 +99,7 @@ class Washout(Method):
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs; it begins afresh, with no stored model."""
-        self.require_fresh(start)
+        require_fresh(start)
         return Setup(
             scan=_scan(),
             carry={name: np.zeros(1) for name in CARRY},

@@ -6,7 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.extrapolate_recorded import outside_known
 from identifier.axle import AxleIdentifier, AxleModel
+from identifier.axle.model import BESIDE
 from identifier.frozen import FrozenModelError
 from identifier.run import identify
 from identifier.tire_model import load_model, stored_verdict
@@ -17,14 +19,14 @@ def test_told_another_stiffness_it_reads_off_the_true_one(car, drive):
     told = replace(car, cornering_stiffness_front=0.7e5, cornering_stiffness_rear=1.8e5)
     model = learnt(drive(amplitude=0.04), told)
     true = np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear])
-    np.testing.assert_allclose(model.cornering_stiffness, true, rtol=0.08)
+    np.testing.assert_allclose(model.stiffness, true, rtol=0.08)
     alpha = np.array([-0.04, -0.01, 0.01, 0.04])
     expected = np.column_stack([saturating(alpha, 1.4e5, 5000), saturating(alpha, 1.2e5, 4500)])
-    curve = learnt(drive(amplitude=0.06), told).force_at(alpha)
+    curve = learnt(drive(amplitude=0.06), told).force(alpha)
     np.testing.assert_allclose(curve, expected, atol=200.0)
     assert (model.relaxation_length < 0.15).all()  # the drive's tires have no lag
     early = learnt(drive(n=100, amplitude=0.0), told)
-    assert (np.abs(early.cornering_stiffness / true - 1) > 0.25).all()
+    assert (np.abs(early.stiffness / true - 1) > 0.25).all()
 
 
 def test_frozen_and_online_forces_are_one_where_nothing_is_learnt(car, drive):
@@ -33,27 +35,27 @@ def test_frozen_and_online_forces_are_one_where_nothing_is_learnt(car, drive):
     recording = drive(n=400)
     history = identify(recording, car, never)
     np.testing.assert_allclose(
-        history.freeze(0.0).axle_force(recording), history.axle_force, rtol=1e-12, atol=1e-9
+        history.freeze(0.0).predict(recording), history.axle_force, rtol=1e-12, atol=1e-9
     )
 
 
 def test_it_knows_where_it_has_been(car, drive):
     gentle, hard = drive(amplitude=0.02), drive(amplitude=0.1)
     model, expert = learnt(gentle, car), learnt(hard, car)
-    assert model.outside(gentle).mean() < 0.05
-    assert model.outside(hard).mean() > 0.3
-    assert expert.outside(hard).mean() < 0.05
+    assert outside_known(model, gentle).mean() < 0.05
+    assert outside_known(model, hard).mean() > 0.3
+    assert outside_known(expert, hard).mean() < 0.05
     slip = np.abs(gentle.alpha(car.l_f, car.l_r)).max(axis=0)
     np.testing.assert_allclose(model.known_slip, slip, rtol=0.2)
-    relative_sd = model.relative_sd(np.array([0.01, 0.1]))
+    relative_sd = model.band.relative_sd(np.array([0.01, 0.1]))
     assert (relative_sd[0] < 0.15).all()
     assert (relative_sd[1] > 2 * relative_sd[0]).all()
     design = AxleIdentifier.for_vehicle(car)
     new = design.frozen(car, design.setup(car).carry)
-    np.testing.assert_allclose(new.relative_sd(np.array([0.01, 0.1])), 1.0)
+    np.testing.assert_allclose(new.band.relative_sd(np.array([0.01, 0.1])), 1.0)
     np.testing.assert_array_equal(new.known_slip, 0.0)
-    assert new.outside(gentle)[100:].any(axis=1).mean() > 0.9
-    assert 10.0 < model.learning_time.sum(axis=1).min() <= 14.6
+    assert outside_known(new, gentle)[100:].any(axis=1).mean() > 0.9
+    assert 10.0 < model.excitation[:, 1].min() <= 14.6
 
 
 def test_slip_is_known_up_to_where_a_quarter_of_the_doubt_is_left(car):
@@ -65,7 +67,7 @@ def test_slip_is_known_up_to_where_a_quarter_of_the_doubt_is_left(car):
     seen = np.array([[0.2], [0.1]]) * np.eye(1, 9)
     for share, known in ((0.24, [0.2, 0.1]), (0.26, [0.0, 0.0]), (0.35, [0.0, 0.0])):
         model = replace(new, excitation=seen, covariance=share**2 * new.prior_covariance)
-        np.testing.assert_allclose(model.relative_sd(np.array([0.05])), share, rtol=1e-9)
+        np.testing.assert_allclose(model.band.relative_sd(np.array([0.05])), share, rtol=1e-9)
         np.testing.assert_allclose(model.known_slip, known)
     shares = np.array([0.3, 0.2])[:, None, None]
     uneven = replace(new, excitation=seen, covariance=shares**2 * new.prior_covariance)
@@ -92,7 +94,7 @@ def test_slip_is_known_up_to_where_a_quarter_of_the_doubt_is_left(car):
 
 def test_far_outside_it_saturates(car, drive):
     model = learnt(drive(amplitude=0.02), car)
-    far = np.abs(model.force_at(np.linspace(-1.5, 1.5, 61)))
+    far = np.abs(model.force(np.linspace(-1.5, 1.5, 61)))
     assert (far <= 1.5 * np.array(car.axle_loads) + 1e-6).all()
     np.testing.assert_allclose(far[0], far[1], rtol=0.01)
 
@@ -104,15 +106,18 @@ def test_learning_goes_on_from_stored_weights(car, drive, tmp_path):
     model.save(tmp_path / "weights.json")
     stored = load_model(tmp_path / "weights.json")
     assert isinstance(stored, AxleModel) and stored.to_dict() == model.to_dict()
-    np.testing.assert_array_equal(stored.axle_force(whole), model.axle_force(whole))
+    np.testing.assert_array_equal(stored.predict(whole), model.predict(whole))
+    earlier = {key: one for key, one in model.to_dict().items() if key not in BESIDE}
+    earlier["own"] = np.column_stack([model.compliance, model.sway_share, model.offset]).tolist()
+    assert AxleModel.from_dict(earlier, "earlier").to_dict() == model.to_dict()
+    with pytest.raises(FrozenModelError, match="earlier: offset is missing"):
+        AxleModel.from_dict(earlier | {"own": [[0.1, 0.0], [0.1, 0.0]]}, "earlier")
     again, afresh = identify(second, car, design, start=stored), identify(second, car, design)
     np.testing.assert_array_equal(again.state["W"][0], model.W)
     off = [np.abs(one.axle_force - second.axle_force).mean() for one in (again, afresh)]
     assert off[0] < 0.5 * off[1]
     at = np.array([0.05])
-    np.testing.assert_allclose(
-        again.freeze().force_at(at), learnt(whole, car).force_at(at), rtol=0.03
-    )
+    np.testing.assert_allclose(again.freeze().force(at), learnt(whole, car).force(at), rtol=0.03)
 
 
 def test_weights_of_another_structure_are_refused(car, drive):
@@ -140,11 +145,11 @@ def test_a_stored_model_says_whether_it_was_found_valid(car, drive, tmp_path):
     [
         ("W", None, "W is missing"),
         ("W", [[1.0, 2.0]], r"W must have shape \(2, 4\)"),
-        ("own", [[float("nan"), 0, 0], [0, 0, 0]], "own holds a number that is not finite"),
-        ("own", [[-0.1, 0, 0], [0, 0, 0]], r"compliance \[m\] must be within 0 and"),
-        ("own", [[0.1, 0, 0], [0.1, 1.5, 0]], "sway share must be within 0 and 1"),
-        ("own", [[0.1, 0, 2.5e8], [0.1, 0, 0]], r"steering offset \[rad\] must be within -1.2 and"),
-        ("own", [[0.1, 0, 0], [0.1, 0, -1e3]], r"bias of v_y \[m/s\] must be within"),
+        ("compliance", [float("nan"), 0], "compliance holds a number that is not finite"),
+        ("compliance", [-0.1, 0], r"compliance \[m\] must be within 0 and"),
+        ("sway_share", [0, 1.5], "sway share must be within 0 and 1"),
+        ("offset", [2.5e8, 0], r"steering offset \[rad\] must be within -1.2 and"),
+        ("offset", [0, -1e3], r"bias of v_y \[m/s\] must be within"),
         ("ladder", [0.01, 0.03, 0.1, 0.2], "ladder must rise by powers of two"),
         ("sway", {"frequency": -1.0, "damping": 0.3}, "frequency must lie between 0.1 and 100"),
         ("sway", {"frequency": 546.0, "damping": 0.3}, "frequency must lie between 0.1 and 100"),
@@ -183,6 +188,6 @@ def test_curves_may_be_kept_from_falling_before_a_slip(car, drive):
     assert lowest[0] < -0.01
     assert lowest[1] > -1e-9
     grid = np.linspace(0.0, until, 81)
-    assert (np.diff(history.freeze().force_at(grid), axis=0) > -1.0).all()
+    assert (np.diff(history.freeze().force(grid), axis=0) > -1.0).all()
     with pytest.raises(ValueError, match="rising_until must not be negative"):
         replace(free, rising_until=-0.1)

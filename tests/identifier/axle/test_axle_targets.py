@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from benchmarks.documents import recorded
-from benchmarks.extrapolate_recorded import AXLES, INSIDE, LIMITS, REAL_RUNS, RUNS, told_cars
+from benchmarks.extrapolate_recorded import (
+    AXLES,
+    INSIDE,
+    LIMITS,
+    REAL_RUNS,
+    RUNS,
+    outside_known,
+    told_cars,
+)
 from benchmarks.recorded_cars import DART
 from identifier.axle import AxleIdentifier
 from identifier.run import identify
@@ -53,7 +61,7 @@ def test_learnt_on_a_hard_slalom_it_knows_the_gentle_drive(car, drives):
 def test_learnt_on_a_gentle_drive_it_knows_its_range_and_says_where_it_ends(car, drives):
     hard, gentle = drives
     model = learnt(gentle, car)
-    outside = model.outside(hard)
+    outside = outside_known(model, hard)
     slip = np.abs(hard.alpha(car.l_f, car.l_r))
     reached = np.abs(gentle.alpha(car.l_f, car.l_r)).max(axis=0)
     stiffness = np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear])
@@ -66,7 +74,7 @@ def test_learnt_on_a_gentle_drive_it_knows_its_range_and_says_where_it_ends(car,
         linear = rms((told - hard.axle_force)[beyond]) / rms(hard.axle_force[beyond])
         assert missed(model, hard, beyond)[axle] < linear[axle]
         assert beyond[slip[:, axle] > 1.1 * reached[axle]].all()
-    assert model.outside(gentle).mean() < 0.1
+    assert outside_known(model, gentle).mean() < 0.1
 
 
 def test_on_a_real_small_car_it_transfers_better_than_a_linear_tire(shared_data):
@@ -78,7 +86,7 @@ def test_on_a_real_small_car_it_transfers_better_than_a_linear_tire(shared_data)
         for other in drives:
             if other is not trained:
                 moving = other.v_x > 0.8
-                error = (model.axle_force(other) - other.axle_force)[moving]
+                error = (model.predict(other) - other.axle_force)[moving]
                 misses.append(np.sqrt(np.sum(error**2) / np.sum(other.axle_force[moving] ** 2)))
     assert np.mean(misses) < 0.21
     assert max(misses) < 0.30
@@ -89,7 +97,7 @@ def test_on_the_plant_it_repeats_the_slalom_and_knows_other_maneuvers(sensors, l
     plant, rng = Plant(sedan()), np.random.default_rng(11)
     slalom = plant.simulate(WEAVE, speed=20.0).recording(sensors, rng)
     model = learnt(slalom, sedan())
-    assert (rms(model.axle_force(slalom) - slalom.axle_force) < limit).all()
+    assert (rms(model.predict(slalom) - slalom.axle_force) < limit).all()
     begin = {"onset": 1.0, "rate_limit": 1.0}
     lanes = {"amplitude": np.radians(4.5), "frequency": 0.5, "pause": 0.5, "duration": 10.0}
     for maneuver, speed in (
@@ -98,7 +106,7 @@ def test_on_the_plant_it_repeats_the_slalom_and_knows_other_maneuvers(sensors, l
         (replace(WEAVE, amplitude=np.radians(2.5), duration=15.0), 25.0),
     ):
         other = plant.simulate(maneuver, speed=speed).recording(sensors, rng)
-        assert (rms(model.axle_force(other) - other.axle_force) < 150.0).all()
+        assert (rms(model.predict(other) - other.axle_force) < 150.0).all()
 
 
 def test_a_change_of_friction_is_followed_within_two_seconds_both_ways():
@@ -119,9 +127,9 @@ def test_a_change_of_friction_is_followed_within_two_seconds_both_ways():
         assert (rms(error[later]) < 0.07 * rms(size[later])).all()
     before, after = history.freeze(13.9), history.freeze(41.9)
     slips = np.array([0.01, 0.03, 0.06])
-    ratio = after.force_at(slips) / before.force_at(slips)
+    ratio = after.force(slips) / before.force(slips)
     np.testing.assert_allclose(ratio, 1.0, atol=0.12)
-    slid = history.freeze(27.9).force_at(slips) / before.force_at(slips)
+    slid = history.freeze(27.9).force(slips) / before.force(slips)
     tire, loads = Plant(sedan()).tire, np.array(sedan().axle_loads) / 2
     icy, dry = (
         np.array([[float(tire.forces(a, 0.0, 0.0, F, mu=mu).F_y) for F in loads] for a in slips])

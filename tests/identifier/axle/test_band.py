@@ -10,12 +10,12 @@ import pytest
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.band import (
     BandCalibration,
-    BandSpread,
     colored,
     colored_variance,
-    normal_quantile,
+    declared_spread,
     ranges_of,
 )
+from identifier.band import normal_quantile
 from identifier.methods import make_method
 from identifier.run import identify
 from identifier.tire_model import load_model
@@ -53,8 +53,8 @@ def a_model(run):
 def coverage(model, recording, level=0.9):
     """Share of samples whose true force lies in the band around the replayed one (2,)."""
     slip, loads = model.lagged_slip(recording), recording.axle_force
-    half = np.column_stack([model.half_band(slip[:, i], level)[:, i] for i in range(2)])
-    inside = np.abs(model.axle_force(recording) - loads) <= half
+    half = np.column_stack([model.band.half(slip[:, i], level)[:, i] for i in range(2)])
+    inside = np.abs(model.predict(recording) - loads) <= half
     return inside[recording.t > 1.5].mean(axis=0)
 
 
@@ -74,13 +74,13 @@ def test_a_calibrated_band_follows_errors_and_a_told_one_does_not(run, model, sw
     assert rough.calibration.factors.mean() > 1.5 * model.calibration.factors.mean()
     assert told.calibration is None and run.freeze().calibration is None
     at = np.array([0.03])
-    assert (rough.half_band(at) > 1.3 * model.half_band(at)).all()
-    assert (rough.half_band(at) > 1.3 * told.half_band(at)).all()
+    assert (rough.band.half(at) > 1.3 * model.band.half(at)).all()
+    assert (rough.band.half(at) > 1.3 * told.band.half(at)).all()
 
 
 def test_calibration_leaves_the_frozen_model_as_it_is(run, model):
     frozen = run.freeze()
-    for name in ("W", "own", "covariance", "prior_covariance", "excitation"):
+    for name in ("W", "compliance", "offset", "covariance", "prior_covariance", "excitation"):
         np.testing.assert_array_equal(getattr(model, name), getattr(frozen, name))
     assert "band" not in frozen.to_dict()
     more = {"band": model.calibration.to_dict(), "force_missed": model.force_missed.tolist()}
@@ -89,20 +89,20 @@ def test_calibration_leaves_the_frozen_model_as_it_is(run, model):
 
 
 def test_a_band_widens_with_its_level_and_around_its_curve(model):
-    halves = [model.half_band(SLIP, level) for level in (0.1, 0.5, 0.9, 0.99)]
+    halves = [model.band.half(SLIP, level) for level in (0.1, 0.5, 0.9, 0.99)]
     assert all((b > a).all() for a, b in pairwise(halves))
-    low, high = model.band(SLIP)
+    low, high = model.band.at(SLIP)
     np.testing.assert_allclose(0.5 * (low + high), model.force(SLIP))
-    np.testing.assert_allclose(high - low, 2.0 * model.half_band(SLIP))
-    one = model.band(0.05, "rear", 0.8)
+    np.testing.assert_allclose(high - low, 2.0 * model.band.half(SLIP))
+    one = model.band.at(0.05, "rear", 0.8)
     assert isinstance(one[0], float) and one[0] < model.force(0.05, "rear") < one[1]
-    assert one[1] == pytest.approx(model.band([0.05], level=0.8)[1][0, 1])
+    assert one[1] == pytest.approx(model.band.at([0.05], level=0.8)[1][0, 1])
 
 
 @pytest.mark.parametrize("level", [0.0, 1.0, -0.1, 90.0, np.nan])
 def test_an_impossible_level_is_refused(model, level):
     with pytest.raises(ValueError, match="level must be above 0 and below 1"):
-        model.band(0.1, level=level)
+        model.band.at(0.1, level=level)
 
 
 def test_where_nobody_was_the_band_is_the_priors(swinging, model):
@@ -111,18 +111,18 @@ def test_where_nobody_was_the_band_is_the_priors(swinging, model):
     T = np.tanh(0.3 / np.array(new.ladder))
     n, C = T.size, new.prior_covariance
     prior = np.sqrt(np.einsum("j,ajk,k->a", T, C[:, :n, :n], T)) * np.array(car.axle_loads)
-    assert (new.half_band(np.array([0.3]))[0] >= 1.64 * prior).all()
+    assert (new.band.half(np.array([0.3]))[0] >= 1.64 * prior).all()
     narrowed = replace(
         new,
         calibration=replace(
-            BandCalibration.declared(new.reference_speed),
+            BandCalibration.declared(new.band.speed),
             factors=np.full((2, 6), 0.1),
             color=np.full(2, 9.0),
         ),
     )
-    np.testing.assert_allclose(narrowed.half_band(SLIP), new.half_band(SLIP), rtol=1e-9)
+    np.testing.assert_allclose(narrowed.band.half(SLIP), new.band.half(SLIP), rtol=1e-9)
     known = float(model.known_slip.min())
-    relative = model.half_band(np.array([0.8 * known, 2.0 * known])) / model.half_band(
+    relative = model.band.half(np.array([0.8 * known, 2.0 * known])) / model.band.half(
         np.array([0.8 * known])
     )
     assert (relative[1] > 1.5).all()
@@ -133,17 +133,20 @@ def test_a_band_is_wider_where_the_car_is_slower_than_it_was_taught(model):
     assert taught == pytest.approx(20.0, rel=0.05)
     flat = replace(model, calibration=replace(model.calibration, speeds=np.ones((2, 4))))
     at = np.array([0.02])
-    slow, usual, fast = (flat.half_band(at, v_x=share * taught) for share in (0.6, 1.0, 1.5))
+    slow, usual, fast = (flat.band.half(at, v_x=share * taught) for share in (0.6, 1.0, 1.5))
     assert (slow > 1.05 * usual).all() and (fast < 0.99 * usual).all()
-    np.testing.assert_array_equal(usual, flat.half_band(at))
-    one, other = model.band(0.02, "front", v_x=12.0), model.band(0.02, "front")
+    np.testing.assert_array_equal(usual, flat.band.half(at))
+    one, other = model.band.at(0.02, "front", v_x=12.0), model.band.at(0.02, "front")
     assert one[1] - one[0] > other[1] - other[0]
     ranged = replace(flat.calibration, speeds=np.array([[1.0, 1.0, 1.0, 2.0]] * 2))
     for speed, times in ((1.0, 1.0), (3.5, 1.0), (4.0, 1.5), (4.5, 2.0), (9.0, 2.0)):
-        told, by_slip = (one.factor(at, np.array([speed])) for one in (ranged, flat.calibration))
+        told, by_slip = (
+            one.factor(np.column_stack([at, at]), np.array([speed]))
+            for one in (ranged, flat.calibration)
+        )
         np.testing.assert_allclose(told, times * by_slip)
     with pytest.raises(ValueError, match="v_x of a band must be positive, it is 0"):
-        model.band(0.02, v_x=0.0)
+        model.band.at(0.02, v_x=0.0)
 
 
 def test_a_drive_at_two_speeds_gives_each_its_own_factor(swinging):
@@ -161,31 +164,31 @@ def test_a_band_over_a_drive_holds_with_noise_in_it(model, swinging):
     """That of slip alone does not: a force is wrong by its slip, too."""
     drive, rng = swinging[1][2], np.random.default_rng(9)
     noisy = replace(drive, v_y=drive.v_y + 0.15 * rng.standard_normal(len(drive)))
-    away = np.abs(model.axle_force(noisy) - drive.axle_force)[drive.t > 1.5]
+    away = np.abs(model.predict(noisy) - drive.axle_force)[drive.t > 1.5]
     slip = model.lagged_slip(noisy)
-    curve = model.half_band_along(slip, noisy.v_x)
-    over = model.half_band_over(noisy)
+    curve = model.band.along(slip, noisy.v_x)
+    over = model.band.over(noisy)
     assert (over >= curve).all()
     held, alone = (np.mean(away <= half[drive.t > 1.5]) for half in (over, curve))
     assert held > 0.85 and alone < 0.75
     still = replace(drive, v_x=np.where(drive.t > 20.0, 0.1, drive.v_x))
-    assert (model.half_band_over(still)[-100:] == 0.0).all()
+    assert (model.band.over(still)[-100:] == 0.0).all()
 
 
 def test_on_another_road_the_band_opens_by_what_friction_may_do(model):
-    open_ = model.on_another_road()
+    open_ = model.band.on_another_road()
     np.testing.assert_array_equal(open_.W, model.W)
     grip = np.array([0.1])
-    assert (open_.half_band(grip) > 1.5 * model.half_band(grip)).all()
+    assert (open_.band.half(grip) > 1.5 * model.band.half(grip)).all()
     near = np.array([5e-4])  # friction does not change the stiffness
-    np.testing.assert_allclose(open_.half_band(near), model.half_band(near), rtol=0.1)
+    np.testing.assert_allclose(open_.band.half(near), model.band.half(near), rtol=0.1)
     for mu in (0.75, 1.3):
         alpha = np.linspace(0.04, 0.15, 20)
-        truth = mu * model.force_at(alpha / mu)
-        assert (np.abs(truth - model.force_at(alpha)) <= open_.half_band(alpha)).all()
+        truth = mu * model.force(alpha / mu)
+        assert (np.abs(truth - model.force(alpha)) <= open_.band.half(alpha)).all()
     for sd in (-0.1, np.nan):
         with pytest.raises(ValueError, match="sd_friction must be finite, not negative"):
-            model.on_another_road(sd)
+            model.band.on_another_road(sd)
 
 
 def test_a_band_survives_a_file_and_old_files_have_none(run, model, tmp_path, refused_in_one_line):
@@ -193,7 +196,7 @@ def test_a_band_survives_a_file_and_old_files_have_none(run, model, tmp_path, re
     run.freeze().save(tmp_path / "old.json")
     again, old = load_model(tmp_path / "new.json"), load_model(tmp_path / "old.json")
     assert old.calibration is None
-    np.testing.assert_array_equal(again.half_band(SLIP), model.half_band(SLIP))
+    np.testing.assert_array_equal(again.band.half(SLIP), model.band.half(SLIP))
     data = json.loads((tmp_path / "new.json").read_text())
     wrong = {
         "factors": (np.zeros((2, 6)).tolist(), "within 0.1 and 100"),
@@ -212,27 +215,25 @@ def test_a_band_survives_a_file_and_old_files_have_none(run, model, tmp_path, re
 
 
 def test_samples_fill_the_band(model):
-    drawn = model.samples(200, np.random.default_rng(1))
+    drawn = model.band.samples(200, np.random.default_rng(1))
     assert all(isinstance(one, AxleModel) for one in drawn)
     slip = np.array([0.03, 0.06, 0.2])
     away = np.abs(np.array([one.force(slip) for one in drawn]) - model.force(slip))
-    share = (away <= model.half_band(slip)).mean(axis=0)
+    share = (away <= model.band.half(slip)).mean(axis=0)
     assert (share > 0.8).all() and (share < 1.0).any()
-    assert not np.allclose(drawn[0].own, drawn[1].own)
-    assert model.samples(0, np.random.default_rng(1)) == ()
+    assert not np.allclose(drawn[0].compliance, drawn[1].compliance)
+    assert model.band.samples(0, np.random.default_rng(1)) == ()
     with pytest.raises(ValueError, match="n must not be negative"):
-        model.samples(-1, np.random.default_rng(1))
+        model.band.samples(-1, np.random.default_rng(1))
     with pytest.raises(ValueError, match="no tire is among"):
-        replace(model, W=-model.W).samples(1, np.random.default_rng(1))
+        replace(model, W=-model.W).band.samples(1, np.random.default_rng(1))
 
 
 def test_models_without_doubt_have_no_band(swinging):
     car, drives = swinging
     run = identify(drives[0], car, make_method("linear", car, 0))
     tire = calibrated(run)
-    assert tire.band(0.1) is None and within_band(tire, drives[1]) is None
-    with pytest.raises(ValueError, match="cannot tell how sure it is"):
-        tire.samples(1, np.random.default_rng(1))
+    assert tire.band is None and within_band(tire, drives[1]) is None
 
 
 def test_too_short_a_drive_leaves_the_band_as_told(swinging):
@@ -290,23 +291,23 @@ def test_the_variance_is_that_of_the_force_by_its_slope_over_what_was_learnt(mod
             W = [model.W.copy(), model.W.copy()]
             W[0][axle, j] += step
             W[1][axle, j] -= step
-            up, down = (replace(model, W=w).force_at(np.array([x]))[0, axle] for w in W)
+            up, down = (replace(model, W=w).force(np.array([x]))[0, axle] for w in W)
             slope.append((up - down) / (2.0 * step))
-        up, down = (model.force_at(np.array([x + d]))[0, axle] for d in (step, -step))
+        up, down = (model.force(np.array([x + d]))[0, axle] for d in (step, -step))
         slope += [0.0, 0.0, (up - down) / (2.0 * step) / (1.0, v_x)[axle]]
         h = np.array(slope) / model.vehicle.axle_loads[axle]
         told = replace(model, calibration=None)
-        spread = told.band_spread(np.array([x]), np.array([v_x]))
-        phi = model.force_at(np.array([x]))[0, axle] / model.vehicle.axle_loads[axle]
-        stretch = np.clip(told.reference_speed / v_x, 0.5, 2.0)
+        spread = told.band.spread(np.full((1, 2), x), np.array([v_x]), np.ones((1, 2)))
+        phi = model.force(np.array([x]))[0, axle] / model.vehicle.axle_loads[axle]
+        stretch = np.clip(told.band.speed / v_x, 0.5, 2.0)
         m2 = ((0.04 * phi) ** 2 + 0.01**2) * stretch**2
-        total = float((spread.scaled + spread.held)[0, axle])
+        total = float((spread.scaled + spread.fixed)[0, axle])
         assert total == pytest.approx(m2 + h @ model.covariance[axle] @ h, rel=1e-5)
 
 
 def test_the_needed_factor_makes_a_band_that_just_reaches():
     rng = np.random.default_rng(5)
-    spread = BandSpread.of(*rng.uniform(0.1, 1.0, (2, 40)), np.full(40, 20.0))
+    spread = declared_spread(*rng.uniform(0.1, 1.0, (2, 40)), np.full(40, 20.0))
     error = rng.uniform(0.0, 3.0, 40)
     needed = spread.needed_factor(error, 0.0)
     reached = spread.half_width(np.sqrt(needed), 0.9)

@@ -79,7 +79,7 @@ def test_without_the_comparison_a_wrong_sign_would_ruin_what_is_learnt(car, slal
     flipped = replace(slalom, a_y=-slalom.a_y)
     at = np.array([0.04])
     right, guarded, ruined = (
-        identify(log, car, one).freeze().force_at(at)
+        identify(log, car, one).freeze().force(at)
         for log, one in ((slalom, design), (flipped, design), (flipped, believing))
     )
     assert np.abs(guarded / right - 1.0).max() < 0.02

@@ -61,7 +61,7 @@ def test_what_is_declared_holds_after_every_sample(fault, speed, car, drive):
     assert (np.abs(history.axle_force) < 6 * np.array(car.axle_loads)).all()
     model = history.freeze(1e9)
     assert model.cornering_stiffness.min() >= 0.0
-    assert np.isfinite(model.axle_force(history.recording)).all()
+    assert np.isfinite(model.predict(history.recording)).all()
 
 
 @pytest.mark.parametrize("dt", [0.2, 0.3, 0.5])
@@ -180,7 +180,9 @@ def test_a_stored_covariance_that_is_too_wide_is_narrowed(car, drive):
     wide = replace(
         model,
         W=10.0 * model.W,
-        own=np.minimum(model.own + np.array([0.5, 2.0, 1.0]), [np.inf, 1.0, np.inf]),
+        compliance=model.compliance + 0.5,
+        sway_share=np.ones(2),
+        offset=model.offset + 1.0,
         covariance=300.0 * model.prior_covariance,
     )
     state = identify(recording, car, design, start=wide).state

@@ -83,13 +83,13 @@ def a_model(run):
 
 
 def test_the_told_area_leaves_the_static_curve_to_learn(model, drive):
-    np.testing.assert_allclose(model.force_at(SLIPS), static(SLIPS[:, None]), rtol=0.04)
+    np.testing.assert_allclose(model.force(SLIPS), static(SLIPS[:, None]), rtol=0.04)
     np.testing.assert_allclose(model.stiffness, STIFF, rtol=0.08)
     assert (missed(model, drive) < 0.03).all()
     assert (missed(model, race(phase=2.0)) < 0.03).all()
     untold = learnt(drive, UNTOLD).freeze()
     assert (missed(untold, drive) > 0.1).all()
-    assert (np.abs(untold.force_at(SLIPS) / static(SLIPS[:, None]) - 1.0).max(axis=0) > 0.15).all()
+    assert (np.abs(untold.force(SLIPS) / static(SLIPS[:, None]) - 1.0).max(axis=0) > 0.15).all()
 
 
 def test_the_step_repeats_the_equations_by_hand(drive):
@@ -110,17 +110,19 @@ def test_an_axle_that_lifts_keeps_a_fifth_of_its_load():
 def test_curves_with_a_speed_are_those_of_its_load(model):
     for speed in (15.0, 40.0, 70.0):
         curve = model.force(SLIPS, v_x=speed)
-        np.testing.assert_allclose(curve, model.force_at(SLIPS) * pressed(speed), rtol=1e-9)
-    np.testing.assert_allclose(model.force(SLIPS), model.force_at(SLIPS), rtol=1e-9)
-    assert model.force(0.03, "rear") == pytest.approx(model.force_at(np.array([0.03]))[0, 1])
+        np.testing.assert_allclose(curve, model.force(SLIPS) * pressed(speed), rtol=1e-9)
+    np.testing.assert_allclose(model.force(SLIPS), model.force(SLIPS), rtol=1e-9)
+    assert model.force(0.03, "rear") == pytest.approx(model.force(np.array([0.03]))[0, 1])
     assert "30 m/s" in model.summary()
-    assert "30 m/s" not in replace(model, vehicle=UNTOLD, guarantee=None).summary()
+    assert "30 m/s" not in replace(model, vehicle=UNTOLD, possible=None).summary()
 
 
 def test_motion_and_lag_are_those_of_the_replay(model, drive):
     """The replay holds slip by its closed form, the equations of motion are integrated here."""
-    soft = replace(model, own=np.array([[0.02, 0.0, 0.0], [0.03, 0.0, 0.0]]))
-    force, slip = soft.axle_force(drive), soft.lagged_slip(drive)
+    soft = replace(
+        model, compliance=np.array([0.02, 0.03]), sway_share=np.zeros(2), offset=np.zeros(2)
+    )
+    force, slip = soft.predict(drive), soft.lagged_slip(drive)
     dynamics = ca.Function("rate", *_slip_rate(soft))
     begin, before, after = ca.SX.sym("x", 2), ca.SX.sym("before", 4), ca.SX.sym("after", 4)
     x = begin
@@ -133,7 +135,7 @@ def test_motion_and_lag_are_those_of_the_replay(model, drive):
     _, found = sample.mapaccum(len(drive) - 1)(np.zeros(2), rows[:, :-1], rows[:, 1:])
     away = np.abs(np.array(found).T[100:] - force[101:]).max(axis=0)
     assert (away < 0.02 * np.abs(force).max(axis=0)).all()
-    plain = replace(soft, vehicle=UNTOLD, guarantee=None)
+    plain = replace(soft, vehicle=UNTOLD, possible=None)
     assert np.abs(plain.lagged_slip(drive) - slip).max() > 1e-3  # more slope, a longer lag
 
 
@@ -148,27 +150,27 @@ def _slip_rate(model):
 
 def test_bands_hold_at_every_speed(run, drive):
     model, other = calibrated(run), race(phase=2.0)
-    half = model.half_band_over(other)
-    inside = np.abs(model.axle_force(other) - other.axle_force) <= half
+    half = model.band.over(other)
+    inside = np.abs(model.predict(other) - other.axle_force) <= half
     fast = other.v_x > 45.0
     assert (inside[fast].mean(axis=0) > 0.85).all() and (inside[~fast].mean(axis=0) > 0.85).all()
     # The factors of a band are of ranges of speed: those of one range are compared.
-    wide = model.half_band(SLIPS, v_x=60.0) / model.half_band(SLIPS, v_x=45.0)
+    wide = model.band.half(SLIPS, v_x=60.0) / model.band.half(SLIPS, v_x=45.0)
     assert (wide > 1.05).all() and (wide < 1.8).all()
-    told = model.slope_over(other) / model.slope_at(model.lagged_slip(other))
+    told = model.band.slope_over(other) / model.slope_at(model.lagged_slip(other))
     np.testing.assert_allclose(told, pressed(other.v_x), rtol=1e-12)
 
 
 def test_a_guarantee_holds_and_a_car_that_was_told_without_contradicts_itself(run, drive):
     model, other = guaranteed(run), race(phase=2.0)
-    low, high = model.guaranteed_force(other)
+    low, high = model.guarantee.over(other)
     driven = np.isfinite(low).all(axis=1)
     assert (low[driven] <= other.axle_force[driven]).all()
     assert (other.axle_force[driven] <= high[driven]).all()
     _, against = contradictions(model, other)
     assert not against.any()
     untold = guaranteed(learnt(drive, UNTOLD))
-    assert untold.guarantee.bound.error[0] > 2.0 * model.guarantee.bound.error[0]
+    assert untold.guarantee.possible.bound.error[0] > 2.0 * model.guarantee.possible.bound.error[0]
 
 
 def test_what_is_proven_along_a_drive_is_proven_of_the_car_that_drove(run):
@@ -183,8 +185,8 @@ def test_a_file_keeps_the_downforce_and_one_without_has_no_word_of_it(model, tmp
     model.save(tmp_path / "racer.json")
     again = load_model(tmp_path / "racer.json")
     assert again.vehicle.downforce == RACER.downforce
-    np.testing.assert_array_equal(again.axle_force(drive), model.axle_force(drive))
-    assert "downforce" not in str(replace(model, vehicle=UNTOLD, guarantee=None).to_dict())
+    np.testing.assert_array_equal(again.predict(drive), model.predict(drive))
+    assert "downforce" not in str(replace(model, vehicle=UNTOLD, possible=None).to_dict())
 
 
 def test_the_certificate_states_no_time_of_a_drop_that_is_not_proven():

@@ -10,8 +10,8 @@ from identifier.axle import AxleIdentifier
 from identifier.axle.guarantee import (
     Doubt,
     ForceBound,
-    Guarantee,
     HalfSpaces,
+    PossibleWeights,
     Strips,
     force_rate,
     grip_lost,
@@ -130,12 +130,12 @@ def test_a_box_holds_brush_tires_and_no_tire_that_stiffens():
 def test_forces_of_drives_that_were_not_seen_are_inside(model):
     for seed, speed in ((4, 17.0), (5, 23.0)):
         drive = swung(seed, speed)
-        low, high = model.guaranteed_force(replace(drive, axle_force=None))
+        low, high = model.guarantee.over(replace(drive, axle_force=None))
         late = drive.t > 1.0
         assert ((low <= drive.axle_force) & (drive.axle_force <= high))[late].all()
         t, broken = contradictions(model, drive)
         assert len(t) > 100 and not broken.any()
-        away = np.abs(model.axle_force(drive) - drive.axle_force)[late].max(axis=0)
+        away = np.abs(model.predict(drive) - drive.axle_force)[late].max(axis=0)
         assert (0.5 * (high - low)[late].mean(axis=0) < 5.0 * away).all()
 
 
@@ -143,14 +143,14 @@ def test_another_road_contradicts_the_guarantee(model):
     wet = swung(4, 17.0, friction=Friction(changes=(FrictionChange(scale=0.5, at_time=6.0),)))
     t, broken = contradictions(model, wet)
     assert broken.any(axis=0).all() and t[broken.any(axis=1)][0] > 5.7
-    low, high = model.guaranteed_force(wet)
+    low, high = model.guarantee.over(wet)
     assert not ((low <= wet.axle_force) & (wet.axle_force <= high)).all()
 
 
 def test_a_told_bound_is_taken_or_its_violation_is_told(run, model):
     told = guaranteed(run, 0.3)
-    assert told.guarantee.given and not model.guarantee.given
-    assert told.guarantee.bound == ForceBound(error=(0.3, 0.3))
+    assert told.guarantee.possible.given and not model.guarantee.possible.given
+    assert told.guarantee.possible.bound == ForceBound(error=(0.3, 0.3))
     with pytest.raises(BoundViolatedError, match=r"violated at the front axle: .* from .* s on"):
         guaranteed(run, 0.002)
     for wrong in (0.0, -0.1, np.nan, 11.0):
@@ -166,28 +166,28 @@ def test_only_what_came_before_a_freeze_teaches(run):
     before = shown.until(int(np.sum(shown.t + 0.3 <= 8.0 + 1e-9)))
     corners = possible_weights(before, 0, ForceBound(error=(0.2, 0.2)), BOX)
     np.testing.assert_allclose(
-        np.sort(early.guarantee.corners[0], axis=0), np.sort(corners, axis=0), atol=1e-9
+        np.sort(early.guarantee.possible.corners[0], axis=0), np.sort(corners, axis=0), atol=1e-9
     )
 
 
 def test_a_band_is_asked_as_a_force_is(model):
-    low, high = model.guaranteed_band(0.05, "rear")
+    low, high = model.guarantee.at(0.05, "rear")
     assert low < model.force(0.05, "rear") < high
-    both = model.guaranteed_band([[0.05, 0.1]])
+    both = model.guarantee.at([[0.05, 0.1]])
     assert both[0].shape == (1, 2, 2) and both[0][0, 0, 1] == pytest.approx(low)
     fast = model.guarantee.fastest[0]
-    slow, quick = (model.guaranteed_band(0.05, "front", rate) for rate in (0.0, fast))
-    late = model.guarantee.bound.lateness[0] * fast * model.vehicle.axle_loads[0]
+    slow, quick = (model.guarantee.at(0.05, "front", rate) for rate in (0.0, fast))
+    late = model.guarantee.possible.bound.lateness[0] * fast * model.vehicle.axle_loads[0]
     assert slow[0] - quick[0] == pytest.approx(late) == quick[1] - slow[1]
     with pytest.raises(ValueError, match="axle must be front or rear"):
-        model.guaranteed_band(0.05, "left")
+        model.guarantee.at(0.05, "left")
 
 
 def test_a_stored_guarantee_comes_back(model, tmp_path):
     path = tmp_path / "weights.json"
     model.save(path)
     again = load_model(path)
-    np.testing.assert_array_equal(again.guaranteed_band(SLIP), model.guaranteed_band(SLIP))
+    np.testing.assert_array_equal(again.guarantee.at(SLIP), model.guarantee.at(SLIP))
     data = model.to_dict()
     for key, wrong in (
         ("corners", [[[1.0, 2.0]], [[1.0, 2.0]]]),
@@ -205,20 +205,20 @@ def test_a_stored_guarantee_comes_back(model, tmp_path):
 def test_a_calibrated_model_can_carry_it(run, model):
     both = guaranteed(run, model=calibrated(run))
     assert both.calibration is not None
-    np.testing.assert_array_equal(both.guaranteed_band(SLIP), model.guaranteed_band(SLIP))
+    np.testing.assert_array_equal(both.guarantee.at(SLIP), model.guarantee.at(SLIP))
 
 
 def test_without_a_set_of_weights_of_this_car_and_road_there_is_no_guarantee(run, model):
     car, log = sedan(), run.recording
     paper = guaranteed(identify(log, car, make_method("integral", car)))
-    assert paper.guaranteed_band(0.1) is None and paper.guaranteed_force(log) is None
-    assert run.freeze().guaranteed_band(0.1) is None and contradictions(paper, log) is None
+    assert paper.guarantee is None and contradictions(paper, log) is None
+    assert run.freeze().guarantee is None
     short = guaranteed(identify(log.between(0.0, 0.5), car, DESIGN))
     blind = guaranteed(identify(replace(log, v_y=None), car, make_method("inertial", car)))
     assert short.guarantee is None and blind.guarantee is None
     heavier = replace(car, mass=1.2 * car.mass)
-    for other in (model.mounted_on(heavier), model.on_another_road()):
-        assert other.guaranteed_band(0.1) is None
+    for other in (model.mounted_on(heavier), model.band.on_another_road()):
+        assert other.guarantee is None
 
 
 def test_the_rate_of_a_ramp_is_its_slope_and_fades_behind_it():
@@ -253,11 +253,13 @@ def test_a_return_from_slip_that_did_not_teach_stays_inside(model):
         units, doubt = model.signals_of(drive)
         assert np.abs(model.lagged_slip(drive)).max() > 1.5 * model.excitation[:, 0].max()
         y, late = drive.axle_force / model.vehicle.axle_loads, drive.t > 1.0
-        low, high = model.guarantee.limits(units, doubt)
+        low, high = model.guarantee.possible.limits(units, doubt)
         assert ((low <= y) & (y <= high))[late].all()
-        _, own = replace(model, guarantee=None).signals_of(drive)
+        _, own = replace(model, possible=None).signals_of(drive)
         assert (doubt.rate >= own.rate - 1e-9).all()  # the model's is possible too
-        low, high = model.guarantee.limits(units, Doubt.none(len(y))._replace(rate=own.rate))
+        low, high = model.guarantee.possible.limits(
+            units, Doubt(0.0 * own.beyond, own.rate, 0.0 * own.lost)
+        )
         assert not ((low <= y) & (y <= high))[late].all()  # the same without either
 
 
@@ -268,14 +270,14 @@ def test_what_the_car_drives_or_brakes_with_may_be_missing_sideways(model):
     pulls = replace(drive, v_x=drive.v_x + 2.0 * np.maximum(drive.t - 8.0, 0.0))  # 2 m/s² from 8 s
     units, doubt = model.signals_of(pulls)
     before, late = (drive.t > 2.0) & (drive.t < 8.0), drive.t > 10.0
-    loads, carried = model.vehicle.axle_loads, model.force_at(model.driven_slip).diagonal()
+    loads, carried = model.vehicle.axle_loads, model.force(model.driven_slip).diagonal()
     expected = 1.0 - np.sqrt(1.0 - (2.0 * model.vehicle.mass / carried) ** 2)
     np.testing.assert_allclose(doubt.lost[late].mean(axis=0), expected, rtol=0.25)
     assert (doubt.lost[before] < 0.1 * expected).all()
-    low, high = model.guarantee.limits(units, doubt)
-    least, most = model.guarantee.limits(units, doubt._replace(lost=0.0 * doubt.lost))
+    low, high = model.guarantee.possible.limits(units, doubt)
+    least, most = model.guarantee.possible.limits(units, doubt._replace(lost=0.0 * doubt.lost))
     assert (low <= least).all() and (high >= most).all()
-    reach, at = model.guarantee.reach(units), np.argmax(np.where(late, least[:, 1], -1.0))
+    reach, at = model.guarantee.possible.reach(units), np.argmax(np.where(late, least[:, 1], -1.0))
     np.testing.assert_allclose((least - low)[at, 1], (doubt.lost * reach[0])[at, 1])
     assert high[at, 1] == most[at, 1]  # nothing along the car makes more of a side force
     assert (carried / loads < 2.0).all()
@@ -283,10 +285,10 @@ def test_what_the_car_drives_or_brakes_with_may_be_missing_sideways(model):
 
 def test_the_bound_grows_with_a_rate_that_did_not_teach(model):
     """Twice as fast as anything that taught: the error may be twice as large, beside τ ρ."""
-    given, axles = model.guarantee, ("front", "rear")
+    given, axles = model.guarantee.possible, ("front", "rear")
     for i, axle in enumerate(axles):
-        unchanged = model.guaranteed_band(0.02, axle, rate=given.fastest[i])
-        twice = model.guaranteed_band(0.02, axle, rate=2.0 * given.fastest[i])
+        unchanged = model.guarantee.at(0.02, axle, rate=given.fastest[i])
+        twice = model.guarantee.at(0.02, axle, rate=2.0 * given.fastest[i])
         more = given.bound.error[i] + given.bound.lateness[i] * given.fastest[i]
         more *= model.vehicle.axle_loads[i]
         np.testing.assert_allclose(np.subtract(twice, unchanged), [-more, more], rtol=1e-9)
@@ -298,10 +300,10 @@ def test_the_bound_grows_with_slip_that_did_not_teach(model):
         wide.allowed(np.array([[0.0, 0.5]]), np.zeros((1, 2))), [[0.1, 0.15]]
     )
     at = np.array([driven, 2.0 * driven])
-    low, high = (side[:, 0] / model.vehicle.axle_loads[0] for side in model.guaranteed_band(at))
+    low, high = (side[:, 0] / model.vehicle.axle_loads[0] for side in model.guarantee.at(at))
     units = np.repeat(np.tanh(at[:, None] / LADDER)[:, None], 2, axis=1)
-    least, most = (side[:, 0] for side in model.guarantee.reach(units))
-    error = model.guarantee.bound.error[0]
+    least, most = (side[:, 0] for side in model.guarantee.possible.reach(units))
+    error = model.guarantee.possible.bound.error[0]
     np.testing.assert_allclose(high - most, [error, 2.0 * error])
     np.testing.assert_allclose(least - low, [error, 2.0 * error])
 
@@ -309,8 +311,8 @@ def test_the_bound_grows_with_slip_that_did_not_teach(model):
 def test_an_empty_guarantee_is_refused():
     told = {"bound": ForceBound(error=(1, 1)), "given": True, "speed": 9.0}
     with pytest.raises(ValueError, match="corners"):
-        Guarantee(**told, corners=(np.ones((0, 4)),) * 2, fastest=(1.0, 1.0))
+        PossibleWeights(**told, corners=(np.ones((0, 4)),) * 2, fastest=(1.0, 1.0))
     with pytest.raises(ValueError, match="fastest force"):
-        Guarantee(**told, corners=(np.ones((1, 4)),) * 2, fastest=(1.0, 0.0))
+        PossibleWeights(**told, corners=(np.ones((1, 4)),) * 2, fastest=(1.0, 0.0))
     nowhere = HalfSpaces(np.array([[1.0], [-1.0]]), np.array([0.0, -1.0]))
     assert vertices(nowhere) is None

@@ -297,7 +297,9 @@ def assert_by_hand(design, car, recording, start=None):
     largest = np.abs(forces).max()
     np.testing.assert_allclose(history.axle_force, forces, rtol=0, atol=1e-6 * largest)
     model = history.freeze(1e9)
-    np.testing.assert_allclose(np.hstack([model.W, model.own]), hand.theta, rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(
+        np.hstack([model.W, model.beside_curve]), hand.theta, rtol=1e-4, atol=1e-6
+    )
     np.testing.assert_allclose(model.covariance, hand.P, rtol=1e-4, atol=1e-7)
     np.testing.assert_allclose(model.excitation[:, 0], hand.longest, rtol=1e-5)
     np.testing.assert_allclose(model.excitation[:, 1], hand.time, atol=0.5 * design.dt)
@@ -331,7 +333,7 @@ def test_step_repeats_the_equations_with_an_accelerometer(angle, road, car, driv
     design = replace(design, road=replace(design.road, **road))
     hand = assert_by_hand(design, car, recording)
     without = identify(replace(recording, a_y=None), car, design).freeze(1e9)
-    assert np.abs(hand.theta - np.hstack([without.W, without.own])).max() > 1e-3
+    assert np.abs(hand.theta - np.hstack([without.W, without.beside_curve])).max() > 1e-3
 
 
 def with_a_rest(recording):
@@ -366,9 +368,9 @@ def test_what_is_learnt_does_not_depend_on_the_rate(car, drive):
         for one, dt in ((slow, 0.02), (fast, 0.004))
     ]
     slips = np.array([0.01, 0.03, 0.05])
-    sds = [model.relative_sd(slips) for model in models]
+    sds = [model.band.relative_sd(slips) for model in models]
     np.testing.assert_allclose(sds[0], sds[1], rtol=0.15)
-    curves = [model.force_at(slips) for model in models]
+    curves = [model.force(slips) for model in models]
     np.testing.assert_allclose(curves[0], curves[1], rtol=0.03)
     np.testing.assert_allclose(models[0].excitation, models[1].excitation, rtol=0.1, atol=0.1)
 

@@ -26,7 +26,7 @@ def test_magic_formula_is_found_on_data_that_it_made(car, curve_drive, rng):
 def test_frozen_and_online_force_agree_at_the_instant_of_freezing(car, drive):
     history = identify(drive(n=600), car, magic_formula_ekf(car, textbook=True))
     for k in (350, 521):
-        frozen = history.freeze(0.01 * k).axle_force(history.recording)
+        frozen = history.freeze(0.01 * k).predict(history.recording)
         np.testing.assert_allclose(history.axle_force[k], frozen[k], rtol=1e-9)
         assert np.abs(frozen - history.axle_force)[: k - 100].max() > 10.0
 
@@ -39,9 +39,9 @@ def test_with_a_lag_they_agree_from_the_slip_on_that_was_carried(car, drive):
         carried = {name: history.state[name][k] for name in LAG_PORTS}
         force = setup._replace(carry=carried).output(rest, "axle_force")
         np.testing.assert_allclose(force[0], history.axle_force[k], rtol=1e-9)
-        whole = frozen.axle_force(history.recording)[k]  # the past had other parameters
+        whole = frozen.predict(history.recording)[k]  # the past had other parameters
         np.testing.assert_allclose(whole, force[0], atol=0.01 * np.abs(whole).max())
-        unlagged = replace(frozen, relaxation_length=np.zeros(2)).axle_force(history.recording)[k]
+        unlagged = replace(frozen, relaxation_length=np.zeros(2)).predict(history.recording)[k]
         assert np.abs(unlagged - whole).max() > 10.0
 
 

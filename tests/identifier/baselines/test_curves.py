@@ -35,7 +35,7 @@ def test_linear_tire_is_stiffness_times_slip_online_and_frozen(car, drive):
     alpha = recording.u - np.column_stack([v_y + car.l_f * r, v_y - car.l_r * r]) / v_x[:, None]
     expected = alpha * [car.cornering_stiffness_front, car.cornering_stiffness_rear]
     np.testing.assert_allclose(history.axle_force, expected, rtol=1e-12, atol=1e-9)
-    frozen = history.freeze(1.0).axle_force(recording)
+    frozen = history.freeze(1.0).predict(recording)
     np.testing.assert_array_equal(frozen, history.axle_force)
     with pytest.raises(ValueError, match="what learns no tire"):
         identify(recording, car, method, start=history.freeze(1.0))
@@ -43,7 +43,7 @@ def test_linear_tire_is_stiffness_times_slip_online_and_frozen(car, drive):
 
 def test_dugoff_is_the_tire_of_the_plant_at_the_static_load(car, drive):
     recording = drive(n=400, amplitude=0.15)
-    force = model_of("dugoff", car).axle_force(recording)
+    force = model_of("dugoff", car).predict(recording)
     alpha = recording.alpha(car.l_f, car.l_r)
     for i, (C, mu) in enumerate(PARAMETERS["dugoff"]):
         tire = DugoffTire(C_alpha=C, C_kappa=C, friction=mu)
@@ -57,7 +57,7 @@ def test_magic_formula_is_the_printed_formula(car, drive):
     B, C, D = np.array(PARAMETERS["magic_formula"]).T
     alpha = recording.alpha(car.l_f, car.l_r)
     expected = D * np.sin(C * np.arctan(B * alpha)) * np.cos(recording.u)
-    force = model_of("magic_formula", car).axle_force(recording)
+    force = model_of("magic_formula", car).predict(recording)
     np.testing.assert_allclose(force, expected, rtol=1e-9, atol=1e-9)
 
 
@@ -84,8 +84,8 @@ def test_slip_lags_as_scipy_solves_it_and_offsets_are_taken_off(curve, car, driv
         np.array(ca.DM(CURVES[curve].force(ca.DM(q), ca.DM(loads), ca.DM(a), ca.DM(u)))).ravel()
         for a, u in zip(np.array(slip).T, read.u, strict=True)
     ]
-    np.testing.assert_allclose(lagged.axle_force(read), expected, rtol=1e-9, atol=1e-6)
-    assert np.abs(plain.axle_force(recording) - expected).max() > 100.0, "the lag is seen"
+    np.testing.assert_allclose(lagged.predict(read), expected, rtol=1e-9, atol=1e-6)
+    assert np.abs(plain.predict(recording) - expected).max() > 100.0, "the lag is seen"
 
 
 def test_without_lag_and_offsets_nothing_is_added_to_the_slip(car, drive):
@@ -94,7 +94,7 @@ def test_without_lag_and_offsets_nothing_is_added_to_the_slip(car, drive):
     short = replace(plain, relaxation_length=np.full(2, 1e-7))
     assert short.lagged
     np.testing.assert_allclose(
-        short.axle_force(recording), plain.axle_force(recording), rtol=1e-4, atol=0.1
+        short.predict(recording), plain.predict(recording), rtol=1e-4, atol=0.1
     )
 
 
@@ -119,7 +119,7 @@ def test_a_curve_is_silent_at_rest_and_finite_in_any_slide(curve, car, drive):
     recording = drive(n=50)
     v_x, v_y = recording.v_x.copy(), recording.v_y.copy()
     v_x[:5], v_y[10:20] = 0.0, [-1e4, -50, -1, -1e-12, 0, 1e-12, 1, 50, 1e3, 1e4]
-    force = model_of(curve, car).axle_force(replace(recording, v_x=v_x, v_y=v_y))
+    force = model_of(curve, car).predict(replace(recording, v_x=v_x, v_y=v_y))
     assert (force[:5] == 0.0).all()
     assert np.isfinite(force).all()
 
@@ -132,7 +132,7 @@ def test_a_model_comes_back_from_its_file(curve, car, drive, tmp_path):
         model.save(path)
         again = load_model(path)
         assert again.vehicle == model.vehicle
-        np.testing.assert_array_equal(again.axle_force(recording), model.axle_force(recording))
+        np.testing.assert_array_equal(again.predict(recording), model.predict(recording))
 
 
 def test_a_file_without_lag_and_offsets_is_a_curve_without_them(car, tmp_path):

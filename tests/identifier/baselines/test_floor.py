@@ -34,7 +34,7 @@ def test_planted_lag_and_offsets_are_found_too(car, drive, rng):
         offset=np.array([0.003, -0.05]),
     )
     recording = drive(n=600)
-    recording = replace(recording, axle_force=true.axle_force(recording))
+    recording = replace(recording, axle_force=true.predict(recording))
     model = fit_floor(curve_structure(magic_formula_ekf(car), car), [recording], rng=rng, starts=1)
     np.testing.assert_allclose(model.relaxation_length, true.relaxation_length, rtol=1e-2)
     np.testing.assert_allclose(model.offset, true.offset, rtol=2e-2)

@@ -54,7 +54,7 @@ def test_a_log_without_a_y_teaches_too_and_one_with_it_teaches_another_tire(log,
 
 def test_it_freezes_to_the_force_that_it_told(log, car):
     history, tire = learnt(log, car)
-    force = tire.axle_force(history.recording)[-1]
+    force = tire.predict(history.recording)[-1]
     np.testing.assert_allclose(force, history.axle_force[-1], atol=0.01 * np.abs(force).max())
 
 

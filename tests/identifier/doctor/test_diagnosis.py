@@ -77,7 +77,7 @@ def test_what_is_sure_mends_the_log_as_well_as_the_right_one(driven, ratio, foun
     for one in (log, mended):
         history = identify(one, car, design)
         model = history.freeze(float(one.t[-1]))
-        errors.append(float(np.sqrt(np.mean((model.axle_force(log) - log.axle_force) ** 2))))
+        errors.append(float(np.sqrt(np.mean((model.predict(log) - log.axle_force) ** 2))))
     assert told == car
     assert errors[1] < 1.2 * errors[0]
     assert diagnose(mended, told).healthy

@@ -66,7 +66,7 @@ def off(model, ladder=None):
     """Largest difference of the projected curves on the identified range [static loads], (2,)."""
     units = model.in_units(ladder)
     slips = np.linspace(-1.0, 1.0, 201)[:, None] * model.known_slip
-    each = [model.force_at(x)[:, i] - units.force_at(x)[:, i] for i, x in enumerate(slips.T)]
+    each = [model.force(x)[:, i] - units.force(x)[:, i] for i, x in enumerate(slips.T)]
     return np.abs(each).max(axis=1) / CAR.axle_loads
 
 
@@ -93,7 +93,7 @@ def test_sensors_are_taken_over_and_the_doubt_of_an_angle_is_that_at_the_speed_o
         v_y_bias=0.02, v_y_angle=0.01, steering_zero=0.003, v_y_lever=0.2, steering_gain=0.1
     )
     units = model.in_units()
-    np.testing.assert_allclose(units.own[:, 2], [0.003, 0.02])
+    np.testing.assert_allclose(units.offset, [0.003, 0.02])
     assert units.sensors == (0.01, 0.2, 0.1)
     b, angle = INDEX["v_y_bias"], INDEX["v_y_angle"]
     P = model.covariance
@@ -108,10 +108,10 @@ def test_the_axle_identifier_goes_on_from_a_fit_with_its_doubt(fitted):
     begun = design.frozen(CAR, design.setup(CAR, fitted).carry)
     units = fitted.in_units(LADDER)
     np.testing.assert_allclose(begun.W, units.W)
-    np.testing.assert_allclose(begun.own, units.own)
+    np.testing.assert_allclose(begun.beside_curve, units.beside_curve)
     slips = np.array([0.02, 0.1])
-    assert (begun.relative_sd(slips) < 0.5 * design.frozen(CAR, design.setup(CAR).carry)
-            .relative_sd(slips)).all()  # fmt: skip
+    assert (begun.band.relative_sd(slips) < 0.5 * design.frozen(CAR, design.setup(CAR).carry)
+            .band.relative_sd(slips)).all()  # fmt: skip
 
 
 def test_going_on_from_a_fit_begins_with_its_forces(fitted, drive):
@@ -167,8 +167,8 @@ def test_a_network_file_tells_curves_and_band_of_a_fit(fitted):
     alpha = np.linspace(-0.1, 0.1, 21)
     out = session.run(None, {"alpha_f": alpha[:, None], "alpha_r": alpha[:, None]})
     loads = np.array(CAR.axle_loads)
-    assert (np.abs(np.hstack(out[:2]) - fitted.force_at(alpha)) < 0.01 * loads).all()
-    band = fitted.half_band(alpha, v_x=float(fitted.speeds.mean()))
+    assert (np.abs(np.hstack(out[:2]) - fitted.force(alpha)) < 0.01 * loads).all()
+    band = fitted.band.half(alpha, v_x=float(fitted.speeds.mean()))
     np.testing.assert_allclose(np.hstack(out[2:]), band, rtol=0.02, atol=0.001 * loads.min())
 
 
@@ -184,7 +184,7 @@ def test_a_tracker_takes_the_errors_of_the_sensors_off():
     )
     np.testing.assert_allclose([float(x) for x in tire.structure.slip(at)], expected)
     slips = DOUBT_STEP * np.arange(26)
-    np.testing.assert_allclose(tire.doubt.T, model.half_band(slips))
+    np.testing.assert_allclose(tire.doubt.T, model.band.half(slips))
 
 
 def test_a_tracker_of_a_fit_lags_and_pushes_as_the_fit_does():

@@ -17,7 +17,7 @@ GRID = np.linspace(0.005, 0.06, 12)
 
 
 def share_missed(model, recording):
-    missed = model.axle_force(recording) - recording.axle_force
+    missed = model.predict(recording) - recording.axle_force
     return np.sqrt(np.mean(missed**2, axis=0) / np.mean(recording.axle_force**2, axis=0))
 
 
@@ -41,8 +41,8 @@ def test_planted_errors_of_sensors_are_found_within_their_doubt(planted):
 def test_the_curve_predicts_a_drive_that_did_not_teach(learnt):
     other = driven(5)
     assert share_missed(learnt.model, other).max() < 0.08
-    half = learnt.model.half_band_over(other)
-    held = np.mean(np.abs(learnt.model.axle_force(other) - other.axle_force) <= half, axis=0)
+    half = learnt.model.band.over(other)
+    held = np.mean(np.abs(learnt.model.predict(other) - other.axle_force) <= half, axis=0)
     assert held.min() > 0.8
 
 
@@ -83,8 +83,10 @@ def test_two_logs_tell_more_than_one(learnt):
 def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt, monkeypatch):
     monkeypatch.setattr(fitting, "BLOCK", 8.0)
     blocks = fit([driven(3)], sedan()).model
-    np.testing.assert_allclose(blocks.force_at(GRID), learnt.model.force_at(GRID), rtol=0.05)
-    np.testing.assert_allclose(blocks.relative_sd(GRID), learnt.model.relative_sd(GRID), rtol=0.7)
+    np.testing.assert_allclose(blocks.force(GRID), learnt.model.force(GRID), rtol=0.05)
+    np.testing.assert_allclose(
+        blocks.band.relative_sd(GRID), learnt.model.band.relative_sd(GRID), rtol=0.7
+    )
 
 
 def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
@@ -96,8 +98,8 @@ def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
     ratio = segment.ratio if begins else 1.0 / segment.ratio
     assert 0.4 < ratio < 0.75
     at = np.array([DROP - 5.0, DROP + 5.0])
-    assert wet.road_differs(at).tolist() == [not begins, begins]
-    (note,) = (text for _, text in wet.notes)
+    assert wet.drives.road_differs(at).tolist() == [not begins, begins]
+    (note,) = (text for _, text in wet.drives.notes)
     assert f"{segment.ratio:.2f} ±" in note
 
 
@@ -119,9 +121,9 @@ def test_a_steering_with_play_leaves_a_curve_that_rises(learnt):
     log = driven(3)
     play = replace(log, delta_f=log.delta_f + 0.03 * np.tanh(log.delta_f / 0.001))
     model = fit([play], sedan()).model
-    assert (model.force_at(np.array([0.001, 0.02])) > 0.0).all()
-    stiffness = learnt.model.cornering_stiffness
-    np.testing.assert_allclose(model.cornering_stiffness, stiffness, rtol=0.5)
+    assert (model.force(np.array([0.001, 0.02])) > 0.0).all()
+    stiffness = learnt.model.stiffness
+    np.testing.assert_allclose(model.stiffness, stiffness, rtol=0.5)
 
 
 # A steering ratio that somebody typed is right to a few percent, or plainly wrong.

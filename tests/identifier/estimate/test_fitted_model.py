@@ -1,6 +1,7 @@
 """A fitted model as a file, in other units and sample by sample."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,14 +17,14 @@ from tireid.learning import identify
 
 
 def test_a_saved_model_is_the_same(learnt, tmp_path):
-    model = learnt.model.with_calibration(None, np.array([0.02, 0.03]))
+    model = learnt.model.band.calibrated_by(None, np.array([0.02, 0.03]))
     model.save(tmp_path / "tires.json")
     loaded = load_model(tmp_path / "tires.json")
     assert isinstance(loaded, FittedModel)
     assert loaded.to_dict() == model.to_dict()
     drive = driven(5)
-    np.testing.assert_array_equal(loaded.axle_force(drive), model.axle_force(drive))
-    np.testing.assert_array_equal(loaded.half_band_over(drive), model.half_band_over(drive))
+    np.testing.assert_array_equal(loaded.predict(drive), model.predict(drive))
+    np.testing.assert_array_equal(loaded.band.over(drive), model.band.over(drive))
 
 
 @pytest.mark.parametrize(
@@ -49,7 +50,7 @@ def test_sample_by_sample_it_says_what_it_says_of_the_drive(learnt):
     run = model.setup(drive.dt).run(drive, tuple(blocks(len(drive))), ports=("axle_force",))
     step = np.concatenate([block.outputs["axle_force"] for block in run])
     size = np.sqrt(np.mean(drive.axle_force**2, axis=0))
-    away = np.sqrt(np.mean((step - model.axle_force(drive)) ** 2, axis=0))
+    away = np.sqrt(np.mean((step - model.predict(drive)) ** 2, axis=0))
     assert (away < 0.03 * size).all()
 
 
@@ -70,19 +71,28 @@ def test_braking_takes_of_the_lateral_force_and_shifts_load(learnt):
 def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):
     model = learnt.model
     slip = np.array([0.0005, 0.05])
-    own, other = model.half_band(slip), model.on_another_road().half_band(slip)
+    own, other = model.band.half(slip), model.band.on_another_road().band.half(slip)
     np.testing.assert_allclose(other[0], own[0], rtol=0.05)  # the stiffness stays
     assert (other[1] > 2.0 * own[1]).all()
-    np.testing.assert_array_equal(model.on_another_road().force_at(slip), model.force_at(slip))
+    np.testing.assert_array_equal(model.band.on_another_road().force(slip), model.force(slip))
     with pytest.raises(ValueError, match="sd_friction"):
-        model.on_another_road(-0.1)
+        model.band.on_another_road(-0.1)
 
 
 def test_on_half_the_friction_its_stiffness_stays(learnt):
     model, slip = learnt.model, np.array([0.001, 0.02, 0.05])
     half = model.at_friction(0.5)
-    np.testing.assert_allclose(half.force_at(0.5 * slip), 0.5 * model.force_at(slip), rtol=1e-9)
-    np.testing.assert_allclose(half.cornering_stiffness, model.cornering_stiffness, rtol=1e-9)
+    np.testing.assert_allclose(half.force(0.5 * slip), 0.5 * model.force(slip), rtol=1e-9)
+    np.testing.assert_allclose(half.stiffness, model.stiffness, rtol=1e-9)
+
+
+def test_the_band_of_a_fit_grows_with_the_load(learnt):
+    pressed = replace(sedan(), downforce_area_front=1.0, downforce_area_rear=1.2)
+    slip = np.linspace(0.01, 0.1, 5)
+    cars = pressed, sedan()
+    halves = [replace(learnt.model, vehicle=car).band.half(slip, v_x=40.0) for car in cars]
+    wider = np.broadcast_to(pressed.load_ratio(40.0), (5, 2))
+    np.testing.assert_allclose(halves[0], wider * halves[1], rtol=1e-9)
 
 
 def test_grip_is_the_top_of_the_curve_and_known_slip_ends_where_a_drive_decides_the_force():

@@ -57,7 +57,7 @@ def test_logs_added_up_teach_what_they_do_at_once(drives, told):
     at_once = fit(drives, sedan())
     p, covariance = settled(PRIORS.after(sum(told, Information.nothing())), PRIORS.mean)
     added = replace(at_once.model, p=p, covariance=covariance)
-    np.testing.assert_allclose(added.force_at(SLIPS), at_once.model.force_at(SLIPS), rtol=0.02)
+    np.testing.assert_allclose(added.force(SLIPS), at_once.model.force(SLIPS), rtol=0.02)
     sd, whole = np.sqrt(np.diag(covariance)), np.sqrt(np.diag(at_once.posterior.covariance))
     on = whole > 0.0
     assert sd[on] == pytest.approx(whole[on], rel=0.3)

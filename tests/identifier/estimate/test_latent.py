@@ -195,9 +195,9 @@ def test_a_model_keeps_what_it_says_of_its_log(learnt, tmp_path):
     doubtful.save(tmp_path / "weights.json")
     again = FittedModel.load(tmp_path / "weights.json")
     assert isinstance(again, FittedModel)
-    assert again.notes == doubtful.notes
-    assert {"not_observable", "a_y_late"} <= {code for code, _ in again.notes}
-    assert not {"not_observable", "a_y_late"} & {code for code, _ in learnt.notes}
+    assert again.drives.notes == doubtful.drives.notes
+    assert {"not_observable", "a_y_late"} <= {code for code, _ in again.drives.notes}
+    assert not {"not_observable", "a_y_late"} & {code for code, _ in learnt.drives.notes}
 
 
 def test_nothing_goes_from_one_segment_to_the_next(exact):

@@ -41,7 +41,7 @@ def off(found, log):
 
 
 def share_missed(learnt, log):
-    force, truth = learnt.axle_force(log), log.axle_force
+    force, truth = learnt.predict(log), log.axle_force
     return float(np.sqrt(np.sum((force - truth) ** 2) / np.sum(truth**2)))
 
 

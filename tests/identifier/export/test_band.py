@@ -42,7 +42,7 @@ def test_the_c_tells_the_band_of_the_model(single, package, model, slalom):
     compiled.set_adaptation(False)
     drive = slalom.between(20.0, 45.0)
     told = compiled.run(drive).outputs["half_band"]
-    of_slip = model.half_band_along(model.lagged_slip(drive), drive.v_x)
+    of_slip = model.band.along(model.lagged_slip(drive), drive.v_x)
     late = drive.t > drive.t[0] + 1.0
     assert (told[late] > of_slip[late] * (1.0 - 1e-4)).all()
     silent = replace(model, calibration=replace(CALIBRATION, noise=np.zeros(3)))
@@ -51,7 +51,7 @@ def test_the_c_tells_the_band_of_the_model(single, package, model, slalom):
     again = exact.run(drive).outputs["half_band"]
     np.testing.assert_allclose(again[late], of_slip[late], rtol=2e-4 if single else 1e-6)
     narrow = replace(model, calibration=replace(CALIBRATION, factors=0.8 * CALIBRATION.factors))
-    other = narrow.half_band_along(model.lagged_slip(drive), drive.v_x)
+    other = narrow.band.along(model.lagged_slip(drive), drive.v_x)
     assert not np.allclose(again[late], other[late], rtol=1e-2)  # the alarm rings
 
 
@@ -62,8 +62,8 @@ def test_noise_widens_it_as_that_of_a_drive_with_such_sensors(package, model, sl
     compiled = CompiledPackage.of(package)
     compiled.set_adaptation(False)
     told = compiled.run(noisy).outputs["half_band"][100:, 1]
-    np.testing.assert_allclose(told, model.half_band_over(noisy)[100:, 1], rtol=0.01)
-    assert (told > 1.002 * model.half_band_over(drive)[100:, 1]).mean() > 0.5
+    np.testing.assert_allclose(told, model.band.over(noisy)[100:, 1], rtol=0.01)
+    assert (told > 1.002 * model.band.over(drive)[100:, 1]).mean() > 0.5
 
 
 def test_the_c_is_to_the_last_bit_what_casadi_says_while_it_learns_and_the_band_narrows(
@@ -152,7 +152,7 @@ def test_onnx_tells_the_band_of_the_model(single, model):
     alpha = np.linspace(-0.4, 0.4, 81)
     column = alpha[:, None].astype(np.float32 if single else np.float64)
     told = session.run(None, {"alpha_f": column, "alpha_r": column})
-    expected = np.column_stack([model.force_at(alpha), model.half_band(alpha)])
+    expected = np.column_stack([model.force(alpha), model.band.half(alpha)])
     np.testing.assert_allclose(np.hstack(told), expected, rtol=2e-4 if single else 1e-9, atol=0.1)
     assert len(runtime.InferenceSession(onnx_bytes(model)).get_outputs()) == 2
     paper = make_method("integral", CAR)

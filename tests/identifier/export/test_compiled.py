@@ -49,7 +49,7 @@ def test_frozen_c_is_the_frozen_model(law, packages, slalom):
     run.set_adaptation(False)
     run.reset()
     frozen = run.run(slalom).axle_force
-    assert np.abs(frozen - model.axle_force(slalom)).max() < 1e-6
+    assert np.abs(frozen - model.predict(slalom)).max() < 1e-6
     for name, value in run.weights.items():
         np.testing.assert_array_equal(value, learnt[name])
 

@@ -57,7 +57,7 @@ def test_onnx_has_the_curves_of_the_static_loads_and_says_so(slalom):
     session = runtime.InferenceSession(content)
     alpha = np.linspace(-0.2, 0.2, 11)
     told = session.run(None, {"alpha_f": alpha[:, None], "alpha_r": alpha[:, None]})
-    np.testing.assert_allclose(np.hstack(told), model.force_at(alpha), rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(np.hstack(told), model.force(alpha), rtol=1e-9, atol=1e-6)
     assert b"static loads" in content
     front, rear = (float(session.get_modelmeta().custom_metadata_map[f"downforce_{axle}_s2_m2"])
                    for axle in ("front", "rear"))  # fmt: skip

@@ -8,7 +8,7 @@ from datetime import date
 import numpy as np
 import pytest
 
-from identifier.axle.band import normal_quantile
+from identifier.band import normal_quantile
 from identifier.estimate.model import FittedModel
 from identifier.estimate.priors import Priors
 from identifier.export.ggv import ggv_text, limits
@@ -103,7 +103,7 @@ def test_a_property_file_says_what_it_is_and_what_it_is_not(tmp_path):
         assert part in words
     assert f"{math.degrees(model.known_slip[0]):.3g} deg" in words
     known = model.known_slip[:1]
-    half = 0.5 * model.half_band(known)[0, 0]
+    half = 0.5 * model.band.half(known)[0, 0]
     assert f"+- {half:.3g} N" in words
     assert "cannot tell how sure" in tire_properties(network(), "front")
 
@@ -120,7 +120,7 @@ def test_a_curve_that_is_no_magic_formula_has_no_property_file():
 def level(**numbers):
     """A car whose axles have one lowest friction 1.1, sure of all but its mass."""
     model = fitted(sd=1e-6, **numbers)
-    low = 1.0 - Z * model.load_doubt
+    low = 1.0 - Z * model.band.load_doubt
     grip = dict(zip(("ln_grip_f", "ln_grip_r"), np.log(1.1 / low), strict=True))
     model = fitted(sd=1e-6, **grip, **numbers)
     return replace(model, driven=np.array([0.5, 0.5]))
@@ -159,8 +159,8 @@ def test_the_diamond_of_planners_lies_within_the_forces_of_the_model(h, braking_
     grip = {"ln_grip_f": math.log(1.3), "ln_grip_r": math.log(1.25)}
     model = fitted(PRESSED, sd=1e-6, load_transfer=h, **use, **grip)
     found = limits(model)
-    low = 1.0 - Z * model.load_doubt
-    forces = [model.force_at(np.linspace(0.0, known, 300))[:, i].max()
+    low = 1.0 - Z * model.band.load_doubt
+    forces = [model.force(np.linspace(0.0, known, 300))[:, i].max()
               for i, known in enumerate(model.known_slip)]  # fmt: skip
     peak = low * forces / PRESSED.axle_loads
     coasting = -PRESSED.drag * found.v_x**2
@@ -262,7 +262,7 @@ def test_the_standard_deviation_is_that_of_linear_propagation():
     model = fitted(sd=0.2)
     found = understeer_gradient(model, np.random.default_rng(1))
     index = [INDEX[f"ln_stiffness_{axle}"] for axle in "fr"]
-    P = model.covariance[np.ix_(index, index)] + np.diag(model.error_share**2)
+    P = model.covariance[np.ix_(index, index)] + np.diag(model.band.error_share**2)
     J = np.array([-1.0, 1.0]) / np.exp(model.p[index]) / GRAVITY
     resid = [INDEX[f"residual{j}_{axle}"] for axle in "fr" for j in range(4)]
     slips = np.tile([0.01, 0.02, 0.05, 0.12], 2)
@@ -298,7 +298,7 @@ def test_the_loader_of_slipx_takes_the_folder(tmp_path):
     slipx_car(tmp_path, model)
     car = slipx.load_car(tmp_path)
     stiffness = [car.params.c_alpha_f, car.params.c_alpha_r]
-    np.testing.assert_allclose(stiffness, model.cornering_stiffness, rtol=0.1)
+    np.testing.assert_allclose(stiffness, model.stiffness, rtol=0.1)
     assert car.params.mass == SMALL.mass and car.params.lr == SMALL.l_r
     for i, tire in enumerate((car.spec.tyre_front, car.spec.tyre_rear)):
         found, load = tire.provenance.residuals, 0.5 * SMALL.axle_loads[i]
@@ -307,7 +307,7 @@ def test_the_loader_of_slipx_takes_the_folder(tmp_path):
         assert 0.0 < found["linear.c_alpha"]["stddev"] < tire.c_alpha
         slip = np.linspace(0.0, 1.0, 30) * model.known_slip[i]
         force = load * _mf_lite(slip, tire.c_alpha / load, tire.mu_y0, **tire.mf_lite)
-        expected = 0.5 * model.force_at(slip)[:, i]
+        expected = 0.5 * model.force(slip)[:, i]
         assert np.abs(force - expected).max() <= 0.02 * expected.max()
     assert "c_kappa" in _refusal(car, slipx.Tier.L2_DoubleTrack)
 

@@ -287,7 +287,7 @@ def test_without_adaptation_it_is_the_frozen_model(master):
     one.adapt(False)
     forces = one.run(rows(drive)[400:], 0.01, first=400)
     history = identify(drive, CAR, design())
-    frozen = history.freeze(drive.t[400]).axle_force(drive)[400:]
+    frozen = history.freeze(drive.t[400]).predict(drive)[400:]
     assert np.abs(forces - frozen).max() < 1e-9
     assert np.abs(frozen - history.axle_force[400:]).max() > 10  # with adaptation it moved on
 

@@ -53,7 +53,7 @@ def run(content, drive, number=np.float64):
 def test_onnxruntime_gives_the_forces_of_the_network(car, drive, rng, network, single, tolerance):
     recording = stopping(drive(400), rng)
     model = frozen(car, network, rng)
-    expected = model.axle_force(recording)
+    expected = model.predict(recording)
     number = np.float32 if single else np.float64
     forces = run(onnx_bytes(model, single=single), recording, number)
     assert forces.dtype == number
@@ -82,7 +82,7 @@ def test_the_static_curve_of_the_axle_model(car, drive, single, tolerance):
     method = make_method("axle", car)
     model = identify(recording, car, method).freeze(recording.t[-1])
     alpha = np.linspace(-0.5, 0.5, 101)
-    expected = model.force_at(alpha)
+    expected = model.force(alpha)
     session = runtime.InferenceSession(onnx_bytes(model, single=single))
     column = alpha[:, None].astype(np.float32 if single else np.float64)
     forces = np.hstack(session.run(["F_yf", "F_yr"], {"alpha_f": column, "alpha_r": column}))

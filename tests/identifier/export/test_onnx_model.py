@@ -71,7 +71,7 @@ def slip(drive, car):
 def test_its_forces_are_those_of_onnxruntime(car, drive, rng, activation, batch):
     recording = drive(200)
     content = network_file(tire(rng), activation=activation, batch=batch)
-    forces = OnnxModel(vehicle=car, content=content).axle_force(recording)
+    forces = OnnxModel(vehicle=car, content=content).predict(recording)
     session = runtime.InferenceSession(content)
     alpha = slip(recording, car).astype(np.float32)
     rows = alpha if batch is None else alpha[:, None]
@@ -90,9 +90,9 @@ def test_a_network_of_the_five_signals_comes_back_from_onnx(car, drive, rng):
         vehicle=car, network=network, weights=Weights(W=W, V=V), force_unit=1e3, min_speed=1.0
     )
     back = OnnxModel(vehicle=car, content=onnx_bytes(model), min_speed=1.0)
-    expected = model.axle_force(recording)
-    assert (back.axle_force(recording)[recording.t < 0.5] == 0.0).all()
-    assert np.abs(back.axle_force(recording) - expected).max() < 1e-9 * np.abs(expected).max()
+    expected = model.predict(recording)
+    assert (back.predict(recording)[recording.t < 0.5] == 0.0).all()
+    assert np.abs(back.predict(recording) - expected).max() < 1e-9 * np.abs(expected).max()
 
 
 def test_its_derivative_is_that_of_the_file(car, rng):
@@ -131,26 +131,26 @@ def test_a_network_in_the_sign_of_iso_8855_is_turned_round(car, drive, rng):
     recording = drive(100)
     with pytest.raises(UnusableNetworkError, match="must rise with slip"):
         OnnxModel(vehicle=car, content=iso)
-    turned = OnnxModel(vehicle=car, content=iso, slip_sign=-1).axle_force(recording)
-    assert np.array_equal(turned, OnnxModel(vehicle=car, content=paper).axle_force(recording))
+    turned = OnnxModel(vehicle=car, content=iso, slip_sign=-1).predict(recording)
+    assert np.array_equal(turned, OnnxModel(vehicle=car, content=paper).predict(recording))
 
 
 def test_columns_may_be_named_in_any_order(car, drive, rng):
     recording, weights = drive(100), tire(rng)
-    plain = OnnxModel(vehicle=car, content=network_file(weights)).axle_force(recording)
+    plain = OnnxModel(vehicle=car, content=network_file(weights)).predict(recording)
     swapped = network_file([weights[0][::-1], weights[1]])
     told = OnnxModel(vehicle=car, content=swapped, inputs=("alpha_r", "alpha_f"))
     named = network_file([weights[0][::-1], weights[1]], inputs=[("alpha_r", 1), ("alpha_f", 1)])
-    assert np.array_equal(told.axle_force(recording), plain)
-    assert np.array_equal(OnnxModel(vehicle=car, content=named).axle_force(recording), plain)
+    assert np.array_equal(told.predict(recording), plain)
+    assert np.array_equal(OnnxModel(vehicle=car, content=named).predict(recording), plain)
 
 
 def test_forces_may_be_named_in_any_order(car, drive, rng):
     recording, weights = drive(100), tire(rng)
-    plain = OnnxModel(vehicle=car, content=network_file(weights)).axle_force(recording)
+    plain = OnnxModel(vehicle=car, content=network_file(weights)).predict(recording)
     turned = [weights[0], weights[1][:, ::-1]]
     named = network_file(turned, outputs=[("F_yr", 1), ("F_yf", 1)])
-    assert np.array_equal(OnnxModel(vehicle=car, content=named).axle_force(recording), plain)
+    assert np.array_equal(OnnxModel(vehicle=car, content=named).predict(recording), plain)
 
 
 @pytest.mark.parametrize("inputs", [None, ("alpha_r", "alpha_f")])
@@ -161,7 +161,7 @@ def test_it_is_stored_and_read_again(car, drive, rng, tmp_path, inputs):
     model.save(tmp_path / "weights.json")
     again = load_model(tmp_path / "weights.json")
     assert again == model
-    assert np.array_equal(again.axle_force(recording), model.axle_force(recording))
+    assert np.array_equal(again.predict(recording), model.predict(recording))
     (tmp_path / "tire.onnx").write_bytes(model.content)
     numbers = {"min_speed": 2.0, "slip_sign": -1, "inputs": inputs}
     assert OnnxModel.from_onnx(tmp_path / "tire.onnx", car, **numbers) == model

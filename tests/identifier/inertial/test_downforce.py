@@ -38,7 +38,7 @@ def models(drive):
 
 def test_the_told_area_leaves_the_static_curve_to_learn(models, drive):
     told, untold = models
-    np.testing.assert_allclose(told.force_at(SLIPS), static(SLIPS[:, None]), rtol=0.15)
+    np.testing.assert_allclose(told.force(SLIPS), static(SLIPS[:, None]), rtol=0.15)
     still = race(car=UNTOLD)  # the same drive of a car without: as well as can be had
     usual = missed(identify(felt(still), UNTOLD, METHOD).freeze(), still)
     assert (missed(told, drive) < 1.5 * usual).all()

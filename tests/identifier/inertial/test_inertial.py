@@ -147,7 +147,7 @@ def test_it_freezes_to_the_kind_of_model_that_an_axle_identifier_learns(history,
     again = AxleModel.load(tmp_path / "weights.json")
     np.testing.assert_array_equal(again.W, model.W)
     alpha = np.array([0.01, 0.03, 0.06])
-    assert (model.relative_sd(alpha) < 0.7).all()  # and knows that it learnt
+    assert (model.band.relative_sd(alpha) < 0.7).all()  # and knows that it learnt
 
 
 def test_its_own_bounds_hold_and_its_own_ladder_is_used(banked):
@@ -170,7 +170,7 @@ def test_a_recording_without_an_accelerometer_is_refused_before_it_is_learnt_on(
     for run in (identify, learn):
         with pytest.raises(RecordingError, match="no ay, from which InertialIdentifier learns"):
             run(blind, CAR, METHOD)
-    assert not AxleIdentifier.for_vehicle(CAR).needs_a_y
+    assert "a_y" not in AxleIdentifier.for_vehicle(CAR).needs
     identify(blind.between(0.0, 5.0), CAR, AxleIdentifier.for_vehicle(CAR))
 
 
@@ -306,6 +306,6 @@ def test_a_tiny_body_rolls_no_faster_than_the_filter_can_follow():
     )
     method = InertialIdentifier.for_vehicle(tiny)
     assert method.roll_frequency / tiny.froude_time > 60.0
-    assert method.body_prior(tiny).frequency == 60.0
+    assert method.accelerometer.body(tiny).frequency == 60.0
     roll_stiffness = method.setup(tiny).constants["laws"][2]
     assert roll_stiffness == 60.0**2

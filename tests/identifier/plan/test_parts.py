@@ -61,7 +61,8 @@ def driven(tires):
 
 def equations(tires, k, planned):
     """d/dt of v_y, r, X, Y, ψ, δ, ρ, dρ/dt, and of both axles x, ∂x/∂s, ∂x/∂k."""
-    ladder, W, (s, share) = np.array(tires.method.ladder), tires.W[k], tires.own[:, :2].T
+    ladder, W = np.array(tires.method.ladder), tires.W[k]
+    s, share = tires.compliance, tires.sway_share
     stiffness, damping, soft, *_ = tires.method.sway.numbers()
     loads, arms = np.array(CAR.axle_loads), np.array([CAR.l_f, -CAR.l_r])
     flattest = LEAST_SLOPE * (W / ladder).sum(axis=1)
@@ -412,7 +413,7 @@ def test_a_learnt_car_is_planned_with_its_own_curves_and_no_offset():
     log = Plant(CAR).simulate(slalom_of(CAR, 6.0)(0.06), speed=SPEED).recording()
     model = identify(log, CAR, AxleIdentifier.for_vehicle(CAR, dt=log.dt)).freeze()
     known = PlausibleTires.learnt(model, np.random.default_rng(0))
-    np.testing.assert_array_equal(known.own, model.own * [1.0, 1.0, 0.0])
+    np.testing.assert_array_equal(known.compliance, model.compliance)
     assert known.covariance is model.covariance and known.method.ladder == model.ladder
     lag = CAR.require_chassis().steering_lag
     np.testing.assert_allclose(known.steering_lag / lag, [1.0, *[0.7, 1.3] * 3])

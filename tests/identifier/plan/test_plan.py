@@ -90,12 +90,12 @@ def lagged(alpha, dt, compliance, W, ladder):
 
 
 def test_slip_and_its_sensitivity_are_those_of_a_lag_that_is_integrated(tires):
-    still = replace(tires, own=tires.own * [1.0, 0.0, 0.0])  # no sway
+    still = replace(tires, sway_share=np.zeros(2))  # no sway
     t, motion = steered(still, lambda t: 0.05 * np.sin(5.0 * t), 2.0)
     one = [value[:, 0, 0] for value in (motion.delta, motion.v_y, motion.r)]
     alpha = one[0] - np.arctan((one[1] + CAR.l_f * one[2]) / SPEED)
-    s, W = still.own[0, 0], still.W[0, 0]
-    ladder, dt, step = np.array(still.method.ladder), t[1], 1e-3 * still.own[0, 0]
+    s, W = still.compliance[0], still.W[0, 0]
+    ladder, dt, step = np.array(still.method.ladder), t[1], 1e-3 * still.compliance[0]
     x = lagged(alpha, dt, s, W, ladder)
     np.testing.assert_allclose(motion.slip[:, 0, 0, 0], x, atol=2e-3 * np.abs(x).max())
     above, below = (lagged(alpha, dt, s + sign * step, W, ladder) for sign in (1.0, -1.0))

@@ -54,7 +54,7 @@ def wetter():
 
 def test_half_the_friction_is_told_within_a_second_with_its_size(tires, wetter):
     (road,) = predict(tires, wetter).friction().roads
-    wrong = np.abs(tires.axle_force(wetter) - wetter.axle_force) / tires.vehicle.axle_loads
+    wrong = np.abs(tires.predict(wetter) - wetter.axle_force) / tires.vehicle.axle_loads
     slides = wetter.t[np.argmax((wrong.max(axis=1) > 0.15) & (wetter.t >= DROP))]
     assert DROP < road.first < slides + 1.0
     assert road.last == pytest.approx(wetter.t[-1], abs=0.3)
@@ -68,8 +68,8 @@ def test_the_road_that_taught_is_told_as_such(tires, same):
 
 
 def test_a_band_that_nobody_calibrated_tells_no_friction(tires, wetter):
-    unchecked = tires.with_calibration(None)
-    assert tires.band_calibrated and not unchecked.band_calibrated
+    unchecked = tires.band.calibrated_by(None)
+    assert tires.band.calibrated and not unchecked.band.calibrated
     assert "band: calibrated on the drive" in tires.summary()
     assert "not calibrated; run.tire" in unchecked.summary()
     with pytest.raises(ValueError, match=r"friction\(\) wants a calibrated band"):
@@ -135,8 +135,8 @@ def test_the_verdict_of_a_prediction_names_the_road(tires, wetter, same):
 def test_tires_on_another_road_keep_their_stiffness(tires):
     alpha = np.array([0.001, 0.02, 0.1])
     half = tires.at_friction(0.5)
-    np.testing.assert_allclose(half.force_at(0.5 * alpha), 0.5 * tires.force_at(alpha), rtol=1e-12)
-    np.testing.assert_allclose(half.cornering_stiffness, tires.cornering_stiffness, rtol=1e-12)
+    np.testing.assert_allclose(half.force(0.5 * alpha), 0.5 * tires.force(alpha), rtol=1e-12)
+    np.testing.assert_allclose(half.stiffness, tires.stiffness, rtol=1e-12)
     np.testing.assert_allclose(half.known_slip, 0.5 * tires.known_slip, rtol=1e-9)
     for ratio in (0.0, -1.0, np.nan, np.inf):
         with pytest.raises(ValueError, match="ratio must be positive"):

@@ -64,7 +64,7 @@ def codes(verdict, *, refusing=True):
 def test_a_right_answer_is_valid_and_it_is_right(clean, good, drive):
     assert good.valid
     assert codes(good) == set()
-    missed = clean.freeze().axle_force(drive) - drive.axle_force
+    missed = clean.freeze().predict(drive) - drive.axle_force
     share = np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
     assert (share < 0.08).all()
     assert good.measures["explained_lateral"] > 0.98
@@ -106,7 +106,7 @@ def turned(drive, degrees):
 
 
 def share_missed(model, drive):
-    missed = model.axle_force(drive) - drive.axle_force
+    missed = model.predict(drive) - drive.axle_force
     return np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
 
 
@@ -266,7 +266,7 @@ def test_every_method_that_freezes_has_a_verdict(drive, name, valid):
     car = sedan()
     run = identify(drive, car, make_method(name, car))
     verdict = judge(run)
-    missed = run.freeze().axle_force(drive) - drive.axle_force
+    missed = run.freeze().predict(drive) - drive.axle_force
     share = np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
     assert verdict.valid == valid
     assert share.max() < 1.0 / 7.0 or not valid

@@ -162,12 +162,12 @@ def test_the_chassis_tells_how_the_body_rolls(swings):
     """Against what the plant does; a car without a chassis is taken for a usual one."""
     method = InertialIdentifier.for_vehicle(CAR, dt=DT)
     roll, a_y = (np.array([getattr(one, name) for one in swings]) for name in ("roll", "a_y"))
-    told, now, rolled = method.body_prior(CAR), (0.0, 0.0), []
+    told, now, rolled = method.accelerometer.body(CAR), (0.0, 0.0), []
     for value in a_y:
         now = told.step(now, value, DT)
         rolled.append(told.roll * now[0] / GRAVITY)
     np.testing.assert_allclose(rolled, roll, atol=0.1 * np.abs(roll).max())
-    usual = method.body_prior(replace(CAR, chassis=None))
+    usual = method.accelerometer.body(replace(CAR, chassis=None))
     assert usual.sd_roll > told.sd_roll and abs(usual.roll - told.roll) < 2.0 * usual.sd_roll
 
 

@@ -19,7 +19,7 @@ CURVES = {
 def test_forces_are_those_of_the_frozen_curve(car, motions, forces, at, curve):
     model = CurveModel(vehicle=car, curve=curve, parameters=CURVES[curve], min_speed=1.0)
     predicted, _ = forces(prediction_tire(model), *at(motions))
-    expected = model.axle_force(motions)
+    expected = model.predict(motions)
     np.testing.assert_allclose(predicted, expected, rtol=1e-9, atol=1e-6)
     parameters = np.array(CURVES[curve])
     parameters[1, -1] *= 1.02
@@ -63,7 +63,7 @@ def test_offsets_without_a_lag_add_no_states(car, motions, forces, at):
     tire = prediction_tire(model)
     assert not tire.structure.lagged
     force, _ = forces(tire, *at(motions))
-    np.testing.assert_allclose(force, model.axle_force(motions), rtol=1e-9, atol=1e-6)
+    np.testing.assert_allclose(force, model.predict(motions), rtol=1e-9, atol=1e-6)
 
 
 def test_a_frozen_dugoff_curve_is_fitted_by_a_ladder(car, forces):
@@ -73,7 +73,7 @@ def test_a_frozen_dugoff_curve_is_fitted_by_a_ladder(car, forces):
     slips = np.column_stack([alpha, alpha])
     predicted = forces(prediction_tire(model), 20.0, none, none, none, lagged=slips)[0]
     limit = parameters[:, 1] * np.array(car.axle_loads)
-    assert (np.abs(predicted - model.force_at(alpha)) < 0.013 * limit).all()
+    assert (np.abs(predicted - model.force(alpha)) < 0.013 * limit).all()
 
 
 def test_slip_is_the_angle_between_wheel_and_travel(car, motions, forces, at):

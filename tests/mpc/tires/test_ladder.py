@@ -24,7 +24,9 @@ def axle_model(car, *, compliance=(0.05, 0.06), sway=(0.0, 0.0), offset=(0.0, 0.
         sway=design.sway,
         plausibility=design.plausibility,
         W=weights,
-        own=np.column_stack([compliance, sway, offset]),
+        compliance=np.array(compliance),
+        sway_share=np.array(sway),
+        offset=np.array(offset),
         covariance=np.tile(np.eye(n + 3), (2, 1, 1)),
         prior_covariance=np.tile(np.eye(n + 3), (2, 1, 1)),
         excitation=np.zeros((2, 9)),
@@ -61,7 +63,7 @@ def standing(v_y, r, delta, speed=20.0, n=400):
 def test_steady_forces_are_those_of_the_frozen_model(car, forces, motion):
     model = axle_model(car, offset=(0.01, 0.15))
     predicted, _ = forces(prediction_tire(model), 20.0, *(np.array([value]) for value in motion))
-    expected = model.axle_force(standing(*motion))[-1]
+    expected = model.predict(standing(*motion))[-1]
     np.testing.assert_allclose(predicted[0], expected, rtol=1e-9)
 
 
@@ -163,12 +165,12 @@ def test_of_a_car_with_downforce_forces_are_those_of_the_frozen_model(racer, for
     model, motion = axle_model(racer, offset=(0.01, 0.15)), (0.4, 0.3, 0.05)
     tire = prediction_tire(model)
     predicted, _ = forces(tire, speed, *(np.array([value]) for value in motion))
-    expected = model.axle_force(standing(*motion, speed=speed))[-1]
+    expected = model.predict(standing(*motion, speed=speed))[-1]
     np.testing.assert_allclose(predicted[0], expected, rtol=1e-9)
     half = tire._replace(weights=tire.structure.at_friction(tire.weights, 0.5))
     less, _ = forces(half, speed, *(np.array([value]) for value in motion))
     slid = standing(0.4, 0.3, 0.05, speed=speed)
-    np.testing.assert_allclose(less[0], model.at_friction(0.5).axle_force(slid)[-1], rtol=1e-9)
+    np.testing.assert_allclose(less[0], model.at_friction(0.5).predict(slid)[-1], rtol=1e-9)
 
 
 def test_of_a_car_with_downforce_slip_lags_as_in_the_frozen_model(racer):

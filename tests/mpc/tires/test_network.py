@@ -33,7 +33,7 @@ def model_of(car, network, rng):
 def test_forces_are_those_of_the_frozen_model(network, car, motions, forces, at, rng):
     model = model_of(car, network, rng)
     predicted, _ = forces(prediction_tire(model), *at(motions))
-    expected = model.axle_force(motions)
+    expected = model.predict(motions)
     np.testing.assert_allclose(predicted, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
