@@ -34,7 +34,8 @@ from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
 from codegen.processor import PROCESSORS, missing_tools, replay
 from identifier.axle import AxleIdentifier, AxleModel
-from identifier.axle.band import RANGES, SPEEDS, ranges_of
+from identifier.axle.band import ranges_of
+from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
 from identifier.axle.curve import unit_matrix
 from identifier.band import normal_quantile
 from identifier.export.package import build_package, synthetic_samples
@@ -54,8 +55,11 @@ REAL_RUNS = {
     "dart.csv.gz": ("ramp_steer02", "free_10_02_28", "free_10_12_05"),
     "dart_imu.csv.gz": ("ramp_steerneg025", TILES, *SLOW),
 }
-SLIPS = (*(f"to_{end:g}" for end in RANGES), f"from_{RANGES[-1]:g}")  # rad
-FAST = (*(f"below_{end:g}" for end in SPEEDS), f"above_{SPEEDS[-1]:g}")  # sqrt(g L)
+SLIPS = (*(f"to_{end:g}" for end in AXLE_CHOSEN.ranges), f"from_{AXLE_CHOSEN.ranges[-1]:g}")  # rad
+FAST = (
+    *(f"below_{end:g}" for end in AXLE_CHOSEN.speeds),
+    f"above_{AXLE_CHOSEN.speeds[-1]:g}",
+)  # sqrt(g L)
 BANDS = ("band", "covariance", "constant")
 JUDGED = ("exact", "noisy", "carmaker", "dart", "dart_other_floor")
 
@@ -132,7 +136,9 @@ def held(
     slips = np.abs(model.lagged_slip(drive))[moving]
     away = (np.abs(model.predict(drive) - force) / loads)[moving]
     wide = (model.band.over(drive) / loads)[moving]
-    fast = np.searchsorted(SPEEDS, drive.v_x[moving] / model.vehicle.froude_speed, side="right")
+    fast = np.searchsorted(
+        AXLE_CHOSEN.speeds, drive.v_x[moving] / model.vehicle.froude_speed, side="right"
+    )
     for i, axle in enumerate(AXLES):
         slip, error = slips[:, i], away[:, i]
         half = {

@@ -36,7 +36,8 @@ from benchmarks.random_cars import CLASSES
 from benchmarks.recorded_cars import DATA
 from benchmarks.targets import Targets, keeps, show
 from identifier.doctor import Finding
-from identifier.doctor.suspects import DEGREES, SUSPECTS
+from identifier.doctor.chosen import CHOSEN as DOCTOR_CHOSEN
+from identifier.doctor.suspects import SUSPECTS
 from models.faults import SensorFault
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -119,7 +120,7 @@ def ratio_error(finding: Finding, fault: Gross) -> float:
     if finding.code != "steering_ratio" or not isinstance(planted, SensorFault):
         return np.nan
     size = abs(planted.size)
-    return finding.size / (size / DEGREES if size > 100.0 else size) - 1.0
+    return finding.size / (size / DOCTOR_CHOSEN.degrees if size > 100.0 else size) - 1.0
 
 
 def clean_car(job: tuple[str, int]) -> Clean:

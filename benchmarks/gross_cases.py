@@ -20,7 +20,7 @@ from benchmarks.faults import (
     WrongUnit,
 )
 from benchmarks.random_cars import good_sensors
-from identifier.doctor.suspects import DEGREES
+from identifier.doctor.chosen import CHOSEN as DOCTOR_CHOSEN
 from models.faults import SensorFault
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -206,9 +206,9 @@ KINDS: Mapping[str, Draw] = {
     "speeds in km/h": _both_in_kmh,
     "a_y in g": _unit("a_y", "g"),
     "sideslip in rad": _sideslip(1.0),
-    "sideslip in degrees": _sideslip(DEGREES),
+    "sideslip in degrees": _sideslip(DOCTOR_CHOSEN.degrees),
     "steering wheel in rad": _ratio(1.0),
-    "steering wheel in degrees": _ratio(DEGREES),
+    "steering wheel in degrees": _ratio(DOCTOR_CHOSEN.degrees),
     "zero": _of_one("zero", "frozen"),
     "stuck": _stuck,
     "spiking": _spiking,

@@ -29,8 +29,8 @@ from benchmarks.random_cars import FIRST_SEED
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier
-from identifier.axle.covariance import LEAST_VARIANCE, per_variance, triangle, unpacked
-from identifier.axle.slip import MOST_SENSITIVE, MOST_SWAY
+from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
+from identifier.axle.covariance import per_variance, triangle, unpacked
 from identifier.export.compiled import CompiledPackage
 from identifier.export.package import build_package
 from models.vehicle import GRAVITY, sedan
@@ -73,7 +73,7 @@ def covariance(case: Case, state: State) -> bool:
     q, UD = n + 3, state["UD"].reshape(-1, 2, (n + 3) * (n + 4) // 2)
     places = [k for k, (i, j) in enumerate(triangle(q)) if i == j]
     D = UD[:, :, places]
-    if not (np.isfinite(UD).all() and (D >= LEAST_VARIANCE * (1.0 - 1e-6)).all()):
+    if not (np.isfinite(UD).all() and (AXLE_CHOSEN.least_variance * (1.0 - 1e-6) <= D).all()):
         return False
     prior = design.prior.covariance(case.vehicle, design.ladder)
     limits = per_variance(prior, n, design.regression.widest)
@@ -93,10 +93,10 @@ def finite(case: Case, state: State) -> bool:
     if not all(np.isfinite(values).all() for values in state.values()):
         return False
     sway, omega = state["sway"].reshape(-1, 3), case.design.sway.frequency
-    most = MOST_SWAY * GRAVITY * (1.0 + ROUNDING)
+    most = AXLE_CHOSEN.most_sway * GRAVITY * (1.0 + ROUNDING)
     sensitive = np.abs(state["sensitivity"][:, :, 0]).max() * case.vehicle.wheelbase
     return bool(
-        sensitive <= MOST_SENSITIVE * (1.0 + ROUNDING)
+        sensitive <= AXLE_CHOSEN.most_sensitive * (1.0 + ROUNDING)
         and np.abs(sway[:, 0]).max() <= most
         and np.abs(sway[:, 1]).max() <= omega * most
     )

@@ -13,8 +13,9 @@ from benchmarks.random_cars import FIRST_SEED
 from benchmarks.targets import Targets, show
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier
-from identifier.axle.along import BEGIN, Adjoint, Lessons, adjoint, begin_error, lessons
+from identifier.axle.along import Adjoint, Lessons, adjoint, begin_error, lessons
 from identifier.axle.certificate import FrictionDrop
+from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
 from identifier.axle.covariance import unpacked
 from identifier.axle.learning import ErrorState
 from identifier.run import identify
@@ -117,7 +118,7 @@ def worst(
     most = by_begin + by_told + abs(float(reach.moved[i, m]))
     side = 1.0 if reach.moved[i, m] >= 0.0 else -1.0
     error = np.zeros_like(taught.theta[0])
-    error[i] = side * BEGIN**2 * taught.begin[i] @ begin / max(by_begin, 1e-300)
+    error[i] = side * AXLE_CHOSEN.begin**2 * taught.begin[i] @ begin / max(by_begin, 1e-300)
     units = np.tanh(SLIPS[m] / np.array(case.design.ladder))
     ends = []
     for share in (1.0, 1.05):

@@ -27,9 +27,10 @@ from benchmarks.random_cars import CLASSES, FIRST_SEED, RandomCar
 from benchmarks.targets import Targets, keeps, show
 from codegen.arrays import Array
 from identifier.plan import PlanError, hold_of, rehearse
+from identifier.plan.chosen import CHOSEN as PLAN_CHOSEN
 from identifier.plan.motion import steps_of
 from identifier.plan.plan import extent, free_motion, hardest, random_of, slalom_of
-from identifier.plan.rehearsal import LEAD, Course
+from identifier.plan.rehearsal import Course
 from identifier.plan.search import Space, body_of, edge_distance
 from identifier.plan.tires import PlausibleTires
 from models.maneuvers import Maneuver
@@ -96,8 +97,10 @@ def driven(
     exact, way = rehearse(car.plant, steering, course, speed, hold_of(tires, speed))
     log = blind(car.sensors.apply(exact, np.random.default_rng([seed, 7])))
     run = ti.identify(log, car.told, check=False)
-    errors = {t: float(np.mean(force_error(run.freeze(t=LEAD + t), asked))) for t in times}
-    return Driven(errors, way[exact.t >= LEAD - 1e-9])
+    errors = {
+        t: float(np.mean(force_error(run.freeze(t=PLAN_CHOSEN.lead + t), asked))) for t in times
+    }
+    return Driven(errors, way[exact.t >= PLAN_CHOSEN.lead - 1e-9])
 
 
 def open_course(tires: PlausibleTires, speed: float, steering: Maneuver) -> Course:

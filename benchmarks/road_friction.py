@@ -32,7 +32,7 @@ from benchmarks.random_cars import CLASSES, FIRST_SEED, RandomCar, random_steeri
 from benchmarks.recorded_cars import DART, DATA
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
-from identifier.verdict.motion import BRISK
+from identifier.verdict.chosen import CHOSEN as VERDICT_CHOSEN
 from models.friction import Friction, FrictionChange
 from models.plant import PlantError
 from models.recordings import Recording
@@ -103,7 +103,7 @@ def wrong_at(model: ti.TireModel, drive: Recording, since: float, lasts: float =
     """
     assert drive.axle_force is not None
     away = np.abs(model.predict(drive) - drive.axle_force) / np.array(model.vehicle.axle_loads)
-    fast = drive.v_x >= BRISK * model.vehicle.froude_speed
+    fast = drive.v_x >= VERDICT_CHOSEN.brisk * model.vehicle.froude_speed
     wrong = (away.max(axis=1) > WRONG) & (drive.t >= since) & fast
     n = max(1, round(lasts / drive.dt))
     whole = np.convolve(wrong, np.ones(n), "valid") > n - 0.5

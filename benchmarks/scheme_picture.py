@@ -16,15 +16,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch
 
 from tireid.figures import style
+from tireid.figures.chosen import CHOSEN as FIGURES_CHOSEN
 from tireid.figures.paper import SCHEME
-from tireid.figures.style import (
-    BLACK,
-    GREY,
-    ORANGE,
-    PAGE,
-    new_figure,
-    styled,
-)
+from tireid.figures.style import BLACK, GREY, ORANGE, new_figure, styled
 
 WIDTH, _HEIGHT = 100.0, 46.0  # of the drawing, in its own unit
 _JOINT, SUM = 0.45, 1.6  # radii of a joint of two lines and of the sum
@@ -66,7 +60,7 @@ CUT: Point = (66.0, 6.0)
 @styled
 def scheme_figure() -> Figure:
     """Draw the identifier as blocks and signals."""
-    figure = new_figure(PAGE, PAGE * _HEIGHT / WIDTH)
+    figure = new_figure(FIGURES_CHOSEN.page, FIGURES_CHOSEN.page * _HEIGHT / WIDTH)
     axes = figure.subplots()
     axes.set(xlim=(0.0, WIDTH), ylim=(-0.5, _HEIGHT - 0.5), aspect="equal")
     axes.set_axis_off()

@@ -21,6 +21,7 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.certificate import Design, corners, curve_facts, jump_by_learning
+from identifier.axle.chosen import CHOSEN
 from identifier.axle.covariance import unpacked
 from identifier.axle.curve import doublings
 from identifier.axle.model import AxleModel
@@ -30,13 +31,6 @@ from identifier.method import Run
 from identifier.setup import Setup
 from identifier.tire_model import AXLES, TireModel
 from models.vehicle import Vehicle
-
-SLIPS = 12  # over the range that is known, at which errors are bounded
-BEGIN = 3.0  # standard deviations of the prior, within which the truth lies before the drive
-MOST = 360_000  # samples that are looked at, those at the end
-SMALLEST = 1e-4  # rad: where nothing is known
-TINY = 1e-30  # keeps a quotient finite
-ROUNDING = 1e-9  # of a bound
 
 
 class _Learner(Design, Protocol):
@@ -90,7 +84,7 @@ def lessons(design: _Learner, history: Run) -> Lessons:
     over = tuple(port for port in step.name_in() if port not in setup.constants)
     scan, parts, theta, begin = Scan(step, carry=(), over=over), [], [], []
     constants = {port: setup.constants[port] for port in scan.constants}
-    for block in history.blocks(np.arange(max(n - MOST, 0), n)):
+    for block in history.blocks(np.arange(max(n - CHOSEN.along_most, 0), n)):
         seen = setup.shown(history.recording, block.part)
         signals = {port: seen.of_recording(values) for port, values in seen.signals.items()}
         sampled = {port: _by_columns({**block.before, **signals}[port]) for port in over}
@@ -135,7 +129,10 @@ def certified_along(design: _Learner, history: Run) -> tuple[Property, ...]:
     model = design.frozen(history.vehicle, history.state_at(float(history.recording.t[-1])))
     taught = lessons(design, history)
     known = np.asarray(model.known_slip)
-    slips = np.linspace(1.0 / SLIPS, 1.0, SLIPS) * np.maximum(known, SMALLEST)[:, None]
+    slips = (
+        np.linspace(1.0 / CHOSEN.slips, 1.0, CHOSEN.slips)
+        * np.maximum(known, CHOSEN.smallest)[:, None]
+    )
     reach = adjoint(taught, slips, design.ladder)
     box = corners(design.bounds, design.ladder, design.rising_until)
     jump = np.abs(np.cumsum(np.diff(taught.theta[:, :, : len(design.ladder)], axis=0), axis=2))
@@ -147,8 +144,12 @@ def certified_along(design: _Learner, history: Run) -> tuple[Property, ...]:
             title="largest jump of a force by learning",
             value=largest,
             limit=limit,
-            margin=limit / max(largest, TINY),
-            status=at_most(largest, good=limit * (1.0 + ROUNDING), bad=limit * (1.0 + ROUNDING)),
+            margin=limit / max(largest, CHOSEN.along_tiny),
+            status=at_most(
+                largest,
+                good=limit * (1.0 + CHOSEN.along_rounding),
+                bad=limit * (1.0 + CHOSEN.along_rounding),
+            ),
             unit="static loads",
             advice="weights were changed by something else than learning",
         )
@@ -166,7 +167,7 @@ def _of_axle(
     slips : [rad], up to the range that is known (m,).   box : corners of the set of weights (k, n).
     """
     axle, known = AXLES[i], float(model.known_slip[i])
-    facts = curve_facts(model.W[i : i + 1], model.ladder, max(known, SMALLEST))
+    facts = curve_facts(model.W[i : i + 1], model.ladder, max(known, CHOSEN.smallest))
     at_slips = np.tanh(slips[:, None] / np.array(model.ladder))
     possible = np.abs((box - model.W[i]) @ at_slips.T).max(axis=0)
     g, sizes = reach.g[:, i], np.abs(reach.g[:, i])
@@ -218,7 +219,7 @@ def _of_axle(
             title=f"{span}: largest force error, with the residuals of y",
             value=float(by_left[k]),
             limit=float(by_told[k]),
-            margin=float(by_told[k] / max(float(by_left[k]), TINY)),
+            margin=float(by_told[k] / max(float(by_left[k]), CHOSEN.along_tiny)),
             status=at_most(float(by_left[k]), good=float(by_told[k]), bad=None),
             unit="static loads",
             advice="y errs by more than declared, and so may the force: check sensors, car and "
@@ -228,8 +229,8 @@ def _of_axle(
 
 
 def begin_error(taught: Lessons, reach: Adjoint) -> Array:
-    """Return the force error that the beginning leaves, within `BEGIN` deviations (2, m).
+    """Return the force error that the beginning leaves, within `CHOSEN.begin` deviations (2, m).
     reach : of errors, at m slips.
     """
     variance = np.einsum("ami,aij,amj->am", reach.begin, taught.begin, reach.begin)
-    return np.asarray(BEGIN * np.sqrt(np.maximum(variance, 0.0)))
+    return np.asarray(CHOSEN.begin * np.sqrt(np.maximum(variance, 0.0)))

@@ -18,28 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.axle.covariance import LEAST_VARIANCE
+from identifier.axle.chosen import CHOSEN
 from identifier.axle.curve import unit_slopes
-from identifier.axle.learning import (
-    FLOAT,
-    LEAN,
-    MOST_SLOW,
-    SLOW_Q,
-    Bounds,
-    Regression,
-    RoadChange,
-)
+from identifier.axle.learning import FLOAT, Bounds, Regression, RoadChange
 from identifier.axle.prior import Prior
 from identifier.certificate import Property, at_least, at_most, statement
 from identifier.driving import Driving
 from models.vehicle import Vehicle
-
-LARGEST_SLIP = 1.5  # rad
-CELLS = 2000  # of slip, each a part wider than the one before
-SMALLEST_CELL = 1e-5  # rad, from zero slip
-ON_BOUND = 1e-9  # of a bound, within which a corner lies on it
-LONGEST = 60.0  # s, beyond which a drop is not followed
-FORGETS = (0.5, 0.9)  # share of its own information that a sample may forget: good, bad
 
 
 class Design(Protocol):
@@ -91,7 +76,7 @@ def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | Non
             for free in map(list, combinations(range(n), active)):
                 rest = [j for j in range(n) if j not in free]
                 rows = np.array([row[free] for row, _ in chosen]).reshape(active, active)
-                if active and abs(np.linalg.det(rows)) < ON_BOUND:
+                if active and abs(np.linalg.det(rows)) < CHOSEN.on_bound:
                     continue
                 for ends in product(*(range_ for _, range_ in chosen)):
                     for at in product((-most, most), repeat=n - active):
@@ -103,10 +88,12 @@ def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | Non
                         w[free] = np.linalg.solve(rows, missing) if active else []
                         found.append(w)
     points = np.array(found)
-    inside = (np.abs(points) <= most * (1.0 + ON_BOUND)).all(axis=1)
+    inside = (np.abs(points) <= most * (1.0 + CHOSEN.on_bound)).all(axis=1)
     for row, (low, high) in slabs:
         value = points @ row
-        inside &= (value >= low - ON_BOUND * high) & (value <= high * (1.0 + ON_BOUND))
+        inside &= (value >= low - CHOSEN.on_bound * high) & (
+            value <= high * (1.0 + CHOSEN.on_bound)
+        )
     return points[inside]
 
 
@@ -125,7 +112,7 @@ class _CurveFacts(NamedTuple):
 
 def _cells(until: float) -> Array:
     """Return the ends of cells of slip from 0 on [rad]."""
-    narrow = np.geomspace(min(SMALLEST_CELL, 0.1 * until), until, CELLS)
+    narrow = np.geomspace(min(CHOSEN.smallest_cell, 0.1 * until), until, CHOSEN.cells)
     return np.concatenate([[0.0], narrow])
 
 
@@ -210,8 +197,8 @@ class FrictionDrop:
         wrong = self.left * error
         declared = r.error + r.relative_error * friction + r.noise * self.slope / v_x
         A, b, slow = 0.0, 0.0, self.errors
-        for k in range(1, math.ceil(LONGEST / dt) + 1):
-            slow = min(slow * (1.0 + (SLOW_Q - 1.0) * at.slow), MOST_SLOW)
+        for k in range(1, math.ceil(CHOSEN.longest / dt) + 1):
+            slow = min(slow * (1.0 + (CHOSEN.slow_q - 1.0) * at.slow), CHOSEN.most_slow)
             weight = 2.0 * at.per_sample / (declared**2 * slow + self.unsure**2)
             e = min(wrong - self.noise, r.clip * declared)
             A, b = at.keep * A + weight * self.seen**2, at.keep * b + weight * self.seen * e
@@ -233,8 +220,8 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
     """
     b, dt = design.bounds, design.dt
     set_ = corners(b, design.ladder, design.rising_until)
-    facts = curve_facts(set_, design.ladder, LARGEST_SLIP)
-    apart = _widest_range(set_, design.ladder, LARGEST_SLIP)
+    facts = curve_facts(set_, design.ladder, CHOSEN.largest_slip)
+    apart = _widest_range(set_, design.ladder, CHOSEN.largest_slip)
     jump = jump_by_learning(design)
     forgets = -math.expm1(-dt / design.regression.memory)
     lean = _lean_over_rounding(design)
@@ -243,16 +230,16 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
             name="forgets",
             title="information along its regressor that a sample forgets: P stays positive",
             value=forgets,
-            limit=FORGETS[0],
-            margin=FORGETS[0] / forgets,
-            status=at_most(forgets, good=FORGETS[0], bad=FORGETS[1]),
+            limit=CHOSEN.forgets[0],
+            margin=CHOSEN.forgets[0] / forgets,
+            status=at_most(forgets, good=CHOSEN.forgets[0], bad=CHOSEN.forgets[1]),
             unit="-",
             advice="sample faster, or let the memory be longer",
         ),
         statement(
             "smallest_factor",
             "smallest factor D of the covariance U D U', double and float",
-            LEAST_VARIANCE,
+            CHOSEN.least_variance,
             "units of weights^2",
         ),
         Property(
@@ -317,7 +304,7 @@ def jump_by_learning(design: Design) -> float:
     from there than n times the weight and the grip.
     """
     b, n = design.bounds, len(design.ladder)
-    return design.regression.rate * design.dt + LEAN * n * (b.weight + b.most_grip)
+    return design.regression.rate * design.dt + CHOSEN.lean * n * (b.weight + b.most_grip)
 
 
 def _lean_over_rounding(design: Design) -> float:
@@ -327,4 +314,4 @@ def _lean_over_rounding(design: Design) -> float:
     per_distance = [numbers.per_grip, numbers.per_weight]
     if design.rising_until is not None:
         per_distance += [numbers.per_falling, numbers.per_rising]
-    return float(LEAN / max(per_distance) / (8.0 * n * FLOAT * b.weight))
+    return float(CHOSEN.lean / max(per_distance) / (8.0 * n * FLOAT * b.weight))

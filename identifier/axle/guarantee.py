@@ -26,23 +26,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
+from identifier.axle.chosen import CHOSEN
 from identifier.axle.curve import unit_matrix
 from identifier.axle.learning import Bounds
 from identifier.band import Axle, ends, of_axle
 from models.recordings import Recording
 
-MEMORY = 0.3  # s: of the rate, and of slip that was beyond
 SECANTS = tuple(0.004 * 2.0**k for k in np.arange(0.0, 7.5, 0.5))  # rad, where a curve bends down
-UNLIKELY = 1.5  # lateness, over error: chosen as `verdict.guaranteed.RESERVE` was
-FIRST, MORE = 150, 100  # constraints that are tried first, and added at a time
-SLACK = 1e-9  # static axle loads
-LEAST_RADIUS = 1e-6  # static axle loads of a ball in the polytope: below it there is no inside
-TINY = 1e-12  # of a size that is divided by: straight ahead nothing is said of the weights
-LARGEST_BOUND = 10.0  # static axle loads
-LONGEST_LATENESS = 1.0  # s
-MOST_VERTICES = 100_000
 PAIRS = ("error_static_axle_loads", "lateness_s", "fastest_static_axle_loads_per_s")
-AT_ONCE = 256  # samples times all vertices: so many products stay in the cache
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,15 +48,16 @@ class ForceBound:
 
     def __post_init__(self) -> None:
         for value in self.error:
-            if not 0.0 < value <= LARGEST_BOUND:
+            if not 0.0 < value <= CHOSEN.largest_bound:
                 raise ValueError(
-                    f"the bound of an error must be above 0 and at most {LARGEST_BOUND:g} static "
+                    f"the bound of an error must be above 0 and at most {CHOSEN.largest_bound:g} "
+                    f"static "
                     f"axle loads, it is {value:g}"
                 )
         for value in self.lateness:
-            if not 0.0 <= value <= LONGEST_LATENESS:
+            if not 0.0 <= value <= CHOSEN.longest_lateness:
                 raise ValueError(
-                    f"lateness must be from 0 to {LONGEST_LATENESS:g} s, it is {value:g}"
+                    f"lateness must be from 0 to {CHOSEN.longest_lateness:g} s, it is {value:g}"
                 )
 
     @classmethod
@@ -167,16 +159,16 @@ def _least(cost: Array, among: HalfSpaces, free: int) -> Array | None:
 
 def _first(m: int) -> NDArray[np.intp]:
     """Return which of m constraints are tried first: the first ones, a box, and some of all."""
-    some = np.linspace(0, m - 1, FIRST).astype(np.intp)
-    return np.union1d(np.arange(min(FIRST, m)), some)
+    some = np.linspace(0, m - 1, CHOSEN.first).astype(np.intp)
+    return np.union1d(np.arange(min(CHOSEN.first, m)), some)
 
 
 def _broken(over: Array, tried: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return which of the constraints that were not tried are broken most; none: it holds."""
     over = over.copy()
     over[tried] = -np.inf
-    worst = np.argsort(over)[-MORE:]
-    broken: NDArray[np.intp] = worst[over[worst] > SLACK]
+    worst = np.argsort(over)[-CHOSEN.more :]
+    broken: NDArray[np.intp] = worst[over[worst] > CHOSEN.slack]
     return broken
 
 
@@ -192,7 +184,7 @@ def least_bound(strips: Strips, axle: int, box: HalfSpaces) -> tuple[float, floa
     sides = np.vstack([np.hstack([h, -beside]), np.hstack([-h, -beside])])
     kept = np.hstack([box.A, np.zeros((box.b.size, 2))])
     among = HalfSpaces(np.vstack([kept, sides]), np.concatenate([box.b, y, -y]))
-    cost = np.concatenate([np.zeros(n), [1.0, UNLIKELY * float(rate.mean())]])
+    cost = np.concatenate([np.zeros(n), [1.0, CHOSEN.unlikely * float(rate.mean())]])
     x = _least(cost, among, n)
     if x is None:  # the box alone is never empty, and errors may be as large as they like
         raise ArithmeticError("no bound fits: the linear program of the least bound has no answer")
@@ -204,14 +196,14 @@ def vertices(among: HalfSpaces) -> Array | None:
     from scipy.spatial import HalfspaceIntersection
 
     A, b = among
-    n, length = A.shape[1], np.maximum(np.linalg.norm(A, axis=1), TINY)
+    n, length = A.shape[1], np.maximum(np.linalg.norm(A, axis=1), CHOSEN.guarantee_tiny)
     inside = _least(  # the largest ball
         np.append(np.zeros(n), -1.0), HalfSpaces(np.column_stack([A, length]), b), n
     )
-    if inside is None or not inside[-1] >= LEAST_RADIUS:
+    if inside is None or not inside[-1] >= CHOSEN.least_radius:
         return None
     center, slack = inside[:-1], b - A @ inside[:-1]
-    tried = np.union1d(_first(b.size), np.argsort(slack / length)[:FIRST])
+    tried = np.union1d(_first(b.size), np.argsort(slack / length)[: CHOSEN.first])
     while True:
         sides = np.column_stack([A[tried], -b[tried]])
         corners: Array = HalfspaceIntersection(sides, center).intersections
@@ -254,7 +246,7 @@ class PossibleWeights:
                     f"the fastest force of the guarantee must be positive, it is {rate}"
                 )
         for corners in self.corners:
-            if corners.ndim != 2 or not 0 < len(corners) <= MOST_VERTICES:
+            if corners.ndim != 2 or not 0 < len(corners) <= CHOSEN.most_vertices:
                 raise ValueError(
                     f"corners of the possible weights must be (k, n), they are {corners.shape}"
                 )
@@ -289,7 +281,9 @@ class PossibleWeights:
         One is proof that the bound does not hold there: other tires, another road, a sensor.
         """
         low, high = self.limits(strips.h, Doubt(strips.beyond, strips.rate, strips.lost))
-        outside: NDArray[np.bool_] = (strips.y < low - SLACK) | (strips.y > high + SLACK)
+        outside: NDArray[np.bool_] = (strips.y < low - CHOSEN.slack) | (
+            strips.y > high + CHOSEN.slack
+        )
         return outside
 
     def to_dict(self) -> dict[str, Any]:
@@ -383,8 +377,8 @@ class Guarantee(NamedTuple):
 def _extremes(rows: Array, corners: Array) -> tuple[Array, Array]:
     """Return least and largest product of each row (k, n) with corners (m, n), (k,) each."""
     least, most = np.empty(len(rows)), np.empty(len(rows))
-    for first in range(0, len(rows), AT_ONCE):
-        part = slice(first, first + AT_ONCE)
+    for first in range(0, len(rows), CHOSEN.at_once):
+        part = slice(first, first + CHOSEN.at_once)
         products = corners @ rows[part].T
         least[part], most[part] = products.min(axis=0), products.max(axis=0)
     return least, most
@@ -415,7 +409,7 @@ def _faded(signal: Array, dt: float) -> Array:
     """Return the mean of a signal (k, ...) over the last 0.3 s, fading."""
     from scipy.signal import lfilter
 
-    e = math.exp(-dt / MEMORY)
+    e = math.exp(-dt / CHOSEN.memory)
     mean: Array = lfilter([1.0 - e], [1.0, -e], signal, axis=0, zi=e * signal[:1])[0]
     return mean
 
@@ -436,7 +430,7 @@ def slip_beyond(slip: Array, driven: Array, dt: float, segments: Iterable[slice]
     beyond = np.zeros_like(slip)
     for part in segments:
         over = _beyond_driven(slip[part], driven)
-        age = dt / MEMORY * np.arange(len(over))[:, None]
+        age = dt / CHOSEN.memory * np.arange(len(over))[:, None]
         with np.errstate(divide="ignore"):  # ln 0: nothing was beyond yet
             beyond[part] = np.exp(np.maximum.accumulate(np.log(over) + age, axis=0) - age)
     return beyond
@@ -449,7 +443,9 @@ def grip_lost(along: Array, grip: Array) -> Array:
     along : f, force along the car over the load of each axle (k, 2).
     grip : what the axle carries at least (2,) or (k, 2) [static axle loads].
     """
-    lost: Array = 1.0 - np.sqrt(1.0 - np.minimum(np.abs(along) / np.maximum(grip, TINY), 1.0) ** 2)
+    lost: Array = 1.0 - np.sqrt(
+        1.0 - np.minimum(np.abs(along) / np.maximum(grip, CHOSEN.guarantee_tiny), 1.0) ** 2
+    )
     return lost
 
 
@@ -459,5 +455,7 @@ def along_acceleration(v_x: Array, turning: Array, dt: float, segments: Iterable
     """
     along = np.zeros_like(v_x)
     for part in segments:
-        along[part] = (v_x[part] - _faded(v_x[part], dt)) / MEMORY - _faded(turning[part], dt)
+        along[part] = (v_x[part] - _faded(v_x[part], dt)) / CHOSEN.memory - _faded(
+            turning[part], dt
+        )
     return along

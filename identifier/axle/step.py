@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
-from identifier.axle.band import AT_SPEEDS, CENTERS
 from identifier.axle.band_step import AtSample, BandNumbers, half_band
 from identifier.axle.bank import UNPROVEN, SlopeNumbers, SlopeState, road_push, slope_step
 from identifier.axle.car import (
@@ -27,13 +26,11 @@ from identifier.axle.car import (
     symbols,
     within,
 )
+from identifier.axle.chosen import CHOSEN
 from identifier.axle.covariance import factors_of, inflated, row_of, spread, triangle
 from identifier.axle.curve import EDGES, EXCITATION, Curve, curve, excited
 from identifier.axle.gate import GATE_PORT, Gate, GateState, Plausibility, gate
 from identifier.axle.learning import (
-    LARGEST_Q,
-    MOST_SLOW,
-    SLOW_Q,
     BoundNumbers,
     ErrorState,
     Learnt,
@@ -258,8 +255,8 @@ def _band_ports(n: int) -> dict[str, Any]:
     """Return the ports of the band."""
     return {
         "banding": (2, BandNumbers),
-        "slip_factors": (2, len(CENTERS)),
-        "speed_factors": (2, len(AT_SPEEDS)),
+        "slip_factors": (2, len(CHOSEN.centers)),
+        "speed_factors": (2, len(CHOSEN.at_speeds)),
         "prior": (2, len(triangle(n + 3))),
     }
 
@@ -471,11 +468,11 @@ def _errors(
     numbers, (fast, trend, slow, _) = s.changing, s.errors
     learns, declared = sample.learns, sample.sigma**2
     V = declared * slow + unsure
-    q = smaller(sample.e**2 / V, LARGEST_Q)
-    of_noise = smaller(sample.e**2 / declared, SLOW_Q * slow)
+    q = smaller(sample.e**2 / V, CHOSEN.largest_q)
+    of_noise = smaller(sample.e**2 / declared, CHOSEN.slow_q * slow)
     means = fast + learns * numbers.fast * (q - fast)
     lasting = trend + learns * numbers.trend * (larger(q, 1) - trend)
-    noise = within(slow + learns * numbers.slow * (of_noise - slow), 1, MOST_SLOW)
+    noise = within(slow + learns * numbers.slow * (of_noise - slow), 1, CHOSEN.most_slow)
     road = evidence(
         numbers,
         s.change,

@@ -17,6 +17,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.baselines.chosen import CHOSEN
 from identifier.baselines.curves import CURVES, CurveModel, measured_slip, unlagged
 from identifier.baselines.kalman import CARRY, PORTS, correct, midpoint
 from identifier.baselines.ports import (
@@ -42,12 +43,8 @@ from models.vehicle import GRAVITY, Vehicle
 # friction positive; a logistic keeps the Magic Formula's shape C between 1 and 2, where the force
 # has a peak and keeps its sign.
 
-TYPICAL_SHAPE = 1.4  # C of a passenger tire, Pacejka, Tyre and Vehicle Dynamics, figure 4.9
-_LOGIT = math.log((TYPICAL_SHAPE - 1.0) / (2.0 - TYPICAL_SHAPE))
+_LOGIT = math.log((CHOSEN.typical_shape - 1.0) / (2.0 - CHOSEN.typical_shape))
 _STIFFNESS, _SHAPE, _FRICTION = range(3)
-_LIMITS = (2.0, 3.0, 1.5)  # of |θ| by kind: stiffness within a factor of 7.4, friction 4.5
-_LAG_LIMIT = 2.0  # of |ln σ/σ₀|: a relaxation length within a factor of 7.4
-_OFFSET_LIMITS = (5.0, 8.0)  # spreads of δ₀ and of b: 0.01 rad, for a sedan 0.2 m/s
 
 
 _SPREADS = ("stiffness_spread", "shape_spread", "friction_spread")  # in the order of the kinds
@@ -65,7 +62,6 @@ def _decoded(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any
 
 _NOISE = ("v_y_noise", "r_noise", "v_y_disturbance", "r_disturbance", "outlier")
 _CONSTANTS = ("noise", "walk", "limit", "prior", "learning_speed")
-OWN = 4  # unknowns beside those of the curve: ln σ/σ₀ (2,), δ₀ and b over their spreads
 _OWN_PRIOR = ("relaxation_length", "steering_spread", "v_y_spread")
 
 
@@ -82,7 +78,7 @@ def _build_step(textbook: bool) -> ca.Function:
     textbook : whether it is without lag and offsets; then θ is that of the curve alone.
     """
     s, of_curve = sample_ports(), len(KINDS)
-    lags, own, prior = (0, 0, 1) if textbook else (2, OWN, 1 + len(_OWN_PRIOR))
+    lags, own, prior = (0, 0, 1) if textbook else (2, CHOSEN.own, 1 + len(_OWN_PRIOR))
     unknowns = of_curve + own
     p, dt, n = s.parameters, s.sampling[0], 2 + lags + unknowns
     estimate, P, before = ca.SX.sym("estimate", n), ca.SX.sym("P", n, n), ca.SX.sym("before", 3)
@@ -279,8 +275,8 @@ class CurveEkf(Method):
     @property
     def limit(self) -> Array:
         """What the unknowns θ stay within, (n,) [-]."""
-        of_curve = [_LIMITS[kind] for kind in KINDS]
-        own = [] if self.textbook else [_LAG_LIMIT, _LAG_LIMIT, *_OFFSET_LIMITS]
+        of_curve = [CHOSEN.limits[kind] for kind in KINDS]
+        own = [] if self.textbook else [CHOSEN.lag_limit, CHOSEN.lag_limit, *CHOSEN.offset_limits]
         return np.array([*of_curve, *own])
 
     def model(self, vehicle: Vehicle, theta: Array) -> CurveModel:

@@ -16,10 +16,10 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.baselines.chosen import CHOSEN
 from identifier.baselines.ports import (
     LAG_PORTS,
     OVER,
-    SHORTEST,
     axle_loads,
     lag_symbols,
     lagged_slip,
@@ -37,8 +37,6 @@ from models.bicycle import BicycleParameters, slip_angles
 from models.schema import Table
 from models.vehicle import GRAVITY, Vehicle
 
-TINY = 1e-9  # rad: keeps Dugoff's λ finite at zero slip, where it does not matter
-LONGEST = 10.0  # wheelbases, of a relaxation length
 _MOST_OFFSET = np.array([0.5, 10.0])  # rad and m/s: beyond it a sensor is not mounted, but broken
 
 
@@ -95,7 +93,7 @@ def dugoff(q: Any, loads: Any, alpha: Any, u: Any) -> Any:
     """
     C, mu = q[:, 0], q[:, 1]
     slope = ca.tan(ca.fmin(ca.fmax(alpha, -1.5), 1.5))  # short of a right angle
-    lam = ca.fmin(mu * loads / (2 * C * ca.fmax(ca.fabs(slope), TINY)), 1)
+    lam = ca.fmin(mu * loads / (2 * C * ca.fmax(ca.fabs(slope), CHOSEN.tiny)), 1)
     return C * slope * lam * (2 - lam) * ca.cos(u)
 
 
@@ -187,7 +185,7 @@ class CurveModel(TireModel):
             )
         if not (np.isfinite(self.parameters) & (self.parameters > 0.0)).all():
             raise ValueError(f"parameters must be positive, they are {self.parameters.tolist()}")
-        longest = LONGEST * self.vehicle.wheelbase
+        longest = CHOSEN.longest * self.vehicle.wheelbase
         for name, value, low, high in (
             ("relaxation_length [m]", self.relaxation_length, 0.0, longest),
             ("offset [rad, m/s]", self.offset, -_MOST_OFFSET, _MOST_OFFSET),
@@ -233,7 +231,7 @@ class CurveModel(TireModel):
         alpha = measured_slip(CURVES[self.curve], p, self.offset, v_x, x, u)
         if not self.lagged:
             return self._force(alpha, delta), ca.MX(0, 1)
-        time = ca.fmax(ca.DM(np.maximum(self.relaxation_length, SHORTEST)) / v_x, least_lag)
+        time = ca.fmax(ca.DM(np.maximum(self.relaxation_length, CHOSEN.shortest)) / v_x, least_lag)
         return self._force(slip, delta), (alpha - slip) / time
 
     def _force(self, alpha: Any, delta: Any) -> Any:

@@ -18,7 +18,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.baselines.curve_ekf import TYPICAL_SHAPE
+from identifier.baselines.chosen import CHOSEN
 from identifier.baselines.curves import CURVES, CurveModel, measured_slip, unlagged
 from identifier.baselines.kalman import CARRY, PORTS, corrected, midpoint
 from identifier.baselines.ports import (
@@ -38,11 +38,8 @@ from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
 CURVE = CURVES["magic_formula"]
-STIFFNESS, FRICTION = 14.0, 0.85  # at first, in static axle loads
 BOUNDS = np.log([[2.0, 60.0], [0.2, 1.6]])  # of ln C and ln μ
 TIRE = slice(4, 8)  # of the state
-STATES = 10
-_NO_GATE = 1e6  # standard deviations
 
 
 class Numbers(NamedTuple):
@@ -68,7 +65,7 @@ def _curve_parameters(theta: Any, loads: Any) -> Any:
     theta : ln C and ln μ of both axles (4,).   loads : static, (2,) [N].
     """
     stiffness, friction = ca.exp(theta[:2]), ca.exp(theta[2:])
-    shape = ca.DM.ones(2) * TYPICAL_SHAPE
+    shape = ca.DM.ones(2) * CHOSEN.typical_shape
     return ca.horzcat(stiffness / (shape * friction), shape, friction * loads)
 
 
@@ -76,7 +73,7 @@ def build_step(name: str) -> ca.Function:
     """Return the filter's step; carried are the ports of a `kalman` filter whose tire lags."""
     ports, last = given_ports(), lag_symbols()
     s, p = ports.sample, ports.sample.parameters
-    estimate, P = ca.SX.sym("estimate", STATES), ca.SX.sym("P", STATES, STATES)
+    estimate, P = ca.SX.sym("estimate", CHOSEN.states), ca.SX.sym("P", CHOSEN.states, CHOSEN.states)
     before, running = ca.SX.sym("before", 3), ca.SX.sym("running")
     numbers = ca.SX.sym("numbers", len(Numbers._fields))
     given, dt, loads = Numbers(*ca.vertsplit(numbers)), s.sampling[0], axle_loads(p, GRAVITY)
@@ -100,13 +97,13 @@ def build_step(name: str) -> ca.Function:
     walks = ca.vertcat(
         *(given.v_y_disturbance, given.r_disturbance, 0, 0), *[given.walk] * 4, ca.SX(2, 1)
     )
-    at = ca.SX.sym("at", STATES)
+    at = ca.SX.sym("at", CHOSEN.states)
     shows = ca.vertcat(at[:2], ca.sum1(force(at, at[2:4], s.u)) / p.m + at[9])
     shows, H = ca.substitute([shows, ca.jacobian(shows, at)], [at], [ahead])
     H[2, :] *= ports.has_a_y
     missed = ca.vertcat(s.x - shows[:2], ports.has_a_y * (ports.a_y - shows[2]))
     R = ca.diag(ca.vertcat(*given[:3]) ** 2)
-    found = corrected(F @ P @ F.T + ca.diag(walks**2 * dt), H, R, missed, _NO_GATE)
+    found = corrected(F @ P @ F.T + ca.diag(walks**2 * dt), H, R, missed, CHOSEN.no_gate)
 
     after = ahead + found.move
     low, high = (np.repeat(BOUNDS[:, k], 2) for k in (0, 1))
@@ -198,7 +195,7 @@ class LaggedEkf(Method):
         """Return what a run needs; it begins afresh, with no stored model."""
         if start is not None:
             raise ValueError("the lagged filter begins afresh: it goes on from no stored model")
-        theta = np.repeat(np.log([STIFFNESS, FRICTION]), 2)
+        theta = np.repeat(np.log([CHOSEN.stiffness, CHOSEN.friction]), 2)
         spread = [self.stiffness_spread] * 2 + [self.friction_spread] * 2
         slip = self.v_y_noise / self.learning_speed
         sd = [self.v_y_noise, self.r_noise, slip, slip, *spread]

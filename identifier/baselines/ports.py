@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
+from identifier.baselines.chosen import CHOSEN
 from identifier.setup import Port
 from models.bicycle import BicycleParameters, bicycle
 
 OVER = ("x", "u", "v_x")
 WITH_A_Y = (*OVER, "a_y")
-_MOST_FELT = 98.0  # m/s²: no car feels more
 _SAMPLING = ("dt", "min_speed")
 
 
@@ -80,7 +80,7 @@ class Given(NamedTuple):
 
 def given_ports() -> Given:
     a_y = ca.SX.sym("a_y")
-    has_a_y = ca.fabs(a_y) < _MOST_FELT  # NaN is not
+    has_a_y = ca.fabs(a_y) < CHOSEN.most_felt  # NaN is not
     return Given(sample_ports(), ca.if_else(has_a_y, a_y, 0), has_a_y, a_y)
 
 
@@ -110,7 +110,6 @@ LAG_DESCRIBED = (
     Port("alpha", "rad", "slip angles of the last sample, front and rear"),
     Port("begun", "-", "1 after a sample in motion, from which slip lags"),
 )
-SHORTEST = 1e-9  # m: keeps v_x T_s/σ finite without a lag, where e^(-v_x T_s/σ) is zero
 
 
 def lag_symbols() -> LaggedSlip:
@@ -122,6 +121,6 @@ def lagged_slip(last: LaggedSlip, alpha: Any, way: Any, sigma: Any) -> Any:
     alpha : slip angles now (2,) [rad].   way : v_x T_s, what the tire has rolled [m].
     sigma : relaxation lengths (2,) [m], not negative.
     """
-    e = ca.exp(-way / ca.fmax(sigma, SHORTEST))
+    e = ca.exp(-way / ca.fmax(sigma, CHOSEN.shortest))
     follow = e * (last.slip - last.alpha) - (1 - e) * sigma / way * (alpha - last.alpha)
     return alpha + ca.if_else(last.begun > 0.5, follow, 0)

@@ -20,14 +20,8 @@ from identifier.method import CannotFreezeError, Method
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.run import History, identify
 from identifier.tire_model import TireModel
-from identifier.verdict.motion import (
-    BRISK,
-    FEWEST,
-    Windows,
-    clean_rms,
-    measured_force,
-    noise_variance,
-)
+from identifier.verdict.chosen import CHOSEN as VERDICT_CHOSEN
+from identifier.verdict.motion import Windows, clean_rms, measured_force, noise_variance
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
@@ -51,9 +45,10 @@ class Course:
         for recording in self.recordings:
             if names.count(recording.name) > 1:
                 raise ValueError(f"{recording.name} is given twice: each needs its own name")
-            if self.by_motion and len(self._windows(recording)) < FEWEST:
+            if self.by_motion and len(self._windows(recording)) < VERDICT_CHOSEN.fewest:
                 raise ValueError(
-                    f"{recording.name}: fewer than {FEWEST} windows are driven briskly, and there "
+                    f"{recording.name}: fewer than {VERDICT_CHOSEN.fewest} windows are driven "
+                    f"briskly, and there "
                     "are no true forces Fyf, Fyr to judge by"
                 )
             size = self.size(recording)
@@ -72,7 +67,9 @@ class Course:
         return f"RMSE of the axle force{by}"
 
     def _windows(self, recording: Recording) -> Windows:
-        return Windows.of(recording, max(self.min_speed, BRISK * self.vehicle.froude_speed))
+        return Windows.of(
+            recording, max(self.min_speed, VERDICT_CHOSEN.brisk * self.vehicle.froude_speed)
+        )
 
     def size(self, recording: Recording) -> AxleRmse:
         """Return the rms over the samples that count of the forces that methods are judged by."""

@@ -15,25 +15,20 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.doctor.pieces import SLOWEST, driven_windows, looked_at, usual_speed
+from identifier.doctor.chosen import CHOSEN
+from identifier.doctor.pieces import driven_windows, looked_at, usual_speed
 from models.recordings import Recording
 from models.sensors import white_noise
 from models.vehicle import GRAVITY, Vehicle
 
-FEWEST, MOST = 20, 500  # windows: fewer say nothing, of more that many are taken all over the log
-# Curves that are tried, on one grid of c and μ, so that many have the same c/μ: to saturate them,
-# which costs most, is done once for each of these.
-_FINENESS, _STIFFNESSES, FRICTIONS = 100.0 ** (1.0 / 27.0), 28, 15
-STIFFNESS = _FINENESS ** np.arange(_STIFFNESSES)  # c [1/rad], 1 to 100
-FRICTION = 0.3 * _FINENESS ** np.arange(FRICTIONS)[:, None]  # μ [-], 0.3 to 3.3
-RATIOS = _FINENESS ** np.arange(1 - FRICTIONS, _STIFFNESSES)[:, None] / 0.3  # c/μ [1/rad]
-_RATIO_OF = np.arange(_STIFFNESSES) - np.arange(FRICTIONS)[:, None] + FRICTIONS - 1  # of μ and c
-# A stiffness that is twice the declared one costs as much as 14 % of what is left unexplained.
-_DISBELIEF = 0.3  # per square of the logarithm of c over the declared one
-FAST = 6.0  # sqrt(g L), 30 m/s for a sedan; what is faster costs as much per square of a logarithm
-EXACT = 0.003  # share of the variance of φ, below which less that is left says nothing more
-CLEAR = 2.5  # times its noise that a channel must swing for its unit to be identified
-_ROLLING = (0.85, 1.25)  # slope of a_y on dv_y/dt + v_x r, with the roll of the body
+STIFFNESS = CHOSEN.fineness ** np.arange(CHOSEN.stiffnesses)  # c [1/rad], 1 to 100
+FRICTION = 0.3 * CHOSEN.fineness ** np.arange(CHOSEN.frictions)[:, None]  # μ [-], 0.3 to 3.3
+RATIOS = (
+    CHOSEN.fineness ** np.arange(1 - CHOSEN.frictions, CHOSEN.stiffnesses)[:, None] / 0.3
+)  # c/μ [1/rad]
+_RATIO_OF = (
+    np.arange(CHOSEN.stiffnesses) - np.arange(CHOSEN.frictions)[:, None] + CHOSEN.frictions - 1
+)  # of μ and c
 
 
 class Reading(NamedTuple):
@@ -83,13 +78,17 @@ class Motion(NamedTuple):
         speed = usual_speed(pieces)
         if speed == 0.0:
             return None
-        rows = np.concatenate([_rows(one, SLOWEST * speed) for one in pieces], axis=1)
+        rows = np.concatenate([_rows(one, CHOSEN.slowest * speed) for one in pieces], axis=1)
         m = rows.shape[1]
-        if m < FEWEST:
+        if m < CHOSEN.fewest:
             return None
-        *means, a_y = rows if m <= MOST else rows[:, np.linspace(0, m - 1, MOST).astype(int)]
+        *means, a_y = (
+            rows
+            if m <= CHOSEN.consistency_most
+            else rows[:, np.linspace(0, m - 1, CHOSEN.consistency_most).astype(int)]
+        )
         felt = None if recording.a_y is None else a_y
-        return cls._make((*means, felt, speed, _hidden(pieces, SLOWEST * speed)))
+        return cls._make((*means, felt, speed, _hidden(pieces, CHOSEN.slowest * speed)))
 
 
 def _rows(recording: Recording, fast: float) -> Array:
@@ -111,7 +110,7 @@ def _hidden(pieces: tuple[Recording, ...], fast: float) -> frozenset[str]:
             continue
         means = [driven_windows(one, fast).mean(getattr(one, name)) for one in pieces]
         noise = float(np.median([white_noise(getattr(one, name)) for one in pieces]))
-        if float(np.std(np.concatenate(means))) < CLEAR * noise:
+        if float(np.std(np.concatenate(means))) < CHOSEN.clear * noise:
             found.add(name)
     return frozenset(found)
 
@@ -142,7 +141,7 @@ def but_front_leaves(one: _AxleMotion, motion: Motion, vehicle: Vehicle, reading
     """Return what is left of all other equations."""
     froude = abs(reading.v_x) * motion.speed / (math.sqrt(reading.size) * vehicle.froude_speed)
     declared = vehicle.cornering_stiffness_rear / vehicle.axle_loads[1]
-    total = max(math.log(froude / FAST), 0.0) ** 2
+    total = max(math.log(froude / CHOSEN.fast), 0.0) ** 2
     total += _curve_leaves(one.force[1], one.slip[1], declared)
     if motion.a_y is not None:
         total += _accelerometer_leaves(reading.a_y * motion.a_y, one.acceleration)
@@ -169,7 +168,7 @@ def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> _Axl
 
 
 def _curve_leaves(force: Array, slip: Array, declared: float) -> float:
-    disbelief = _DISBELIEF * np.log(STIFFNESS / declared) ** 2
+    disbelief = CHOSEN.disbelief * np.log(STIFFNESS / declared) ** 2
     force = force - force.mean()
     size = float(force @ force) + 1e-12
     bent = RATIOS * slip
@@ -177,12 +176,12 @@ def _curve_leaves(force: Array, slip: Array, declared: float) -> float:
     bent -= bent.mean(axis=1, keepdims=True)
     along, power = bent @ force, np.einsum("ij,ij->i", bent, bent)
     left = size - 2.0 * FRICTION * along[_RATIO_OF] + FRICTION**2 * power[_RATIO_OF]
-    return float(np.min(np.log(np.clip(left / size, 0.0, 1.0) + EXACT) + disbelief))
+    return float(np.min(np.log(np.clip(left / size, 0.0, 1.0) + CHOSEN.exact) + disbelief))
 
 
 def _accelerometer_leaves(a_y: Array, acceleration: Array) -> float:
     """Return the logarithm of the share of a_y that the motion does not explain."""
     measured, moved = a_y - a_y.mean(), acceleration - acceleration.mean()
-    slope = float(np.clip(measured @ moved / (moved @ moved + 1e-12), *_ROLLING))
+    slope = float(np.clip(measured @ moved / (moved @ moved + 1e-12), *CHOSEN.rolling))
     left = float(np.sum((measured - slope * moved) ** 2)) / (float(measured @ measured) + 1e-12)
-    return math.log(min(left, 1.0) + EXACT)
+    return math.log(min(left, 1.0) + CHOSEN.exact)

@@ -4,11 +4,11 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+from identifier.doctor.chosen import CHOSEN
 from identifier.doctor.faults import Examination, examine, prepared
 from identifier.doctor.finding import Finding, first_of_each
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import (
-    NEAR,
     Screened,
     before_sizes,
     clock_findings,
@@ -23,10 +23,7 @@ from models.recordings.repair import Repair
 from models.vehicle import Vehicle, VehicleError
 
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
-ROUNDS, SETTLED = 2, 0.02  # to which the ratio of a steering wheel is settled
-WIDE = 1.0  # of that ratio, by which the screen may be off
 ELSEWHERE = ("velocity_sensor_x", "v_y")  # what may be in place of a gross fault
-SURELY = 0.9  # confidence that a law is broken
 WITHOUT_V_Y = "all but what contradicts physics or the car: the log has no lateral velocity"
 NEVER = (
     "mass: scales all forces alike and leaves the motion as it is; weigh the car",
@@ -102,7 +99,7 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     """
     world = world_axes(recording)
     if world is not None:  # nothing that follows would be of this car
-        finding = Finding(code="world_axes", channel="v_y", confidence=SURELY, text=world)
+        finding = Finding(code="world_axes", channel="v_y", confidence=CHOSEN.surely, text=world)
         return Diagnosis(name=recording.name, findings=(finding,), unobservable=NEVER)
     if recording.logged_v_y is None:
         samples = clock_findings(recording) or sample_findings(recording)
@@ -157,7 +154,9 @@ def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
     """
     blind = replace(recording, axle_force=None)
     said = physics_contradiction(blind) or vehicle_contradiction(blind, vehicle)
-    return [] if said is None else [Finding(code="contradiction", confidence=SURELY, text=said)]
+    return (
+        [] if said is None else [Finding(code="contradiction", confidence=CHOSEN.surely, text=said)]
+    )
 
 
 def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | None:
@@ -167,18 +166,18 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | N
     """
     assert coarse.repair is not None
     factor, deviation = coarse.repair.factor["delta_f"], math.nan
-    for _ in range(ROUNDS):
+    for _ in range(CHOSEN.rounds):
         search = prepared(drive, car)
         if search is None:
             return coarse
-        search.wide["steering_gain"] = WIDE
+        search.wide["steering_gain"] = CHOSEN.wide
         post = search.run()  # what distorts the motion distorts the ratio
         gain, deviation = post["steering_gain"], post.sd("steering_gain")
         factor *= 1.0 + gain
-        if abs(gain) < SETTLED:
+        if abs(gain) < CHOSEN.settled:
             break
         drive, _ = Repair(factor={"delta_f": 1.0 + gain}).apply(drive, car)
-    if abs(math.log(abs(factor))) < NEAR and factor > 0.0:
+    if abs(math.log(abs(factor))) < CHOSEN.near and factor > 0.0:
         return None
     exact = steering_finding(factor, coarse.confidence, deviation=deviation)
     return replace(exact, sure=exact.sure and coarse.sure)

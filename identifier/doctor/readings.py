@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from codegen.arrays import Array
+from identifier.doctor.chosen import CHOSEN
 from identifier.doctor.consistency import (
     Motion,
     Reading,
@@ -24,27 +25,15 @@ from models.vehicle import GRAVITY, Vehicle
 
 DEGREE, MILLI = math.pi / 180.0, 1e-3
 _KMH, _MPH, _KNOT = 1.0 / 3.6, 0.44704, 1852.0 / 3600.0
-GAIN = 1.1  # that a change must earn: less than it is left by a third in a sum of logarithms
-_FREEDOM = 0.5  # that a change must earn beside, whose factor is free
 ARM = "velocity_sensor_x"  # a size and no gross fault, tried beside: it may explain a log as well
 FREE = ("steering", "other_car", "yaw_inertia", ARM)
-_DEEPER = math.log(0.15)  # left of each equation, above which more changes are tried together
-KEPT = 8  # readings that are taken further
-JUDGED = 10  # of the best, by laws that need no vehicle
-MOST = 4  # changes at once
 STEERING = np.geomspace(1.0 / 2500.0, 4.0, 48)  # factors of the steering angle that are tried
-_SAME_STEERING, _SAME_SIZE, _SAME_INERTIA = math.log(2.5), math.log(2.2), math.log(2.0)
-# within which nothing is gross
-_FINER, FINEST = 5, 12  # golden sections: of an arm, of a steering angle
 SIZES = np.geomspace(1.0 / 32.0, 32.0, 41)
 _INERTIAS = np.geomspace(1.0 / 16.0, 16.0, 17)
 _ARMS = np.linspace(-1.0, 1.0, 17)  # wheelbases
-ALIKE = math.log(1.15)  # factors that say the same
-_STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
 
 
 _PRICES = {"mph": 0.3, "knots": 0.3, "mm/s": 0.3}  # of units that few loggers use
-_ALONE, _UNUSUAL = 2.8, 2.0  # of a v_y in another unit than v_x, and of one that is an angle in deg
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +91,10 @@ class Change:
         """Return whether both say the same, be it by a factor that is a little another one."""
         what = (self.code, self.channels, self.unit)
         pairs = zip(self.factors, other.factors, strict=False)
-        near = all(abs(math.log(abs(a / b))) < ALIKE and a * b > 0.0 for (_, a), (_, b) in pairs)
+        near = all(
+            abs(math.log(abs(a / b))) < CHOSEN.readings_alike and a * b > 0.0
+            for (_, a), (_, b) in pairs
+        )
         return what == (other.code, other.channels, other.unit) and near
 
 
@@ -112,7 +104,7 @@ def _changed(code: str, unit: str, factor: float, *channels: str, price: float =
 
 
 def _unit(unit: str, factor: float, *channels: str) -> Change:
-    alone = _ALONE if channels == ("v_y",) else 0.0
+    alone = CHOSEN.alone if channels == ("v_y",) else 0.0
     return _changed("unit", unit, factor, *channels, price=_PRICES.get(unit, 0.0) + alone)
 
 
@@ -132,7 +124,7 @@ CHANGES = (
             code="sideslip", channels=("v_y",), unit=unit, factors=(("v_y", one),), sideslip=True,
             price=price,
         )
-        for unit, one, price in (("rad", 1.0, 0.0), ("deg", DEGREE, _UNUSUAL))
+        for unit, one, price in (("rad", 1.0, 0.0), ("deg", DEGREE, CHOSEN.unusual))
     ),
     _unit("deg", DEGREE, "delta_f"),
     *(_sign(name) for name in ("v_y", "r", "v_x", "delta_f")),
@@ -160,8 +152,8 @@ class _Explanation:
     def cost(self) -> float:
         """What it leaves and what its changes cost; a number that is free costs more."""
         free = sum(change.code in FREE for change in self.changes)
-        prices = sum(GAIN + change.price for change in self.changes)
-        return self.left + prices + _FREEDOM * free
+        prices = sum(CHOSEN.gain + change.price for change in self.changes)
+        return self.left + prices + CHOSEN.freedom * free
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,7 +170,7 @@ class Read:
     @property
     def confidence(self) -> float:
         """From a half, where the next best reading is as good, to 1."""
-        return 1.0 / (1.0 + math.exp(-_STEEPNESS * (self.other.cost - self.best.cost)))
+        return 1.0 / (1.0 + math.exp(-CHOSEN.steepness * (self.other.cost - self.best.cost)))
 
 
 def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...]], bool]) -> Read:
@@ -194,16 +186,16 @@ def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...
     tried, best = [as_told], as_told
     equations = 2 if motion.a_y is None else 3
     beam = [as_told]
-    for _ in range(MOST):
+    for _ in range(CHOSEN.readings_most):
         longer = [new for one in beam for new in _longer(one, changes, motion, vehicle)]
         tried += longer
         before, best = best, min(tried, key=lambda one: one.cost)
-        if best is before and (len(beam) > 1 or best.left < equations * _DEEPER):
+        if best is before and (len(beam) > 1 or best.left < equations * CHOSEN.deeper):
             break
-        good = best is not before and best.left < equations * _DEEPER
-        beam = [best] if good else sorted(longer, key=lambda one: one.cost)[:KEPT]
+        good = best is not before and best.left < equations * CHOSEN.deeper
+        beam = [best] if good else sorted(longer, key=lambda one: one.cost)[: CHOSEN.kept]
     ranked = sorted(tried, key=lambda one: (one.cost, len(one.changes)))
-    lawful = [one for one in ranked[:JUDGED] if possible(one.changes)]
+    lawful = [one for one in ranked[: CHOSEN.judged] if possible(one.changes)]
     ranked = lawful + [one for one in ranked if one not in lawful]
     found = _chosen(ranked)
     in_place = _chosen([one for one in ranked if one.gross == one.changes])
@@ -233,9 +225,11 @@ def _longer(
     if "delta ratio" not in taken:
         free += _steerings(one, motion, vehicle)
     if "size size" not in taken and not one.changes:
-        free += _scaled("other_car", "size", SIZES, _SAME_SIZE, motion, vehicle)
+        free += _scaled("other_car", "size", SIZES, CHOSEN.same_size, motion, vehicle)
     if "inertia size" not in taken:
-        free += _scaled("yaw_inertia", "inertia", _INERTIAS, _SAME_INERTIA, motion, vehicle, one)
+        free += _scaled(
+            "yaw_inertia", "inertia", _INERTIAS, CHOSEN.same_inertia, motion, vehicle, one
+        )
     if not any(change.code == ARM for change in one.changes):
         free += _arms(one, motion, vehicle)
     longer = []
@@ -259,7 +253,7 @@ def _steerings(one: _Explanation, motion: Motion, vehicle: Vehicle) -> list[Chan
 
     tried = {float(factor): left(float(factor)) for factor in (*STEERING, *-STEERING)}
     factor = _refined(min(tried, key=lambda one: tried[one]), left)
-    if factor > 0.0 and abs(math.log(factor)) < _SAME_STEERING:
+    if factor > 0.0 and abs(math.log(factor)) < CHOSEN.same_steering:
         return []
     return [Change(code="steering", channels=("delta_f",), factors=(("delta", factor),))]
 
@@ -297,13 +291,13 @@ def _arms(one: _Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
     if share == 0.0:
         return []
     step = float(_ARMS[1] - _ARMS[0])
-    share = _least(left, share - step, share + step, _FINER)
+    share = _least(left, share - step, share + step, CHOSEN.finer)
     return [Change(code=ARM, channels=("v_y",), arm=share * length)]
 
 
 def _refined(factor: float, left: Callable[[float], float]) -> float:
     step = math.log(STEERING[1] / STEERING[0])
-    finer = _least(lambda by: left(factor * math.exp(by)), -step, step, FINEST)
+    finer = _least(lambda by: left(factor * math.exp(by)), -step, step, CHOSEN.finest)
     return factor * math.exp(finer)
 
 

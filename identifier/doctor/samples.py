@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from identifier.doctor.chosen import CHOSEN
 from identifier.doctor.finding import Finding, first_of_each
 from identifier.doctor.pieces import driven_pieces
 from models.recordings import Recording
@@ -21,19 +22,7 @@ LATERAL = ("v_y", "r", "delta_f", "a_y")
 CHANNELS = ("v_x", *LATERAL, "delta_r")
 UNITS = {"v_x": "m/s", "v_y": "m/s", "r": "rad/s", "delta_f": "rad", "delta_r": "rad",
          "a_y": "m/s^2"}  # fmt: skip
-_SPIKE = 12.0  # times the noise beyond its neighbors
-FREEZE = 0.3  # [s] that a noisy channel repeats one number
-MOVES = 0.15  # of the range of v_x r, by which a car must move meanwhile, in any unit
-_ALTERNATE = -0.35  # correlation of neighboring second differences, below which they are noise
-REPEATED, FEW = 0.01, 5  # of a noisy channel: share of repeated samples, and how often
-_CAUGHT_UP = 0.025  # of a rounded channel: share of samples after which it catches up
-_GOES_ON = 0.6  # of a step after a rest, that the next but one has where a channel begins to move
-ON_GRID = 0.9  # of steps that are multiples of the smallest
 _ESTIMATED, _SWITCHED = ("v_y", "r"), 2  # channels that may be, how often they are off in a turn
-_OUTLIER = 16.0  # times the variance that is expected of a difference, and not more
-ALIKE = math.log(1.6)  # of the times by which samples of two channels are late
-COARSE = 0.05  # quantum over the rms of a channel
-CERTAIN = 0.99
 
 
 class _Runs(NamedTuple):
@@ -61,7 +50,7 @@ def sample_findings(recording: Recording) -> list[Finding]:
         one
         for one in first_of_each(listed)
         if (one.code != "jitter" or one.channel in late)
-        and not (several and one.code == "clock" and one.confidence < CERTAIN)
+        and not (several and one.code == "clock" and one.confidence < CHOSEN.certain)
     ]
 
 
@@ -70,7 +59,9 @@ def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
 
     Noise of v_y alone may well grow with the slip, and that of a camera with the speed.
     """
-    alike = [one for one, size in late.items() if abs(math.log(size / late[name])) < ALIKE]
+    alike = [
+        one for one, size in late.items() if abs(math.log(size / late[name])) < CHOSEN.samples_alike
+    ]
     return "r" in alike and len(alike) > 1 and late[name] > 0.7 * dt
 
 
@@ -120,7 +111,7 @@ def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:
             if len(there) == len(pieces)
             else _stopped(name, float(there[0].t[0]), there[0].duration)
         )
-        yield _found("frozen", name, length, "s", CERTAIN, text)
+        yield _found("frozen", name, length, "s", CHOSEN.certain, text)
 
 
 def _stopped(name: str, since: float, duration: float) -> str:
@@ -144,7 +135,7 @@ def _copies(signals: Mapping[str, Array]) -> Iterator[Finding]:
             text = (
                 f"{other} {what} {one}, sample by sample: it was computed or mapped, not measured"
             )
-            yield _found("copied", other, ratio, "", CERTAIN, text)
+            yield _found("copied", other, ratio, "", CHOSEN.certain, text)
 
 
 def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Iterator[Finding]:
@@ -152,19 +143,19 @@ def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Ite
     noise = _noise(signal)
     quantum = _quantum(signal)
     runs = _runs(signal)
-    if quantum is not None and quantum > COARSE * float(np.std(signal)):
+    if quantum is not None and quantum > CHOSEN.coarse * float(np.std(signal)):
         text = (
             f"{name} comes in steps of {quantum:.3g} {UNITS[name]}: a coarse sensor, or too few "
             "digits were written"
         )
-        yield _found("quantized", name, quantum, UNITS[name], CERTAIN, text)
+        yield _found("quantized", name, quantum, UNITS[name], CHOSEN.certain, text)
     lost = _lost(signal, noise)
     if lost.size:
         text = (
             f"{name} drops to 0 for {lost.size} of {signal.size} samples, first at "
             f"{recording.t[lost[0]]:.4g} s: a lost sensor; leave these samples out of the log"
         )
-        yield _found("dropout", name, float(lost.size), "", CERTAIN, text)
+        yield _found("dropout", name, float(lost.size), "", CHOSEN.certain, text)
         return
     stairs = _stairs(runs, signal.size, quantum)
     if stairs is not None:
@@ -174,7 +165,7 @@ def _channel(name: str, signal: Array, recording: Recording, jumps: bool) -> Ite
             channel=name,
             size=stairs * dt,
             unit="s",
-            confidence=CERTAIN,
+            confidence=CHOSEN.certain,
             text=f"{name} has a new value every {1e3 * stairs * dt:.3g} ms only and repeats it in "
             f"between: so it is {1e3 * delay:.3g} ms late in the mean",
             repair=Repair(delay={name: delay}),
@@ -209,14 +200,14 @@ def _repeats(name: str, runs: _Runs, noisy: bool, recording: Recording) -> Itera
     grain = _grain(signal, runs)
     lost = _lost_on_the_way(signal, runs, grain)
     rests = not (lost[longest] or at + length == signal.size)
-    frozen = length * dt >= FREEZE and not rests and (noisy or name in ("v_y", "r", "a_y"))
+    frozen = length * dt >= CHOSEN.freeze and not rests and (noisy or name in ("v_y", "r", "a_y"))
     frozen = frozen and _runs_on(name, noisy, recording, at, length)
     first = float(recording.t[at])
     of_all, again = float(np.sum(runs.length[lost] - 1)), int(np.count_nonzero(lost))
     of_others = of_all - (length - 1) * bool(frozen and lost[longest])
-    enough = _CAUGHT_UP if grain is not None else REPEATED + _rounded_alike(signal)
+    enough = CHOSEN.caught_up if grain is not None else CHOSEN.repeated + _rounded_alike(signal)
     known = noisy or grain is not None
-    if known and of_others / len(recording) > enough and again >= FEW:
+    if known and of_others / len(recording) > enough and again >= CHOSEN.few:
         typical = float(np.median(runs.length[lost])) * dt
         most = f", the longest for {length * dt:.3g} s from {first:.4g} s on" if frozen else ""
         text = (
@@ -235,7 +226,7 @@ def _zero(name: str, runs: _Runs, recording: Recording) -> Finding | None:
     No sensor does that: an estimate does, which is switched off there.
     """
     signal, dt, usual = getattr(recording, name), recording.dt, _swing(_turning(name, recording))
-    long = np.flatnonzero((runs.length * dt >= FREEZE) & (signal[runs.first] == 0.0))
+    long = np.flatnonzero((runs.length * dt >= CHOSEN.freeze) & (signal[runs.first] == 0.0))
     places = [slice(int(runs.first[k]), int(runs.first[k] + runs.length[k])) for k in long]
     turning = [
         one for one in places if _moves(name, recording, one.start, one.stop - one.start, usual)
@@ -267,11 +258,11 @@ def _grain(signal: Array, runs: _Runs) -> float | None:
     kept = np.unique(signal[runs.first[runs.length > 2]])
     steps = np.diff(kept)
     steps = steps[steps > 1e-9 * float(np.abs(signal).max())]
-    if steps.size < FEW:
+    if steps.size < CHOSEN.few:
         return None
     step = float(np.median(steps[steps < 1.5 * float(steps.min())]))
     count = steps / step
-    return step if float(np.mean(np.abs(count - np.round(count)) < 0.05)) > ON_GRID else None
+    return step if float(np.mean(np.abs(count - np.round(count)) < 0.05)) > CHOSEN.on_grid else None
 
 
 def _lost_on_the_way(signal: Array, runs: _Runs, grain: float | None) -> NDArray[np.bool_]:
@@ -287,7 +278,7 @@ def _lost_on_the_way(signal: Array, runs: _Runs, grain: float | None) -> NDArray
     change = np.concatenate([np.diff(signal), [0.0, 0.0, 0.0]])
     end = runs.first + runs.length - 1
     step, after, later = change[end], change[end + 1], change[end + 2]
-    goes_on = step * later > _GOES_ON * step**2
+    goes_on = step * later > CHOSEN.goes_on * step**2
     far = np.minimum(np.abs(step), np.abs(step + after)) > 1.5 * grain
     may: NDArray[np.bool_] = again & far & ~goes_on
     return may
@@ -324,7 +315,7 @@ def _moves(name: str, recording: Recording, first: int, length: int, usual: floa
     width = max(1, min(round(0.2 / recording.dt), length // 2))
     turn = _turning(name, recording)[first : first + length]
     smooth = np.convolve(turn, np.ones(width) / width, "valid")
-    return bool(np.ptp(smooth) > MOVES * usual > 0.0)
+    return bool(np.ptp(smooth) > CHOSEN.moves * usual > 0.0)
 
 
 def _turning(name: str, recording: Recording) -> Array:
@@ -349,7 +340,11 @@ def _noise(signal: Array) -> float:
     cut = 6.0 * float(np.median(np.abs(a)))
     kept = (np.abs(a) < cut) & (np.abs(b) < cut)
     together = float(a[kept] @ b[kept]) / (float(np.sum(a[kept] ** 2)) + 1e-300)
-    return float(np.median(np.abs(a))) / (0.6745 * math.sqrt(6.0)) if together < _ALTERNATE else 0.0
+    return (
+        float(np.median(np.abs(a))) / (0.6745 * math.sqrt(6.0))
+        if together < CHOSEN.alternate
+        else 0.0
+    )
 
 
 def _runs(signal: Array) -> _Runs:
@@ -409,7 +404,7 @@ def _spikes(signal: Array, noise: float) -> NDArray[np.intp]:
     )
     around = np.ptp(np.stack([signal[:-4], signal[1:-3], signal[3:-1], signal[4:]]), axis=0)
     size = np.percentile(signal, 99) - np.percentile(signal, 1)
-    far = np.abs(off) > np.maximum(_SPIKE * noise, np.maximum(0.05 * size, 3.0 * around))
+    far = np.abs(off) > np.maximum(CHOSEN.spike * noise, np.maximum(0.05 * size, 3.0 * around))
     found: NDArray[np.intp] = np.flatnonzero(far) + 2
     return found
 
@@ -433,7 +428,7 @@ def _jitter(signal: Array, dt: float) -> tuple[float, float] | None:
         return None
     x, y = x / size_x, y / size_y
     X = np.column_stack([np.ones(x.size), x])
-    y = np.minimum(y, _OUTLIER * _two_step(X, y))
+    y = np.minimum(y, CHOSEN.outlier * _two_step(X, y))
     weight = 1.0 / _two_step(X, y)
     normal = X.T @ (weight[:, None] ** 2 * X)
     try:
@@ -459,11 +454,7 @@ def _two_step(X: Array, y: Array) -> Array:
 
 # The clock.
 
-BLOCK = 5  # samples in a row that were logged before, of all channels
-SHORTEST = 4.0  # samples that a jump has at least
 SMOOTH = ("v_y", "r", "v_x")  # that no car can change at once, as it can its steering
-SIDE = 12  # samples on each side of a jump
-_JUMP, _ALSO = 5.5, 2.5  # of the usual disagreement of both sides: in two channels, in a third
 
 
 def _clock_jump(recording: Recording, signals: Mapping[str, Array]) -> Finding | None:
@@ -473,7 +464,7 @@ def _clock_jump(recording: Recording, signals: Mapping[str, Array]) -> Finding |
     found = _torn(moving, dt) if again is None else (again[0], -again[1] * dt, 0.0)
     if found is None:
         return None
-    (at, size, deviation), confidence = found, 0.95 if again is None else CERTAIN
+    (at, size, deviation), confidence = found, 0.95 if again is None else CHOSEN.certain
     there = f"{recording.t[at]:.4g} s"
     text = f"all channels jump at once at {there}: time is missing or logged twice"
     if again is not None:
@@ -492,44 +483,46 @@ def _logged_again(moving: Mapping[str, Array]) -> tuple[int, int] | None:
     order = np.argsort(code, kind="stable")
     same = np.flatnonzero(np.diff(code[order]) == 0)
     back = order[same + 1] - order[same]
-    lags, count = np.unique(back[back > BLOCK], return_counts=True)
-    for lag in lags[count >= BLOCK]:
+    lags, count = np.unique(back[back > CHOSEN.block], return_counts=True)
+    for lag in lags[count >= CHOSEN.block]:
         late = np.sort(order[same + 1][back == lag])
         block = late[: np.count_nonzero(np.diff(late) == 1) + 1]
-        if np.all(np.ptp(table[block], axis=0) > 0.0) and block.size >= BLOCK:
+        if np.all(np.ptp(table[block], axis=0) > 0.0) and block.size >= CHOSEN.block:
             return int(late[0]), int(lag)
     return None
 
 
 def _torn(moving: Mapping[str, Array], dt: float) -> tuple[int, float, float] | None:
     """Return where both sides of an instant disagree in several channels, and by what time."""
-    names = [name for name in moving if moving[name].size > 20 * SIDE]
+    names = [name for name in moving if moving[name].size > 20 * CHOSEN.side]
     if len(names) < 3 or not set(names) & set(SMOOTH):
         return None
-    k = np.arange(SIDE) + 0.5
+    k = np.arange(CHOSEN.side) + 0.5
     V = np.vander(k, 3, increasing=True)
     weights = np.linalg.pinv(V)[0]  # of a parabola's value between both sides
     slopes = np.linalg.pinv(V)[1]
     score, torn, rate = [], [], []
     for name in names:
         signal = moving[name]
-        windows = np.lib.stride_tricks.sliding_window_view(signal, SIDE)
-        right, left = windows[SIDE:] @ weights, windows[:-SIDE] @ weights[::-1]
+        windows = np.lib.stride_tricks.sliding_window_view(signal, CHOSEN.side)
+        right, left = windows[CHOSEN.side :] @ weights, windows[: -CHOSEN.side] @ weights[::-1]
         jump = right - left
         usual = np.median(np.abs(jump)) / 0.6745
-        busy = np.convolve(np.abs(jump), np.ones(8 * SIDE) / (8 * SIDE), "same")
+        busy = np.convolve(np.abs(jump), np.ones(8 * CHOSEN.side) / (8 * CHOSEN.side), "same")
         score.append(np.abs(jump) / np.maximum(np.maximum(usual, 0.8 * busy), 1e-300))
         torn.append(jump)
-        rate.append(0.5 * (windows[SIDE:] @ slopes - windows[:-SIDE] @ slopes[::-1]) / dt)
+        rate.append(
+            0.5 * (windows[CHOSEN.side :] @ slopes - windows[: -CHOSEN.side] @ slopes[::-1]) / dt
+        )
     table = np.sort(np.stack(score), axis=0)
     at = int(np.argmax(table[-2]))
     smooth = max(score[names.index(name)][at] for name in names if name in SMOOTH)
-    if table[-2, at] < _JUMP or table[-3, at] < _ALSO or smooth < _JUMP:
+    if table[-2, at] < CHOSEN.jump or table[-3, at] < CHOSEN.also or smooth < CHOSEN.jump:
         return None
     jumps, rates = np.stack(torn)[:, at], np.stack(rate)[:, at]
     scale = np.array([np.std(moving[name]) for name in names])
     a, b = rates / scale, jumps / scale
     size = float(a @ b / (a @ a + 1e-300))
-    if abs(size) < SHORTEST * dt:
+    if abs(size) < CHOSEN.samples_shortest * dt:
         return None  # that is a late sample, not another time
-    return at + SIDE, size, 0.5 * abs(size)
+    return at + CHOSEN.side, size, 0.5 * abs(size)

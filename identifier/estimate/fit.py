@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.estimate.drive import FASTEST, Drive, hardest
+from identifier.estimate.chosen import CHOSEN
+from identifier.estimate.drive import Drive, hardest
 from identifier.estimate.information import Information
 from identifier.estimate.latent import Learnt, lateness, latent_priors, learn_latent
 from identifier.estimate.model import FittedModel, Segment
@@ -19,18 +20,11 @@ from identifier.estimate.nodes import Nodes, TooShortError
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
-from identifier.estimate.solve import ENOUGH, STRIDE, error_size, estimate, simulate
+from identifier.estimate.solve import error_size, estimate, simulate
 from identifier.frozen import PROBE
 from identifier.motion.parameters import INDEX, SLIPS
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
-
-BLOCK = 600.0  # [s] that are estimated at once
-BLIND = 300.0  # [s] of a log without v_y that teach: those of hardest cornering
-ENOUGH_MORE = 1.0  # [nats] of improvement by a later block, below which it ends
-LONG, COARSE = 3600.0, 2.0  # [s] of logs from which samples are averaged to intervals so longer
-REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
-LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of its model are not
 
 
 class _Fit(NamedTuple):
@@ -48,7 +42,7 @@ def fit(
     vehicle: Vehicle,
     priors: Priors | None = None,
     *,
-    block: float = BLOCK,
+    block: float = CHOSEN.fit_block,
     coarse: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> _Fit:
@@ -72,7 +66,7 @@ def fit(
     total = sum(one.duration for one in recordings)
     done, reach, found, parted, late = 0.0, Reach(), None, 0.0, 0.0
     segments: list[Segment] = []
-    coarse = coarse or total > LONG
+    coarse = coarse or total > CHOSEN.long
 
     def went_on(seconds: float) -> None:
         nonlocal done
@@ -85,7 +79,7 @@ def fit(
         if not any(one.counts.any() for one in drives):
             continue
         begin = None if found is None else found.p
-        enough = ENOUGH if begin is None else ENOUGH_MORE
+        enough = CHOSEN.enough if begin is None else CHOSEN.enough_more
         beliefs = before.after(known) if parts else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         found, roads = with_roads(drives, vehicle, beliefs, found)
@@ -102,7 +96,7 @@ def fit(
     for blind in (one for one in recordings if one.logged_v_y is None):
         try:
             own = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
-            nodes = Nodes.of(blind, vehicle, hardest(blind, BLIND), a_y_late=own)
+            nodes = Nodes.of(blind, vehicle, hardest(blind, CHOSEN.blind), a_y_late=own)
         except TooShortError:
             if len(recordings) == 1:
                 raise
@@ -170,8 +164,9 @@ def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:
 
 class Reach(NamedTuple):
     """What drives reached: slip (2,) [rad], least and largest speed [m/s] and a_x [m/s²].
-    alike, pairs : sum of products of what the model misses, over its size, at two times `LASTS`
-    apart, (2,), and how many there are: white noise of the sensors has no part in it.
+    alike, pairs : sum of products of what the model misses, over its size, at two times
+    `CHOSEN.lasts` apart, (2,), and how many there are: white noise of the sensors has no part in
+    it.
     """
 
     slip: Array = np.zeros(2)
@@ -206,7 +201,7 @@ class Reach(NamedTuple):
     ) -> "Reach":
         """Return what drives reached, by the estimate of them."""
         found = cls()
-        later = LASTS * min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
+        later = CHOSEN.lasts * min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
         for i, one in enumerate(drives):
             on = one.counts
             if not on.any():
@@ -217,9 +212,9 @@ class Reach(NamedTuple):
             size = np.abs(driven["slip"][on])
             force = np.abs(one.signals[:, 0] * one.signals[:, 2]) / GRAVITY
             e = np.nan_to_num(driven["missed"] / error_size(force)[:, None])
-            n = max(round(max(later, STRIDE) / one.dt), 1)
+            n = max(round(max(later, CHOSEN.stride) / one.dt), 1)
             together = on[n:] & on[:-n]
-            k = min(max(round(REACHED / one.dt), 1), len(size))
+            k = min(max(round(CHOSEN.reached / one.dt), 1), len(size))
             speeds, a_x = np.quantile(one.signals[on][:, [0, 5]], [0.005, 0.995], axis=0).T
             slip = np.partition(size, len(size) - k, axis=0)[-k]
             alike = (e[n:] * e[:-n])[together].sum(axis=0)
@@ -231,7 +226,7 @@ class Reach(NamedTuple):
         """Return what a drive without v_y reached, by its estimated states."""
         nodes, on = learnt.nodes, learnt.nodes.counts
         size, given = np.abs(learnt.z[on, 2:4]), nodes.given[on]
-        k = min(max(round(REACHED / nodes.dt), 1), len(size))
+        k = min(max(round(CHOSEN.reached / nodes.dt), 1), len(size))
         speeds, a_x = np.quantile(given[:, [0, 3]], [0.005, 0.995], axis=0).T
         turning = np.abs(given[:, 0] * learnt.z[on, 1]) / GRAVITY
         alike = np.sum((learnt.z[on, 4:6] / error_size(turning)[:, None]) ** 2, axis=0)
@@ -245,8 +240,8 @@ def _blocks(
     """Yield drives that last no longer together."""
     group: list[Drive] = []
     length = 0.0
-    small = COARSE * float(np.sqrt(vehicle.wheelbase / SEDAN)) < 1.0
-    fastest = FASTEST * (COARSE if coarse and not small else 1.0)
+    small = CHOSEN.coarse * float(np.sqrt(vehicle.wheelbase / SEDAN)) < 1.0
+    fastest = CHOSEN.fastest * (CHOSEN.coarse if coarse and not small else 1.0)
     for recording in recordings:
         n = max(round(longest / recording.dt), 1)
         count = -(-len(recording) // n)

@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.drive import hardest
-from identifier.estimate.nodes import JERKS, Nodes, low_passed
+from identifier.estimate.nodes import Nodes, low_passed
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.solve import around_beliefs, beliefs_cost, bounded_step, car_numbers
@@ -32,22 +33,7 @@ from models.vehicle import GRAVITY, Vehicle
 N, P = len(STATES), len(NAMES)
 OF_V_Y = ("v_y_bias", "v_y_angle", "v_y_lever")
 FELT = {"a_y_bias": 0.015, "roll": 0.04, "a_y_delay": 0.0007, "a_y_lever": 0.01}  # sd; lever in L
-ROLL = 0.06  # by which a_y is larger in a car whose body rolls
-GYRO, INERTIA = 0.002, 0.007  # sd of the bias of r of a sedan [rad/s], and of ln I_z
 AGAIN = ("r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")  # another in each log
-BLOCK, BESIDE = 600.0, 5.0  # [s] that are smoothed at once, and what is so beside them
-ASKED = 60.0  # [s] that are asked for a late a_y
-ANY_DELAY, MOST_LATE, SMALL = 0.1, 0.3, 0.003  # [s] of a sedan: sd of a delay that is looked for,
-# largest, and one that does not matter
-LOOKS = 4  # at a delay
-LEFT_LATE = 0.01  # [s] of a sedan, sd of what is left of a delay that was taken out
-GAINED = 8.0  # nats that a delay gains, more where more is left (`Trust.usual`)
-ALIKE = 1e-4  # probability from which another start's end counts
-STARTS = (-0.4, 0.4)  # of ln C: soft and stiff
-FIRM, FEW = 50.0, 8  # times that beliefs count at first, and iterations of all but the last
-MOST_SLIP, MOST_LAGGED = 0.7, 0.8  # |v_y/v_x|, and lagged slip [rad]
-LOOKED = 0.25  # [s] over which what is left of a sensor is alike
-SHORTEST = 50  # nodes from which noise is learnt
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,19 +130,19 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Prio
     mean, bias, inertia = beliefs.mean.copy(), INDEX["r_bias"], INDEX["ln_inertia"]
     mean[INDEX["ln_sway"]] = 0.0  # as the sway that the nodes are given
     information[bias], information[:, bias], mean[bias] = 0.0, 0.0, 0.0  # another in each log
-    information[bias, bias], moves[bias] = (GYRO / scale) ** -2, True
+    information[bias, bias], moves[bias] = (CHOSEN.gyro / scale) ** -2, True
     if not moves[inertia]:
-        information[inertia, inertia], moves[inertia] = INERTIA**-2, True
+        information[inertia, inertia], moves[inertia] = CHOSEN.inertia**-2, True
     felt = np.array(list(FELT.values())) * [1.0, 1.0, 1.0, vehicle.wheelbase]
     if late:
-        felt[list(FELT).index("a_y_delay")] = LEFT_LATE * scale
+        felt[list(FELT).index("a_y_delay")] = CHOSEN.left_late * scale
     whole = np.zeros((P + len(felt),) * 2)
     whole[:P, :P] = information
     whole[range(P, len(whole)), range(P, len(whole))] = felt**-2
     far = np.full(len(felt), np.inf)
     return replace(
         beliefs,
-        mean=np.concatenate([mean, [0.0, ROLL, 0.0, 0.0]]),
+        mean=np.concatenate([mean, [0.0, CHOSEN.latent_roll, 0.0, 0.0]]),
         low=np.concatenate([beliefs.low, -far]),
         high=np.concatenate([beliefs.high, far]),
         information=whole,
@@ -339,8 +325,8 @@ class _Latent:
     def settled(self, stiffer: float = 0.0) -> tuple[Array, Array]:
         """Return states and parameters near an optimum, where parameters do not run away."""
         firm = copy(self)
-        firm.priors = replace(self.priors, information=FIRM * self.priors.information)
-        z, p, _ = firm.descend(*self.begin(stiffer), self.R, FEW)
+        firm.priors = replace(self.priors, information=CHOSEN.firm * self.priors.information)
+        z, p, _ = firm.descend(*self.begin(stiffer), self.R, CHOSEN.few)
         return z, p
 
     def descend(self, z: Array, p: Array, R: Array, most: int = 25) -> tuple[Array, Array, float]:
@@ -361,8 +347,10 @@ class _Latent:
                     damping = max(8.0 * damping, 1e-6)
                     continue
                 z_then, p_then = z + dz, p.copy()
-                z_then[:, 0] = np.clip(z_then[:, 0], -MOST_SLIP * v_x, MOST_SLIP * v_x)
-                z_then[:, 2:4] = np.clip(z_then[:, 2:4], -MOST_LAGGED, MOST_LAGGED)
+                z_then[:, 0] = np.clip(
+                    z_then[:, 0], -CHOSEN.most_slip * v_x, CHOSEN.most_slip * v_x
+                )
+                z_then[:, 2:4] = np.clip(z_then[:, 2:4], -CHOSEN.most_lagged, CHOSEN.most_lagged)
                 p_then[index] = np.clip(p[index] + dp, low, high)
                 reached = self.cost(z_then, p_then, weights)
                 if reached < cost:
@@ -411,8 +399,8 @@ class _Latent:
         missed = self.nodes.measured - self._run(self._plain, z, p, {})["shows"]
         doubt = np.einsum("nij,njk,nik->ni", shows, own, shows)
         found, on = R.copy(), self.nodes.counts
-        lags = max(2, int(LOOKED * self.scale / self.nodes.dt))
-        if np.count_nonzero(on) < SHORTEST:
+        lags = max(2, int(CHOSEN.looked * self.scale / self.nodes.dt))
+        if np.count_nonzero(on) < CHOSEN.shortest:
             return found
         for i in range(len(MEASURED)):
             e = missed[on, i]
@@ -436,7 +424,7 @@ class _Latent:
         """
         R = self.R if R is None else R
         for _ in range(rounds):
-            z, p, _ = self.descend(z, p, R, FEW)
+            z, p, _ = self.descend(z, p, R, CHOSEN.few)
             own, _, _, shows = self.spread(z, p, R)
             R = self.noise(z, p, own, shows, R)
         z, p, cost = self.descend(z, p, R)
@@ -465,15 +453,15 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, late: bool 
     beliefs : of the car, or what other drives of it left.   late : as of `latent_priors`.
     """
     problem = _Latent(nodes, vehicle, latent_priors(vehicle, beliefs, late))
-    first = problem.smoothed(*problem.settled(STARTS[0]))
-    z, p, cost = problem.descend(*problem.settled(STARTS[1]), first.R)
+    first = problem.smoothed(*problem.settled(CHOSEN.starts[0]))
+    z, p, cost = problem.descend(*problem.settled(CHOSEN.starts[1]), first.R)
     best, other = first, (z, p, cost)
     if cost < first.cost:
         best, other = problem.smoothed(z, p, first.R, 0), (first.z, first.p, first.cost)
     on, v_x = nodes.counts, nodes.given[:, 0]
     apart = ((best.z - other[0])[:, 0] / v_x)[on]
     share = 1.0 / (1.0 + np.exp(min(other[2] - best.cost, 50.0)))
-    alike = share > ALIKE and bool(on.any())  # else one of them explains the drive far worse
+    alike = share > CHOSEN.alike and bool(on.any())  # else one of them explains the drive far worse
     parted = float(np.sqrt(np.mean(apart**2))) if alike else 0.0
     index = problem.index[problem.index < P]
     moved = problem.index < P
@@ -510,33 +498,33 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     too little.
     priors : as of `_Latent`.
     """
-    part = hardest(recording, ASKED)
+    part = hardest(recording, CHOSEN.latent_asked)
     scale, dt = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt
     # Interpolation averages noise: what is smooth is not changed by it.
-    smooth = low_passed(recording.needed("a_y"), JERKS / scale, dt)
+    smooth = low_passed(recording.needed("a_y"), CHOSEN.jerks / scale, dt)
     piece = replace(recording, a_y=smooth)
     delay = LATENT_NAMES.index("a_y_delay")
     information = priors.information.copy()
-    information[delay, delay] = (ANY_DELAY * scale) ** -2
+    information[delay, delay] = (CHOSEN.any_delay * scale) ** -2
     open_ = replace(priors, information=information)
 
     def problem(late: float, beliefs: Priors) -> _Latent:
         return _Latent(Nodes.of(piece, vehicle, part, a_y_late=late), vehicle, beliefs)
 
     on_time = problem(0.0, priors)
-    z, p, least = on_time.descend(*on_time.settled(), on_time.R, FEW)
+    z, p, least = on_time.descend(*on_time.settled(), on_time.R, CHOSEN.few)
     late = 0.0
-    for _ in range(LOOKS):
-        z, p, _ = problem(late, open_).descend(z, p, on_time.R, FEW)
+    for _ in range(CHOSEN.looks):
+        z, p, _ = problem(late, open_).descend(z, p, on_time.R, CHOSEN.few)
         more, p[delay] = float(p[delay]), 0.0
-        late = min(max(late + more, -MOST_LATE * scale), MOST_LATE * scale)
-        if abs(more) < SMALL * scale:
+        late = min(max(late + more, -CHOSEN.most_late * scale), CHOSEN.most_late * scale)
+        if abs(more) < CHOSEN.latent_small * scale:
             break
-    if abs(late) < SMALL * scale:
+    if abs(late) < CHOSEN.latent_small * scale:
         return 0.0
-    found = problem(late, priors).descend(z, p, on_time.R, FEW)[2]
+    found = problem(late, priors).descend(z, p, on_time.R, CHOSEN.few)[2]
     count = max(on_time.nodes.counts.sum(), 1)
-    enough = GAINED * max(1.0, 2.0 * found / count / TRUST.usual)
+    enough = CHOSEN.gained * max(1.0, 2.0 * found / count / TRUST.usual)
     return late if least - found > enough else 0.0
 
 
@@ -584,9 +572,9 @@ def estimate_v_y(
 
 
 def _blocks(recording: Recording) -> Iterator[tuple[slice, slice]]:
-    """Yield parts of at most `BLOCK`, with what is beside them, and alone."""
-    n = max(round(BLOCK / recording.dt), 1)
-    beside = round(BESIDE / recording.dt)
+    """Yield parts of at most `CHOSEN.latent_block`, with what is beside them, and alone."""
+    n = max(round(CHOSEN.latent_block / recording.dt), 1)
+    beside = round(CHOSEN.beside / recording.dt)
     for begin in range(0, len(recording), n):
         end = min(begin + n, len(recording))
         yield slice(max(begin - beside, 0), min(end + beside, len(recording))), slice(begin, end)

@@ -23,13 +23,14 @@ from identifier.band import (
     Band,
     BandSpread,
 )
+from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.drive import Drive
 from identifier.estimate.latent import TRUST, LateralVelocity, estimate_v_y
 from identifier.estimate.priors import Priors
-from identifier.estimate.solve import ERROR_SIZE, car_numbers, simulate
+from identifier.estimate.solve import car_numbers, simulate
 from identifier.frozen import FORMAT, vehicle_from, vehicle_numbers
+from identifier.motion.chosen import CHOSEN as MOTION_CHOSEN
 from identifier.motion.model import (
-    LEAST_GRIP,
     REPLAYED,
     curve_function,
     curve_index,
@@ -56,23 +57,7 @@ from models.rules import require_positive
 from models.schema import Table
 from models.vehicle import DOWNFORCE_SPEED, GRAVITY, LIGHTEST, Vehicle, load_ratio
 
-UNITS = (0.008, 0.016, 0.032, 0.064, 0.128, 0.256)  # rad, of the projection
-LEAST_REACH = 0.032  # rad, up to which it follows the curves at least
-WIDEST = 0.6  # rad, as far as it is fitted
-LEAST_VARIANCE = 1e-10  # of weights, lag and zeros, so that no covariance is singular
-BEYOND = 0.3  # weight of a slip that no drive reached, in that fit
-DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided a number
 BOUNDED = (("ln_stiffness", "cornering stiffness", True), ("ln_grip", "grip", True))
-ELSEWHERE = 2.25
-# times what the drives that taught miss, on others; chosen on recordings of three real cars and two
-# simulated ones, since the errors of a plant that one draws are those that one thought of
-SURE_MASS, SURE_CENTER = 0.03, 0.01  # sd of a given mass, of it; of a center, in wheelbases
-TYPICAL = 0.5  # static loads, at which an error is given as a share of the force
-SMALL = 1e-4  # rad, over which a slope is taken
-SURELY, NOTED_GAIN = 3.0, 0.08  # standard deviations, and error of the steering that is noted
-WARM = 300  # samples before a part of a long drive, over which lag and sway settle
-LEAST_DOUBT = 1e-6  # of a prior, in variances of the usual one
-LARGEST = 1e6  # of the numbers in a file
 _KEYS = {  # of arrays in a file
     "covariance": "covariance",
     "driven": "driven_slip_rad",
@@ -100,9 +85,9 @@ class FittedModel(TireModel):
     driven : largest slip of each axle that the drives reached [rad], (2,).
     speeds : least and largest speed of them [m/s], (2,).
     a_x : least and largest longitudinal acceleration of them [m/s²], (2,).
-    unexplained : size of what the drives miss for longer than noise, over `ERROR_SIZE`, (2,).
-    force_missed : share of the measured force that it misses of the drives that taught, (2,); None
-        where nobody looked.
+    unexplained : size of what the drives miss for longer than noise, over `CHOSEN.error_size`,
+    (2,). force_missed : share of the measured force that it misses of the drives that taught, (2,);
+    None where nobody looked.
     parted : of drives without v_y, side slip by which soft and stiff tires that explain them alike
         part, rms [rad].
     a_y_late : of such drives, by which a_y was later than the yaw rate [s].
@@ -209,7 +194,7 @@ class FittedModel(TireModel):
         moved = self["load_transfer"] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
         load = 1.0 + np.outer(f, moved) + np.outer(np.square(v_x), car.downforce)
         use = np.where(f[:, None] > 0.0, self._pair("driving"), self._pair("braking")) * f[:, None]
-        left = np.sqrt(np.maximum(1.0 - use**2, LEAST_GRIP))
+        left = np.sqrt(np.maximum(1.0 - use**2, MOTION_CHOSEN.least_grip))
         product: Array = np.maximum(load, LIGHTEST) * left
         return product
 
@@ -300,7 +285,7 @@ class FittedModel(TireModel):
         for segment in recording.segments:
             begin, end = segment.start, min(segment.stop, len(recording))
             for part in blocks(end - begin):
-                first = max(part.start - WARM, 0)
+                first = max(part.start - CHOSEN.warm, 0)
                 some = slice(begin + first, begin + part.stop)
                 drive = Drive.of(recording, self.vehicle, some, replay=True)
                 out = simulate(drive, self.p, self.vehicle)
@@ -334,7 +319,7 @@ class FittedModel(TireModel):
         ]
         gain, k = self["steering_gain"], INDEX["steering_gain"]
         sd = float(np.sqrt(self.covariance[k, k]))
-        if abs(gain) > max(SURELY * sd, NOTED_GAIN):
+        if abs(gain) > max(CHOSEN.surely * sd, CHOSEN.noted_gain):
             listed.append(
                 (
                     "steering_gain",
@@ -414,10 +399,12 @@ class FittedModel(TireModel):
         before = _covariance_before(self)
         given = self.vehicle.bicycle[4:]
         band, loads, lag = self.band, self._loads, self.relaxation_length
-        stiff = [sd[0] / SMALL for sd in band.of_phi(np.full((1, 2), SMALL))]
+        stiff = [
+            sd[0] / CHOSEN.model_small for sd in band.of_phi(np.full((1, 2), CHOSEN.model_small))
+        ]
         stiffness = self.stiffness
         C = stiffness / loads
-        slip = np.linspace(0.0, WIDEST, 201)
+        slip = np.linspace(0.0, CHOSEN.widest, 201)
         slip = np.column_stack([slip, slip])
         phi = self.curve_at(slip)[0]
         peak = np.take_along_axis(slip, phi.argmax(axis=0)[None], axis=0)
@@ -434,11 +421,11 @@ class FittedModel(TireModel):
         rows: list[tuple[str, Axle, float, float, str, float | None, bool]] = []
         for i, axle in enumerate(AXLES):
             now, prior = sd_of(f"compliance_{axle[0]}")
-            known = [sd[0][i] <= DECIDED * sd[1][i] for sd in (stiff, wide)]
+            known = [sd[0][i] <= CHOSEN.decided * sd[1][i] for sd in (stiff, wide)]
             rows += [
                 (STIFFNESS, axle, stiffness[i], sd_C[i] * loads[i], "N/rad", given[i], known[0]),
                 (GRIP, axle, top[i], sd_top[i], "static load", None, known[1]),
-                (RELAXATION, axle, lag[i], C[i] * now, "m", None, now <= DECIDED * prior),
+                (RELAXATION, axle, lag[i], C[i] * now, "m", None, now <= CHOSEN.decided * prior),
             ]
         zeros: tuple[tuple[str, Axle, str, str, float], ...] = (
             ("zero of the steering", "front", "steering_zero", "deg", math.degrees(1.0)),
@@ -446,7 +433,7 @@ class FittedModel(TireModel):
         )
         for title, axle, name, unit, scale in zeros:
             now, prior = sd_of(name)
-            known_zero, value = now <= DECIDED * prior, scale * self[name]
+            known_zero, value = now <= CHOSEN.decided * prior, scale * self[name]
             rows.append((title, axle, value, scale * now, unit, 0.0, known_zero))
         return tuple(
             Estimate(title, axle, float(value), float(sd), unit, declared, bool(known))
@@ -477,7 +464,7 @@ class FittedModel(TireModel):
         usual = Priors.of(vehicle)
         where = np.ix_(usual.moves, usual.moves)
         information = np.zeros_like(usual.information)
-        sure = self.covariance + LEAST_DOUBT * np.diag(usual.sd**2)
+        sure = self.covariance + CHOSEN.least_doubt * np.diag(usual.sd**2)
         information[where] = np.linalg.inv(sure[where])
         return replace(usual, mean=self.p, information=information, typed=())
 
@@ -485,10 +472,10 @@ class FittedModel(TireModel):
         """Return the tires in the hidden units of the axle identifier.
 
         Curve, lag, sway and errors of the sensors; without load transfer and ellipse.
-        ladder : slip scales of the units [rad]; None takes `UNITS`, whose curves are within
+        ladder : slip scales of the units [rad]; None takes `CHOSEN.units`, whose curves are within
             0.3 % of the static load.
         """
-        ladder = UNITS if ladder is None else ladder
+        ladder = CHOSEN.units if ladder is None else ladder
         fits = [_units_fit(ladder, float(reach)) for reach in self._reach]
         W = np.stack(
             [
@@ -518,7 +505,7 @@ class FittedModel(TireModel):
     @property
     def _reach(self) -> Array:
         """Slip up to which its projection follows the curves [rad], (2,)."""
-        return np.maximum(self.known_slip, LEAST_REACH)
+        return np.maximum(self.known_slip, CHOSEN.model_least_reach)
 
     def _units_covariance(self, fits: list[tuple[Array, Array]], covariance: Array) -> Array:
         """Return the covariance of weights, lag and zeros (2, n + 3, n + 3), never singular."""
@@ -536,7 +523,7 @@ class FittedModel(TireModel):
             to[n, 9] = to[n + 1, 10] = 1.0
             to[n + 2, 11:] = list(zeros.values())
             P = to @ covariance[np.ix_(index, index)] @ to.T
-            found[i] = P + np.diag(np.full(n + 3, LEAST_VARIANCE))
+            found[i] = P + np.diag(np.full(n + 3, CHOSEN.least_variance))
         return found
 
     def setup(self, dt: float) -> Setup:
@@ -593,8 +580,10 @@ class FittedModel(TireModel):
         if "force_missed" in table:
             found["force_missed"] = table.array("force_missed")
         for name, value in found.items():
-            if np.abs(value).max(initial=0.0) > LARGEST:
-                table.refuse(_KEYS.get(name, "parameters"), f"must hold numbers below {LARGEST:g}")
+            if np.abs(value).max(initial=0.0) > CHOSEN.largest:
+                table.refuse(
+                    _KEYS.get(name, "parameters"), f"must hold numbers below {CHOSEN.largest:g}"
+                )
         segments = table.tables("segments") if "segments" in table else []
         parted, late = (
             table.number(key) if key in table else 0.0 for key in ("parted_rad", "a_y_late_s")
@@ -621,11 +610,11 @@ class _FittedBand(Band[FittedModel]):
 
     @property
     def origin(self) -> str:
-        front, rear = 100.0 * self._error_at(TYPICAL)
+        front, rear = 100.0 * self._error_at(CHOSEN.typical)
         return (
             f"what the drives leave open, and an error of the model of {front:.0f} / {rear:.0f} % "
-            f"at {TYPICAL:g} static loads, from its error on them and a mass known to "
-            f"{100.0 * SURE_MASS:.0f} %"
+            f"at {CHOSEN.typical:g} static loads, from its error on them and a mass known to "
+            f"{100.0 * CHOSEN.sure_mass:.0f} %"
         )
 
     @property
@@ -637,18 +626,20 @@ class _FittedBand(Band[FittedModel]):
         """Relative standard deviation of the static loads: mass and center of gravity, (2,)."""
         car = self.model.vehicle
         arms = np.array([car.l_r, car.l_f])
-        doubt: Array = np.hypot(SURE_MASS, SURE_CENTER * car.wheelbase / arms)
+        doubt: Array = np.hypot(CHOSEN.sure_mass, CHOSEN.sure_center * car.wheelbase / arms)
         return doubt
 
     @property
     def error_share(self) -> Array:
         """Standard deviation of the model's own error, the part that goes with the force, (2,)."""
-        return np.hypot(self.load_doubt, ELSEWHERE * ERROR_SIZE[1] * self.model.unexplained)
+        return np.hypot(
+            self.load_doubt, CHOSEN.elsewhere * CHOSEN.error_size[1] * self.model.unexplained
+        )
 
     @property
     def error_floor(self) -> Array:
         """The part of it that is there without a force [static loads], (2,)."""
-        floor: Array = ELSEWHERE * ERROR_SIZE[0] * self.model.unexplained
+        floor: Array = CHOSEN.elsewhere * CHOSEN.error_size[0] * self.model.unexplained
         return floor
 
     def _error_at(self, force: float) -> Array:
@@ -699,7 +690,7 @@ class _FittedBand(Band[FittedModel]):
 
     def _samples(self, n: int, rng: np.random.Generator) -> tuple[FittedModel, ...]:
         model, priors = self.model, Priors.of(self.model.vehicle)
-        share = self._error_at(TYPICAL)
+        share = self._error_at(CHOSEN.typical)
         values, vectors = np.linalg.eigh(model.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         drawn = []
@@ -720,8 +711,8 @@ _OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
 @cache
 def _units_fit(ladder: tuple[float, ...], reach: float) -> tuple[Array, Array]:
     """Return slips (k,) and what makes unit weights of forces there, (n, k)."""
-    slip = np.concatenate([np.linspace(0.0, reach, 120)[1:], np.linspace(reach, WIDEST, 60)])
-    weight = np.where(slip <= reach, 1.0, BEYOND)
+    slip = np.concatenate([np.linspace(0.0, reach, 120)[1:], np.linspace(reach, CHOSEN.widest, 60)])
+    weight = np.where(slip <= reach, 1.0, CHOSEN.model_beyond)
     T = unit_matrix(slip, ladder)
     damped = np.vstack([T * weight[:, None], 1e-4 * np.eye(len(ladder))])
     pseudo: Array = np.asarray(np.linalg.pinv(damped)[:, : slip.size] * weight, dtype=np.float64)

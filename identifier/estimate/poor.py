@@ -14,28 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.estimate.drive import SMOOTHED, hardest
+from identifier.estimate.chosen import CHOSEN
+from identifier.estimate.drive import hardest
 from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
 from models.sensors import white_noise
 from models.vehicle import Vehicle
 
-RARE = 0.03  # [s] of a sedan between new values, more of which are too few
-NOISY = 0.015  # [m/s] of a sedan, white noise that is too much in the mean that the estimate takes
-FEWEST = 20  # new values
-FINE = 0.005  # [s] of a sedan, to which a delay is found
-SURE = 20.0  # nats that a delay must gain
-ASKED, MOST = 60.0, 12000  # [s] and samples of hardest cornering that tell delay and noise
-ROLL, ROLL_SD = 0.05, 0.04  # ρ
-OFF = 0.15  # [m/s²], b at first
-WANDERS = 5e-3  # [(m/s²)²/s], variance of b' of a banked road
-EQUAL = 1e-9  # of the largest change, below which two are one
-CLIP, AGAIN = 3.0, 3  # deviations from which a sample counts less, and how often it is asked
 DELAYS = np.arange(0.0, 0.41, 0.05)  # [s]
 NOISE = 3e-3 * 10.0 ** np.arange(0.0, 2.1, 0.25)  # [m/s] of a sedan
 PUSHES = 10.0 ** np.arange(-5.0, 0.1, 0.5)  # [(m/s²)² s], variance of w
-BANKS = WANDERS * 10.0 ** np.arange(-3.0, 1.1, 1.0)
-ROUNDS = 5
+BANKS = CHOSEN.wanders * 10.0 ** np.arange(-3.0, 1.1, 1.0)
 
 
 class _Shown(NamedTuple):
@@ -48,7 +37,7 @@ class _Shown(NamedTuple):
     late: float = 0.0
     noise: float = float(NOISE[0])
     push: float = 0.003
-    wanders: float = WANDERS
+    wanders: float = CHOSEN.wanders
 
 
 def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
@@ -61,27 +50,30 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
         return recording
     scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
     new = _new_values(v_y)
-    rare = len(new) < len(v_y) and _interval(new) * recording.dt > RARE * scale
+    rare = len(new) < len(v_y) and _interval(new) * recording.dt > CHOSEN.rare * scale
     new = new if rare else np.arange(len(v_y))
     shown = _Shown(_interval(new) * recording.dt, noise=float(NOISE[0]) * scale)
-    if len(new) < FEWEST or (recording.a_y is None and not rare):
+    if len(new) < CHOSEN.poor_fewest or (recording.a_y is None and not rare):
         return recording
     if recording.a_y is None:
         shown = shown._replace(push=float(PUSHES[-1]))
     else:
-        part = hardest(recording, min(ASKED, MOST * recording.dt))
+        part = hardest(recording, min(CHOSEN.poor_asked, CHOSEN.most * recording.dt))
         inside = new[(new >= part.start) & (new < part.stop)] - part.start
         problem = _Kinematics(recording.taken(part), inside)
-        white = white_noise(problem.shown) if problem.shown.size > FEWEST else 0.0
-        if not rare and not white * np.sqrt(shown.interval / SMOOTHED) > NOISY * scale:
+        white = white_noise(problem.shown) if problem.shown.size > CHOSEN.poor_fewest else 0.0
+        if (
+            not rare
+            and not white * np.sqrt(shown.interval / CHOSEN.smoothed) > CHOSEN.noisy * scale
+        ):
             return recording
         shown = _likeliest(problem, shown._replace(noise=max(white, shown.noise)), scale)
         if not rare and not shown.push < PUSHES[-1]:
             return recording  # a_y does not show this motion
     weights, whole = np.ones(len(new)), _Kinematics(recording, new)
-    for _ in range(AGAIN):
+    for _ in range(CHOSEN.again):
         found, missed = whole.carried(shown, weights)
-        weights = np.minimum(1.0, CLIP * shown.noise / np.maximum(np.abs(missed), 1e-12))
+        weights = np.minimum(1.0, CHOSEN.clip * shown.noise / np.maximum(np.abs(missed), 1e-12))
     found.setflags(write=False)
     by = "straight lines" if recording.a_y is None else "ay, vx and r"
     note = (
@@ -97,7 +89,7 @@ def _new_values(signal: Array) -> NDArray[np.intp]:
     All are new where neither is the rule.
     """
     step = np.diff(signal)
-    most = EQUAL * max(float(np.abs(step).max(initial=0.0)), 1e-12)
+    most = CHOSEN.equal * max(float(np.abs(step).max(initial=0.0)), 1e-12)
     changes = 1 + np.flatnonzero(np.abs(step) > most)
     if changes.size > 3 and np.median(np.diff(changes)) > 1.0:
         return np.concatenate([[0], changes])
@@ -161,7 +153,7 @@ class _Kinematics:
         band[0, 3::2] += wander
         band[2, 1:-2:2] -= wander
         band[0, 2 * self.first] += 1e-4
-        band[0, 2 * self.first + 1] += OFF**-2
+        band[0, 2 * self.first + 1] += CHOSEN.off**-2
         at = np.maximum(self.new - s.late / dt, 0.0)
         i = np.minimum(at.astype(np.intp), n - 2)
         share = at - i
@@ -183,14 +175,20 @@ class _Kinematics:
         factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
         x, X = cho_solve_banded((factor, True), g, check_finite=False).T
         # ρ is a border of the matrix: eliminated by Schur's complement.
-        S = np.sum(push * self.felt**2) + ROLL_SD**-2 - g[:, 1] @ X
-        roll = (np.sum(push * self.felt * self.moved) + ROLL / ROLL_SD**2 - g[:, 1] @ x) / S
+        S = np.sum(push * self.felt**2) + CHOSEN.roll_sd**-2 - g[:, 1] @ X
+        roll = (
+            np.sum(push * self.felt * self.moved)
+            + CHOSEN.poor_roll / CHOSEN.roll_sd**2
+            - g[:, 1] @ x
+        ) / S
         x = x - roll * X
         v, b = x[::2], x[1::2]
         missed = (1.0 - share) * v[i] + share * v[i + 1] - self.shown
         moves = np.diff(v) + 0.5 * dt * (b[1:] + b[:-1]) - self.moved + roll * self.felt
         squares = w @ missed**2 + push @ moves**2 + wander @ np.diff(b) ** 2
-        squares += ((roll - ROLL) / ROLL_SD) ** 2 + np.sum(b[self.first] ** 2) / OFF**2
+        squares += ((roll - CHOSEN.poor_roll) / CHOSEN.roll_sd) ** 2 + np.sum(
+            b[self.first] ** 2
+        ) / CHOSEN.off**2
         count, steps = np.count_nonzero(there), np.count_nonzero(self.goes)
         logs = 2.0 * np.sum(np.log(factor[0])) + np.log(S) + count * np.log(s.noise**2)
         logs += steps * np.log(s.push * s.wanders)
@@ -228,12 +226,12 @@ def _likeliest(problem: _Kinematics, best: _Shown, scale: float) -> _Shown:
     others = {"noise": NOISE * scale, "push": PUSHES, "wanders": BANKS}
     better(late=DELAYS, **others)
     step = float(DELAYS[1])
-    for _ in range(ROUNDS):
+    for _ in range(CHOSEN.poor_rounds):
         step *= 0.5
         near = np.maximum(best.late + step * np.array([-1.0, 1.0]), 0.0)
-        if not better(late=near, **others) and step < FINE * scale:
+        if not better(late=near, **others) and step < CHOSEN.fine * scale:
             break
-    if best.late and problem.cost(best._replace(late=0.0)) - least < SURE:
+    if best.late and problem.cost(best._replace(late=0.0)) - least < CHOSEN.sure:
         best = best._replace(late=0.0)
         least = problem.cost(best)
         better(**others)

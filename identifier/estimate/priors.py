@@ -14,14 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.information import Information
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import Vehicle
 
-LESS_LOAD = 0.6  # of the geometric load transfer: tires gain less force than load
-LESS_USE = 0.65  # of the geometric use of the ellipse, measured on cars and the plant
-SURE_HEIGHT = 0.03  # sd of the load transfer of a car that tells its height
-SURE_SHARE, LEAST_USE = 0.5, 0.1  # sd of the use of the ellipse of a given share: of it; least
 SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
 
 
@@ -73,12 +70,8 @@ ALIKE = {  # standard deviation of front less rear
     "compliance": (0.003, "L"),
     "sway_share": (0.1, ""),
 }
-# At one speed a bias of v_y and a mounting angle are one: each takes half, unless speeds differ.
-SHARED_ERROR = 0.5
-ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
 SENSORS = tuple(name for name in OF_CAR if name.startswith(("v_y", "steering")))
 TYPED = ("steering_gain",)
-TAILS = 1.0  # degrees of freedom of their priors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -116,7 +109,7 @@ class Priors:
     ) -> "Priors":
         """Return the beliefs for a car.
         wide : standard deviations in SI in place of those of the table, by parameter.
-        apart : whether bias and angle of v_y are believed apart, without `SHARED_ERROR`.
+        apart : whether bias and angle of v_y are believed apart, without `CHOSEN.shared_error`.
         """
         L = vehicle.wheelbase
         unit = {"": 1.0, "L": L, "v": float(np.sqrt(L / SEDAN))}
@@ -140,7 +133,7 @@ class Priors:
         if not apart and moves[INDEX["v_y_bias"]] and moves[INDEX["v_y_angle"]]:
             b, beta = OF_CAR["v_y_bias"], OF_CAR["v_y_angle"]
             each = {"v_y_bias": 1.0 / (b.sd * unit[b.per]), "v_y_angle": -1.0 / beta.sd}
-            _couple(information, each, SHARED_ERROR)
+            _couple(information, each, CHOSEN.shared_error)
         typed = tuple(INDEX[name] for name in TYPED if moves[INDEX[name]])
         return cls(mean=mean, low=low, high=high, information=information, moves=moves, typed=typed)
 
@@ -164,7 +157,7 @@ class Priors:
         information = np.zeros((n, n))
         information[: len(self.mean), : len(self.mean)] = self.information
         extra = np.arange(len(self.mean), n)
-        information[extra, extra] = 1.0 / ANOTHER_ROAD**2
+        information[extra, extra] = 1.0 / CHOSEN.another_road**2
         return replace(
             self,
             mean=np.concatenate([self.mean, np.zeros(count)]),
@@ -183,7 +176,7 @@ class Priors:
         cost = 0.5 * float(away @ self.information @ away)
         for k in self.typed:
             z2 = float(self.information[k, k] * away[k] ** 2)
-            cost += 0.5 * ((TAILS + 1.0) * math.log1p(z2 / (TAILS + 1.0)) - z2)
+            cost += 0.5 * ((CHOSEN.tails + 1.0) * math.log1p(z2 / (CHOSEN.tails + 1.0)) - z2)
         return cost if self.data is None else cost + self.data.around(p[: len(NAMES)])[0]
 
     def around(self, p: Array) -> tuple[Array, Array]:
@@ -191,7 +184,7 @@ class Priors:
         away, curvature = p - self.mean, self.information.copy()
         for k in self.typed:
             z2 = self.information[k, k] * away[k] ** 2
-            curvature[k, k] *= (TAILS + 1.0) / (TAILS + 1.0 + z2)
+            curvature[k, k] *= (CHOSEN.tails + 1.0) / (CHOSEN.tails + 1.0 + z2)
         gradient: Array = curvature @ away
         if self.data is not None:
             n = len(NAMES)  # of other roads no drive before tells
@@ -213,15 +206,15 @@ def _declared(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
     L, grip = vehicle.wheelbase, np.exp(OF_AXLES["ln_grip"].mean)
     declared: dict[str, tuple[float, float]] = {}
     if (height := vehicle.lengthwise("cg_height")) is not None:
-        declared["load_transfer"] = LESS_LOAD * height / L, SURE_HEIGHT
+        declared["load_transfer"] = CHOSEN.less_load * height / L, CHOSEN.sure_height
     for name, share in (("driving", "drive_front_share"), ("braking", "brake_front_share")):
         if (front := vehicle.lengthwise(share)) is not None:
             for axle, part, W in (
                 ("f", front, L / vehicle.l_r),
                 ("r", 1.0 - front, L / vehicle.l_f),
             ):
-                use = float(LESS_USE * part * W / grip)
-                declared[f"{name}_{axle}"] = use, max(SURE_SHARE * use, LEAST_USE)
+                use = float(CHOSEN.less_use * part * W / grip)
+                declared[f"{name}_{axle}"] = use, max(CHOSEN.sure_share * use, CHOSEN.least_use)
     return declared
 
 

@@ -19,11 +19,11 @@ from codegen.arrays import Array
 from codegen.escape import visible
 from identifier.band import LEVEL, Band, normal_quantile
 from identifier.estimate.priors import Priors
+from identifier.export.chosen import CHOSEN
 from identifier.motion.parameters import INDEX
 from identifier.tire_model import AXLES, TireModel, brisk_speed, require_band
 from models.vehicle import GRAVITY, LIGHTEST
 
-SPEEDS, PUSHES, SLIPS = 13, 200, 200  # of the table, of a diagram, of a curve
 NUMBERS = ("load_transfer", "braking_f", "braking_r", "driving_f", "driving_r")
 
 
@@ -51,7 +51,7 @@ def limits(model: TireModel) -> Limits:
     ends = (mean + normal_quantile(LEVEL) * sd)[index]
     transfer = ends[0] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
     top = brisk_speed(car, model.min_speed) if drives.speeds is None else float(drives.speeds[1])
-    v_x = np.linspace(0.0, top, SPEEDS)
+    v_x = np.linspace(0.0, top, CHOSEN.speeds)
     pressed = car.load_ratio(v_x)
     a_y = (grip * pressed).min(axis=1)
     sides = [
@@ -63,7 +63,7 @@ def limits(model: TireModel) -> Limits:
 
 def _lowest_grip(band: Band[Any], i: int, known: float) -> float:
     """Return the largest force of the lower end of an axle's band, in static loads."""
-    alpha = np.linspace(0.0, known, SLIPS + 1)[1:]
+    alpha = np.linspace(0.0, known, CHOSEN.slips + 1)[1:]
     half, model = band.half(alpha), band.model
     low = float((model.force(alpha) - half)[:, i].max())
     if known <= 0.0 or low <= 0.0:
@@ -78,7 +78,7 @@ def _side(a_y: float, pressed: Array, transfer: Array, grip: Array, use: Array) 
     push of a weight adds to it (2,).   grip : φ_i (2,).   use : c_i (2,).
     """
     most = min(a_y, 1.0 / max(float(use.max()), 1e-9))
-    f = np.linspace(0.0, most, PUSHES + 1)[1:, None]
+    f = np.linspace(0.0, most, CHOSEN.pushes + 1)[1:, None]
     load = np.maximum(pressed + transfer * f, LIGHTEST)
     left = (grip * load * np.sqrt(np.maximum(1.0 - (use * f) ** 2, 0.0))).min(axis=1)
     return min(most, float((f[:, 0] / np.maximum(1.0 - left / a_y, 1e-9)).min()))

@@ -15,15 +15,9 @@ from numpy.typing import ArrayLike
 from codegen.arrays import Array
 from codegen.errors import TireidError
 from codegen.escape import visible
-from identifier.axle.band import (
-    AT_SPEEDS,
-    CENTERS,
-    FLOOR,
-    RELATIVE,
-    UNKNOWN,
-    root,
-)
+from identifier.axle.band import FLOOR, RELATIVE, root
 from identifier.axle.band_step import LEAST_BEFORE, hinges
+from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
 from identifier.axle.model import AxleModel
 from identifier.band import LEVEL, normal_quantile
 from identifier.estimate.model import FittedModel
@@ -259,14 +253,16 @@ def _band_of_axle(model: AxleModel, graph: _Graph, axle: int, units: str) -> Non
     left = node("Max", colored, left)
     relative = node("Mul", _FORCES[axle].name, number(RELATIVE / load))
     total = node("Add", node("Add", graph.square(relative), number(FLOOR**2)), left)
-    ratio = node("Div", left, node("Mul", before, number(UNKNOWN**2)))
+    ratio = node("Div", left, node("Mul", before, number(AXLE_CHOSEN.unknown**2)))
     unknown = node("Min", ratio, number(1.0))
-    slips = hinges(calibration.factors, CENTERS)[axle]
-    size = node("Min", node("Abs", _SLIPS[axle].name), number(CENTERS[-1]))
-    over = node("Max", node("Sub", size, number(CENTERS[:-1])), number(0.0))
+    slips = hinges(calibration.factors, AXLE_CHOSEN.centers)[axle]
+    size = node("Min", node("Abs", _SLIPS[axle].name), number(AXLE_CHOSEN.centers[-1]))
+    over = node("Max", node("Sub", size, number(AXLE_CHOSEN.centers[:-1])), number(0.0))
     by_slip = node("Add", node("MatMul", over, number(slips[1:, None])), number(slips[0]))
     at = speed / model.vehicle.froude_speed
-    factor = node("Mul", by_slip, number(np.interp(at, AT_SPEEDS, calibration.speeds[axle])))
+    factor = node(
+        "Mul", by_slip, number(np.interp(at, AXLE_CHOSEN.at_speeds, calibration.speeds[axle]))
+    )
     wide = node("Max", factor, number(1.0))
     narrow, wide = graph.square(factor), graph.square(wide)
     opened = node("Mul", unknown, node("Sub", wide, narrow))

@@ -20,6 +20,7 @@ from codegen.package import (
 )
 from codegen.template import Values, Words, filled
 from identifier.export.c_source import PREFIX, PROGRAMS, C, c_sources
+from identifier.export.chosen import CHOSEN
 from identifier.export.layout import Member, carried_members, output_members, rules
 from identifier.export.specialize import (
     ACCELERATION,
@@ -141,9 +142,6 @@ def _described(signal: Signal) -> dict[str, Any]:
 
 # Samples for the self-test of a package, and the forces that CasADi gives for them.
 
-SAMPLES = 240
-REST = 10  # samples at rest, and some as long in between
-
 
 class _Vectors(NamedTuple):
     """Samples (n, k) in the order of the inputs, SI, and axle forces (n, 2) [N]."""
@@ -152,7 +150,7 @@ class _Vectors(NamedTuple):
     force: Array
 
 
-def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
+def synthetic_samples(specialized: SpecializedStep, n: int = CHOSEN.samples) -> Array:
     """Return a start from rest and turns to both sides, (n, k); arithmetic only, no noise.
 
     Where v_y is given it is measured at the end alone; a_y is that of the motion, with a gap.
@@ -160,8 +158,8 @@ def synthetic_samples(specialized: SpecializedStep, n: int = SAMPLES) -> Array:
     """
     k = np.arange(n, dtype=np.float64)
     wave, slow = _triangle(k / 60.0), _triangle(k / 97.0 + 0.2)
-    v_x = specialized.min_speed * np.minimum(0.0973 * np.maximum(k - REST, 0.0), 15.0)
-    v_x = np.where((k >= n // 2) & (k < n // 2 + REST), 0.5 * specialized.min_speed, v_x)
+    v_x = specialized.min_speed * np.minimum(0.0973 * np.maximum(k - CHOSEN.rest, 0.0), 15.0)
+    v_x = np.where((k >= n // 2) & (k < n // 2 + CHOSEN.rest), 0.5 * specialized.min_speed, v_x)
     v_y = 0.03 * v_x * slow
     r = 0.4 * specialized.min_speed * wave * np.minimum(k / n, 0.5)
     delta_f, delta_r = 0.05 * wave, 0.005 * slow
@@ -242,10 +240,6 @@ def vectors_header(specialized: SpecializedStep, found: _Vectors) -> str:
     )
 
 
-# Largest differences of a force that the self-test allows, in parts of the limit of forces.
-TOLERANCE_DOUBLE, TOLERANCE_SINGLE = 1e-8, 2e-5
-
-
 class Package(NamedTuple):
     """A package before it is written: its step, its files by path, title, version and hash."""
 
@@ -290,7 +284,7 @@ def _programs(specialized: SpecializedStep) -> dict[str, str]:
 def _tolerances(specialized: SpecializedStep) -> tuple[str, str]:
     """Return the largest difference of a force that the self-test allows [N], double and float."""
     force = specialized.limits.force
-    return f"{TOLERANCE_DOUBLE * force:.2g}", f"{TOLERANCE_SINGLE * force:.2g}"
+    return f"{CHOSEN.tolerance_double * force:.2g}", f"{CHOSEN.tolerance_single * force:.2g}"
 
 
 def readme(package: Package, about_figures: str) -> str:
@@ -315,7 +309,7 @@ def readme(package: Package, about_figures: str) -> str:
             **_about_signals(specialized),
             **_about_gaps(specialized),
             "libraries": f"{', '.join(called) or 'nothing'} of `<math.h>`, copies of structures",
-            "samples": str(SAMPLES),
+            "samples": str(CHOSEN.samples),
             "tolerance_double": double,
             "tolerance_single": single,
             "figures": about_figures,

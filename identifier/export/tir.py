@@ -14,14 +14,8 @@ from scipy.optimize import least_squares
 
 from codegen.arrays import Array
 from codegen.escape import visible
+from identifier.export.chosen import CHOSEN
 from identifier.tire_model import AXLES, Axle, TireModel
-
-WIDEST, BEYOND = 0.6, 0.02  # slip up to which curves are compared [rad]; weight past what is known
-LEAST_REACH, REACH = 0.032, 0.1  # rad, that is followed at least, and where nothing is said
-LOW, HIGH = (0.0, -4.0, 1.0001, -5.0), (6.0, 2.0, 2.4, 0.95)  # of ln K, ln μ, C, E
-WORST = 5.0  # power of the errors whose squares are summed at last: near to the largest one
-MOST_MISSED = 0.1  # of the peak: past that a curve is no Magic Formula
-PROPORTIONAL = 100.0  # PKY2: stiffness goes with load, within 0.1 % up to twice the nominal one
 
 
 class _MagicCurve(NamedTuple):
@@ -38,14 +32,14 @@ class _MagicCurve(NamedTuple):
 
 
 def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -> _MagicCurve:
-    """Return the Magic Formula nearest to the curve of an axle; refuse one beyond `MOST_MISSED`."""
+    """Return the Magic Formula nearest to an axle's curve; refuse one beyond `CHOSEN.most_missed`."""
     i, known = AXLES.index(axle), model.known_slip
-    reach = REACH if known is None else max(LEAST_REACH, float(known[i]))
-    beyond = np.linspace(reach, max(WIDEST, 1.5 * reach), 60)
+    reach = CHOSEN.reach if known is None else max(CHOSEN.least_reach, float(known[i]))
+    beyond = np.linspace(reach, max(CHOSEN.widest, 1.5 * reach), 60)
     side = np.concatenate([np.linspace(0.0, reach, 60)[1:], beyond])
     slip = np.concatenate([side, -side])
     inside = np.abs(slip) <= reach
-    weight, load = np.where(inside, 1.0, BEYOND), model.vehicle.axle_loads[i]
+    weight, load = np.where(inside, 1.0, CHOSEN.beyond), model.vehicle.axle_loads[i]
     phi = model.force(slip)[:, i] / load
     peak = float(np.abs(phi[inside]).max())
 
@@ -57,12 +51,12 @@ def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -
     stiff, most = math.log(max(phi[0] / slip[0], 1.1)), math.log(max(float(phi.max()), 0.05))
     squares = [_solved(errors, (stiff, most, 1.35, E)) for E in (0.0, -1.5)]
     best = min(squares, key=lambda z: float(np.sum(errors(z) ** 2)))
-    z = _solved(errors, best, WORST, max(float(np.abs(errors(best)).max()), 1e-9))
+    z = _solved(errors, best, CHOSEN.worst, max(float(np.abs(errors(best)).max()), 1e-9))
     missed = float(np.abs(errors(z))[inside].max())
-    if not missed <= MOST_MISSED:
+    if not missed <= CHOSEN.most_missed:
         raise ValueError(
             f"the curve of the {axle} axle is no Magic Formula: the nearest one is off by "
-            f"{100.0 * missed:.2g} % of its peak ({100.0 * MOST_MISSED:g} % are allowed)"
+            f"{100.0 * missed:.2g} % of its peak ({100.0 * CHOSEN.most_missed:g} % are allowed)"
         )
     moved = [formula(slip, z + h) - formula(slip, z - h) for h in 1e-5 * np.eye(4)]
     step = np.linalg.pinv(weight[:, None] * np.column_stack(moved) / 2e-5, rcond=1e-6) * weight
@@ -81,9 +75,13 @@ def formula(slip: Array, z: Array) -> Array:
 
 
 def _solved(errors: Callable[..., Array], begin: Sequence[float] | Array, *of: float) -> Array:
-    inside = np.clip(begin, np.array(LOW) + 1e-6, np.array(HIGH) - 1e-6)
+    inside = np.clip(begin, np.array(CHOSEN.tir_low) + 1e-6, np.array(CHOSEN.tir_high) - 1e-6)
     scale = (0.1, 0.1, 0.1, 0.5)
-    return np.array(least_squares(errors, inside, bounds=(LOW, HIGH), x_scale=scale, args=of).x)
+    return np.array(
+        least_squares(
+            errors, inside, bounds=(CHOSEN.tir_low, CHOSEN.tir_high), x_scale=scale, args=of
+        ).x
+    )
 
 
 def tire_properties(model: TireModel, axle: Axle) -> str:
@@ -94,7 +92,7 @@ def tire_properties(model: TireModel, axle: Axle) -> str:
     """
     found, i = magic_curve(model, axle), AXLES.index(axle)
     K, mu, C, E = (float(one) for one in found.numbers)
-    load, u = 0.5 * model.vehicle.axle_loads[i], 1.0 / PROPORTIONAL
+    load, u = 0.5 * model.vehicle.axle_loads[i], 1.0 / CHOSEN.proportional
     slips = found.reach * np.array([0.25, 0.5, 0.75, 1.0])
     force, band = model.force(slips), "the model cannot tell how sure it is"
     if model.band is not None:
@@ -143,5 +141,5 @@ PCY1 = {C:.10g}
 PDY1 = {mu:.10g}
 PEY1 = {E:.10g}
 PKY1 = {-K * (1.0 + u**2) / (2.0 * u):.10g}
-PKY2 = {PROPORTIONAL:.10g}
+PKY2 = {CHOSEN.proportional:.10g}
 """

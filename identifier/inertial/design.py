@@ -11,6 +11,7 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.car import car_numbers, downforce_numbers
+from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
 from identifier.axle.covariance import packed, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.design import AxleIdentifier, curve_boxes, curve_tracks, resumed_units
@@ -19,10 +20,11 @@ from identifier.axle.guarantee import prior_box
 from identifier.axle.learning import Bounds, inward, rising_shares
 from identifier.axle.model import EXACT, AxleModel
 from identifier.axle.prior import Prior
-from identifier.axle.slip import FASTEST, Sensors, Sway
+from identifier.axle.slip import Sensors, Sway
 from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
-from identifier.inertial.motion import MOVING, SENSORS, Along, Laws, Learnt
+from identifier.inertial.chosen import CHOSEN
+from identifier.inertial.motion import SENSORS, Along, Laws, Learnt
 from identifier.inertial.step import (
     CARRY,
     OVER,
@@ -41,10 +43,7 @@ from identifier.tire_model import TireModel
 from models.rules import require_positive, require_within
 from models.vehicle import GRAVITY, Vehicle
 
-RISING_UNTIL = 0.0  # rad, the slip at which force curves shall not fall: the cornering stiffness
 MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1}  # others are in `Bounds`
-LEAST_SHARE = 1e-6  # of the sway, which a prior has to have
-REACH = 0.3  # rad, up to which directions of curves are those of a tire
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,7 +123,7 @@ class InertialIdentifier(Method):
         dt : sampling interval [s].
         """
         usual, tires = cls.for_vehicle(vehicle, dt=dt), model.in_units(LADDER)
-        share = max(float(tires.sway_share.mean()), LEAST_SHARE)
+        share = max(float(tires.sway_share.mean()), CHOSEN.least_share)
         return replace(
             usual,
             held=True,
@@ -221,8 +220,8 @@ class InertialIdentifier(Method):
                 "trust": np.array(trust),
                 "learning_speed": np.array(self.plausibility.learning_speed),
                 "limits": np.array(self._limits()),
-                "bounds": np.array(self.bounds.of_ladder(self.ladder, RISING_UNTIL)),
-                "rising": rising_shares(self.ladder, RISING_UNTIL),
+                "bounds": np.array(self.bounds.of_ladder(self.ladder, CHOSEN.rising_until)),
+                "rising": rising_shares(self.ladder, CHOSEN.rising_until),
                 "curves": curves,
                 "compliance": compliance,
                 "doubt": np.array(self.doubt),
@@ -255,7 +254,7 @@ class InertialIdentifier(Method):
 
     def _sway(self, vehicle: Vehicle) -> Sway:
         """Return the roll of a body of this size."""
-        omega = min(self.roll_frequency / vehicle.froude_time, 0.6 * FASTEST)
+        omega = min(self.roll_frequency / vehicle.froude_time, 0.6 * AXLE_CHOSEN.fastest)
         return Sway(frequency=omega, damping=self.roll_damping)
 
     def _limits(self) -> LearntLimits:
@@ -274,7 +273,7 @@ class InertialIdentifier(Method):
         A curve φ(x) of another stiffness and the same grip changes by x dφ/dx, one of another grip
         and the same stiffness by φ - x dφ/dx, as near as units come to it.
         """
-        slip = np.linspace(0.0, REACH, 121)[1:]
+        slip = np.linspace(0.0, CHOSEN.reach, 121)[1:]
         T = unit_matrix(slip, self.ladder)
         stiffer = slip[:, None] * ((1.0 - T * T) / np.array(self.ladder)) @ W.T
         n = len(self.ladder)
@@ -286,7 +285,9 @@ class InertialIdentifier(Method):
     def _into(self, curves: Array, compliance: Array) -> Array:
         """Return what steps of what is learnt move of each axle's numbers, (2, n + 3, k)."""
         n = len(self.ladder)
-        moved = self._learnt.into(n, ca.DM(curves), ca.DM(compliance))[MOVING:, MOVING:]
+        moved = self._learnt.into(n, ca.DM(curves), ca.DM(compliance))[
+            CHOSEN.moving :, CHOSEN.moving :
+        ]
         *weights, own, sensors = np.split(np.array(ca.evalf(moved)), [n, 2 * n, 2 * n + 2])
         steering, nothing = sensors[SENSORS.index("steering")], np.zeros(sensors.shape[1])
         front = np.vstack([weights[0], own[0], nothing, steering])

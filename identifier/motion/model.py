@@ -31,16 +31,13 @@ from codegen.compiler import FLAGS
 from identifier.axle.car import step_function, symbols
 from identifier.axle.gate import GateState, Plausibility, gate
 from identifier.axle.slip import SHORTEST
+from identifier.motion.chosen import CHOSEN
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, LIGHTEST
 
-LEAST_GRIP = 0.05  # of G²: what an axle that uses all of its grip lengthwise keeps sideways
-LEAST_SLOPE = 0.02  # of C: the carcass does not stretch further
-DAMPING = 0.3  # ζ of the sway
 # Slopes over all parameters are thousands of lines: to optimize them further takes the compiler
 # longer than they run.
 QUICK = tuple("-O1" if flag == "-O2" else flag for flag in FLAGS)
-RATE = 4.0  # κ [1/s]: what is missed is a mean over a quarter of a second
 
 Columns = tuple[str, ...]
 SIGNALS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_x", "bank", "road", "on")
@@ -239,7 +236,9 @@ def _sway(at: _At, v_x: _Dual, r: _Dual) -> tuple[dict[str, _Dual], _Dual]:
         omega = car.omega * ca.exp(ln_sway)
         a = GRAVITY * (front * f_f + rear * f_r)
         eased = 1 + dt * GRAVITY * (front * C_f * k_f + rear * C_r * k_r) / speed
-        moved = (rate * eased + dt * omega**2 * (a - rho)) / (eased + dt * 2 * DAMPING * omega)
+        moved = (rate * eased + dt * omega**2 * (a - rho)) / (
+            eased + dt * 2 * CHOSEN.damping * omega
+        )
         moved = ca.if_else(first > 0, 0, moved)
         place = ca.if_else(first > 0, speed * yaw, rho + dt * moved)
         return [moved, place, -moved / (omega**2 * speed)]
@@ -282,7 +281,7 @@ def _curve(ln_C: Any, ln_mu: Any, c: Any, E: Any, *others: Any) -> tuple[Any, An
 def carcass_curve(*numbers: Any) -> tuple[Any, Any]:
     """Return φ and its slope as far as the carcass stretches.   numbers : as of `_curve`."""
     phi, slope = _curve(*numbers)
-    return phi, ca.fmax(slope, LEAST_SLOPE * ca.exp(numbers[0]))
+    return phi, ca.fmax(slope, CHOSEN.least_slope * ca.exp(numbers[0]))
 
 
 def pushed_names(axle: str) -> list[str]:
@@ -305,7 +304,7 @@ def load_and_ellipse(
     load = 1 + shifted + (press + down) * v_x**2
     use = ca.if_else(f > 0, drive, brake) * f
     least = ca.if_else(load > LIGHTEST, load, LIGHTEST)
-    return least, ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
+    return least, ca.sqrt(ca.fmax(1 - use**2, CHOSEN.least_grip))
 
 
 def curve_names(axle: str) -> list[str]:
@@ -384,11 +383,11 @@ def _missed(
         across = F0 * ca.cos(angle)
         xi = vy / GRAVITY + J * yaw
         u = across - vx * yaw / GRAVITY + push
-        fall = ca.exp(-RATE * dt)
-        mean = (1 - fall) / (RATE * dt)
+        fall = ca.exp(-CHOSEN.rate * dt)
+        mean = (1 - fall) / (CHOSEN.rate * dt)
         z = fall * z0 + mean * (xi - xi0) - (u + u0) / 2 * dt * mean
         z = ca.if_else(at.first > 0, 0, z)
-        return [z, xi, u, across, RATE * z]
+        return [z, xi, u, across, CHOSEN.rate * z]
 
     bank = _Dual(at.signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
     names = [f"{name}_{axle}" for name in ("z", "xi", "u")]
@@ -400,7 +399,6 @@ def _missed(
 
 # The same, sample by sample in a car: no smoothing, a gate before it, a_x from v_x alone.
 
-LAG_OF_A_X = 0.2  # [s] of the washout that tells a_x
 REPLAYED = (*CARRIED[:10], "v_x_slow")
 REPLAY_CARRY, REPLAY_OVER = ("gate", "motion"), ("x", "u", "v_x")
 
@@ -423,8 +421,8 @@ def _replay_step() -> ca.Function:
     old = _by_name(REPLAYED, s.motion)
     g = gate(s.plausibility, s.dt, s.gate, s.x, s.u, s.v_x)
     slow = ca.if_else(g.first > 0, g.v_x, old["v_x_slow"])
-    a_x = (g.v_x - slow) / LAG_OF_A_X - g.v_y * g.r
-    following = g.v_x + (slow - g.v_x) * ca.exp(-s.dt / LAG_OF_A_X)
+    a_x = (g.v_x - slow) / CHOSEN.lag_of_a_x - g.v_y * g.r
+    following = g.v_x + (slow - g.v_x) * ca.exp(-s.dt / CHOSEN.lag_of_a_x)
     values = [g.v_x, g.v_y, g.r, g.delta[0], g.delta[1], a_x, 0, 0, g.on]
     fixed = _constant((*SIGNALS, *RATES), [*values, 0, 0, 0], 0)
     duals = _constant(NAMES, ca.vertsplit(s.parameters), 0)

@@ -21,6 +21,7 @@ from codegen.errors import TireidError
 from identifier.certificate import Certificate
 from identifier.driving import SPEED_SPREAD, Driving, natural_driving
 from identifier.method import Method
+from identifier.paper.chosen import CHOSEN
 from identifier.paper.laws import INPUT_SOURCES, INTEGRATORS, LAWS, Gains, diagonal
 from identifier.paper.network import (
     Network,
@@ -74,8 +75,6 @@ VARIANTS: Mapping[str, _Variant] = {
     "pi_lead": _Variant("PI-lead", "pi_lead", "pi_lead"),
 }
 
-_SHORTEST_STEP, LONGEST_STEP = 1e-4, 0.1  # [s]: finer is only work, coarser is blind
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PaperIdentifier(Method):
@@ -122,7 +121,7 @@ class PaperIdentifier(Method):
                 raise ValueError(
                     f"{name} must be one of {list(known)}, not {getattr(self, name)!r}"
                 )
-        require_within(ValueError, _SHORTEST_STEP, LONGEST_STEP, dt=self.dt)
+        require_within(ValueError, CHOSEN.shortest_step, CHOSEN.longest_step, dt=self.dt)
         require_within(ValueError, 1e-6, 1e9, force_unit=self.force_unit)
         require_within(ValueError, 1e-6, 200.0, min_speed=self.min_speed)
         require_within(ValueError, 0, 2**63 - 1, seed=self.seed)
@@ -352,8 +351,6 @@ def _operation(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> O
 
 # Gains by the margin of the learning loop: sizes follow from the car by similarity.
 
-PHASE_MARGIN = 60.0  # deg
-
 
 def design_for(
     vehicle: Vehicle,
@@ -361,7 +358,7 @@ def design_for(
     *,
     law: str = "integral",
     network: Network | None = None,
-    phase_margin: float = PHASE_MARGIN,
+    phase_margin: float = CHOSEN.phase_margin,
     input_source: str = "measured",
     integrator: str = "euler",
     dt: float = 0.01,

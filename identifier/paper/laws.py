@@ -26,6 +26,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
+from identifier.paper.chosen import CHOSEN
 from models.rules import require_within
 
 _Direction = Callable[[Any, Any], Any]
@@ -224,8 +225,6 @@ def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection =
 
 INTEGRATORS: Mapping[str, Integrator] = {"euler": euler, "rk4": rk4}
 
-LEAST, LARGEST = 1e-15, 1e12  # of a gain that is not 0, in its unit, whatever U is
-
 
 # Gains of the identifier, with their units.
 #
@@ -269,7 +268,7 @@ class Gains:
         A_d = np.array(self.A_d, dtype=np.float64)
         if A_d.shape != (2, 2) or not np.isfinite(A_d).all():
             raise ValueError(f"A_d must be a 2x2 matrix of finite numbers, it is {self.A_d}")
-        require_within(ValueError, 0.0, LARGEST, **{"|A_d|": np.abs(A_d).max()})
+        require_within(ValueError, 0.0, CHOSEN.largest, **{"|A_d|": np.abs(A_d).max()})
         poles = np.linalg.eigvals(A_d)
         if not poles.real.max() < 0.0:
             raise NotHurwitzError(f"A_d must be Hurwitz, its eigenvalues are {poles}")
@@ -280,12 +279,16 @@ class Gains:
             raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
         for name in ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "W_free", "V_free", "lead"):
             if getattr(self, name) != 0.0:
-                require_within(ValueError, LEAST, LARGEST, **{name: getattr(self, name)})
+                require_within(
+                    ValueError, CHOSEN.least, CHOSEN.largest, **{name: getattr(self, name)}
+                )
         for name in ("W_max", "V_max"):
             if not getattr(self, name) > 0.0:
                 raise ValueError(f"{name} must be positive, it is {getattr(self, name)}")
             if getattr(self, name) != np.inf:
-                require_within(ValueError, LEAST, LARGEST, **{name: getattr(self, name)})
+                require_within(
+                    ValueError, CHOSEN.least, CHOSEN.largest, **{name: getattr(self, name)}
+                )
         for free, rho in (("W_free", "rho_W"), ("V_free", "rho_V")):
             if getattr(self, free) > 0.0 and getattr(self, rho) == 0.0:
                 raise ValueError(

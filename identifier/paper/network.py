@@ -23,6 +23,7 @@ from identifier.frozen import (
     vehicle_numbers,
 )
 from identifier.method import OTHER_STRUCTURE, resumed
+from identifier.paper.chosen import CHOSEN
 from identifier.setup import Setup
 from identifier.tire_model import StaticModel, TireModel
 from models.bicycle import BicycleParameters, linear_axle_force, slip_angles
@@ -135,9 +136,6 @@ def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> 
 
 # The paper's network, frozen: weights at one instant and all that axle forces need.
 
-_LARGEST_SUM = 1e9  # of the units of an axle together [N]: what cancels may be large
-_LARGEST_V = 1e9  # [-], beyond which tanh is a sign at the slip of a resting car
-
 
 def _build_frozen(network: Network) -> ca.Function:
     """Return the frozen model as a function of weights, state and steering.
@@ -212,8 +210,8 @@ class NetworkModel(StaticModel):
                 raise ValueError(f"{name} holds a number that is not finite: the law has diverged")
         with np.errstate(over="ignore"):  # beyond the limit, too
             largest = self.force_unit * np.abs(self.weights.W).sum(axis=1).max()
-        require_within(ValueError, 0.0, _LARGEST_SUM, **{"force_unit times |W|": largest})
-        require_within(ValueError, 0.0, _LARGEST_V, **{"|V|": np.abs(self.weights.V).max()})
+        require_within(ValueError, 0.0, CHOSEN.largest_sum, **{"force_unit times |W|": largest})
+        require_within(ValueError, 0.0, CHOSEN.largest_v, **{"|V|": np.abs(self.weights.V).max()})
 
     def setup(self, dt: float) -> Setup:
         del dt

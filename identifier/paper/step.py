@@ -13,6 +13,7 @@ from typing import Any
 
 import casadi as ca
 
+from identifier.paper.chosen import CHOSEN
 from identifier.paper.laws import (
     INPUT_SOURCES,
     INTEGRATORS,
@@ -42,7 +43,6 @@ PORTS = (
     Port("z", "U s^2", "filtered error, front and rear"),
 )
 OVER = ("x", "u", "v_x")
-LARGEST_SPEED, LARGEST_ANGLE = 300.0, 1.5  # m/s and rad: no car is faster, no wheel turns more
 GAINS = (
     "eta_W", "eta_V", "rho_W", "rho_V", "forgetting", "W_max", "V_max", "lead", "W_free", "V_free",
 )  # fmt: skip
@@ -73,7 +73,9 @@ def _plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     most = 2 * v_x  # tan 63°
     front, rear = x[0] + parameters.l_f * x[1], x[0] - parameters.l_r * x[1]
     inside = ca.logic_and(ca.fabs(front) <= most, ca.fabs(rear) <= most)
-    steering = ca.logic_and(ca.fabs(u[0]) <= LARGEST_ANGLE, ca.fabs(u[1]) <= LARGEST_ANGLE)
+    steering = ca.logic_and(
+        ca.fabs(u[0]) <= CHOSEN.largest_angle, ca.fabs(u[1]) <= CHOSEN.largest_angle
+    )
     return ca.logic_and(inside, steering)
 
 
@@ -131,7 +133,9 @@ def build_step(structure: Structure) -> ca.Function:
         return [state[0], state[1], bounded(state[2], W_max), bounded(state[3], V_max)]
 
     moving = v_x >= min_speed
-    plausible_sample = ca.logic_and(_plausible(parameters, speed, x, u), v_x <= LARGEST_SPEED)
+    plausible_sample = ca.logic_and(
+        _plausible(parameters, speed, x, u), v_x <= CHOSEN.largest_speed
+    )
     used = ca.logic_and(moving, plausible_sample)
     f_hat = ca.if_else(used, W @ layers(xi_hat, V)[1], 0)
     linear = ca.if_else(used, linear_axle_force(parameters, speed, x, u), 0)

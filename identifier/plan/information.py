@@ -15,12 +15,9 @@ from scipy.signal import lfilter
 
 from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
+from identifier.plan.chosen import CHOSEN
 from identifier.plan.motion import Motion, time_step
-from identifier.plan.tires import FLAT, PlausibleTires
-
-COLOR = 5.0  # times the correlation time that learning is given: half a second, as errors of models
-EVERY = 2  # step of the simulation that counts: 54 ms in a sedan, the regressor is low-passed
-_MATTERING = 12  # slips at which the curve is asked, up to where it is flat
+from identifier.plan.tires import PlausibleTires
 
 
 def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array:
@@ -28,8 +25,8 @@ def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array
     tires : k pairs of axles; their covariance is that before.   v_x : speed [m/s].
     """
     ladder, numbers = np.array(tires.method.ladder), tires.method.regression
-    dt, n = EVERY * time_step(tires), ladder.size
-    motion = Motion(*(one[::EVERY] for one in motion))
+    dt, n = CHOSEN.every * time_step(tires), ladder.size
+    motion = Motion(*(one[:: CHOSEN.every] for one in motion))
     T, m, k = motion.v_y.shape
     g = np.empty((T, 2, m, k, n + 3))
     g[..., :n] = np.tanh(motion.slip[..., None] / ladder)
@@ -44,7 +41,7 @@ def covariance_after(tires: PlausibleTires, motion: Motion, v_x: float) -> Array
     sigma = numbers.error + numbers.relative_error * np.abs(y)
     sigma += numbers.lateness * numbers.bandwidth * np.abs(motion.force - y)
     sigma += numbers.noise * np.maximum(motion.slope, 0.0) / v_x
-    h /= (sigma * np.sqrt(COLOR * numbers.correlation_time / dt))[..., None]
+    h /= (sigma * np.sqrt(CHOSEN.color * numbers.correlation_time / dt))[..., None]
     lanes = np.ascontiguousarray(h.transpose(2, 3, 1, 4, 0))
     information = lanes @ lanes.swapaxes(-1, -2)
     P: Array = np.linalg.inv(np.linalg.inv(tires.covariance) + information)
@@ -64,7 +61,7 @@ def asked(tires: PlausibleTires, v_x: float) -> _Doubt:
     v_x : speed [m/s].
     """
     ladder = np.array(tires.method.ladder)
-    slips = tires.slip_at(FLAT)[0][:, None] * np.linspace(0.0, 1.0, _MATTERING + 1)[1:]
+    slips = tires.slip_at(CHOSEN.flat)[0][:, None] * np.linspace(0.0, 1.0, CHOSEN.mattering + 1)[1:]
     units = np.stack([unit_matrix(one, tires.method.ladder) for one in slips])
     slope = np.einsum("asj,aj->as", (1.0 - units**2) / ladder, tires.W[0])
     return _Doubt(slips, units, slope * np.array([[1.0], [1.0 / v_x]]))

@@ -18,12 +18,9 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.axle.slip import SHORTEST
+from identifier.plan.chosen import CHOSEN
 from identifier.plan.tires import PlausibleTires
 from models.vehicle import GRAVITY
-
-HOLD = 0.6  # 1/sqrt(L/g): pole of deviations from the course, 1.1 rad/s in a sedan
-STEP = 0.05  # of the time sqrt(L/g): 27 ms in a sedan
-LEAST_SLOPE = 0.02  # of that at zero, for the lag
 
 
 class Hold(NamedTuple):
@@ -59,7 +56,7 @@ class Guide(NamedTuple):
 
 def hold_of(tires: PlausibleTires, v_x: float) -> Hold:
     """Return how the course is held by the first tires.   v_x : speed [m/s]."""
-    car, omega = tires.vehicle, HOLD / tires.vehicle.froude_time
+    car, omega = tires.vehicle, CHOSEN.hold / tires.vehicle.froude_time
     c_f, c_r = (tires.W[0] / np.array(tires.method.ladder)).sum(axis=1)
     per_yaw_rate = car.wheelbase / v_x + v_x / GRAVITY * (1.0 / c_f - 1.0 / c_r)  # 1/G [s]
     per_yaw_rate = max(per_yaw_rate, 0.5 * car.wheelbase / v_x)
@@ -99,7 +96,7 @@ class Entry(NamedTuple):
 
 def time_step(tires: PlausibleTires) -> float:
     """Return the step of the simulation [s]."""
-    return STEP * tires.vehicle.froude_time
+    return CHOSEN.step * tires.vehicle.froude_time
 
 
 def simulate(
@@ -118,7 +115,7 @@ def simulate(
     n, m, k = *planned.shape, len(tires.W)
     W = tires.W.transpose(2, 1, 0)[:, :, None, :]  # (units, 2, 1, k)
     inverse = scales[:, None, None, None]
-    flattest = LEAST_SLOPE * (W * inverse).sum(axis=0)
+    flattest = CHOSEN.least_slope * (W * inverse).sum(axis=0)
     s, share = (one[:, None, None] for one in (tires.compliance, tires.sway_share))
     loads = np.array(car.axle_loads)
     to_v, to_r = loads / car.mass, np.array([car.l_f, -car.l_r]) * loads / car.yaw_inertia

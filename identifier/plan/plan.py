@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from identifier.plan.chosen import CHOSEN
 from identifier.plan.information import asked, covariance_after, deviation, expected_error
 from identifier.plan.motion import NO_HOLD, Entry, Motion, hold_of, simulate, steps_of
-from identifier.plan.rehearsal import LEAD, rehearse
+from identifier.plan.rehearsal import rehearse
 from identifier.plan.search import (
-    FEWEST,
     Pass,
     PlanError,
     Search,
@@ -32,13 +32,7 @@ from models.plant import Plant
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
 
-TURNS = 0.8  # share of the planned lateral force that a car may need to turn inside the area
-_MOST_PASSES = 12
-_LEAST_TIME, _MOST_TIME = 0.5, 60.0  # s
-SLALOM = 0.27  # 1/sqrt(L/g): frequency of the slalom it is compared with, 0.5 Hz for a sedan
 _AMPLITUDES = np.geomspace(0.05, 1.0, 24)  # of the largest angle
-PROBED = 15.0  # sqrt(L/g), of a maneuver whose amplitude is looked for: 8 s in a sedan
-_RANDOM = 8  # random steerings that it is compared with
 _LONGER = np.array([1.0, 1.5, 2.0, 3.0, 4.5, 6.0, 8.0, 10.0])  # times, of a slalom that catches up
 
 
@@ -113,7 +107,7 @@ class Plan:
         driven = []
         for one in self.passes:
             log, way = rehearse(plant, one.steering, one.course, self.space.speed, hold)
-            inside = way[log.t >= LEAD - 1e-9]
+            inside = way[log.t >= CHOSEN.lead - 1e-9]
             assert log.v_y is not None
             side_slip = float(np.abs(np.arctan2(log.v_y, log.v_x)).max())
             clearance = float(edge_distance(self.space, body, *inside.T))
@@ -134,7 +128,7 @@ def _longest_pass(tires: PlausibleTires, space: Space) -> float:
     """Return how long a pass may last [s]: inf where the car can turn inside the area."""
     body = body_of(tires)
     slippery = float(tires.grip.min(axis=1).min())
-    radius = space.speed**2 / (TURNS * space.share * slippery * GRAVITY)
+    radius = space.speed**2 / (CHOSEN.turns * space.share * slippery * GRAVITY)
     reach = math.hypot(radius + body.side, body.ahead) + space.margin
     if 2.0 * reach <= space.width:
         return math.inf
@@ -154,8 +148,10 @@ def make_plan(
         speed.
     time : of all passes together [s].
     """
-    if not _LEAST_TIME <= time <= _MOST_TIME:
-        raise PlanError(f"the time must be {_LEAST_TIME:g} to {_MOST_TIME:g} s, it is {time:g}")
+    if not CHOSEN.least_time <= time <= CHOSEN.most_time:
+        raise PlanError(
+            f"the time must be {CHOSEN.least_time:g} to {CHOSEN.most_time:g} s, it is {time:g}"
+        )
     least = tires.vehicle.lowest_speed * 3.0
     if space.speed < least:
         raise PlanError(
@@ -170,7 +166,7 @@ def make_plan(
             "give more room or less margin"
         )
     longest = _longest_pass(tires, space)
-    needed = FEWEST * swing_time(tires, space)
+    needed = CHOSEN.fewest * swing_time(tires, space)
     if min(longest, time) < needed:
         if longest >= needed:
             raise PlanError(
@@ -179,10 +175,10 @@ def make_plan(
             )
         raise PlanError(_too_small(tires, space, longest, needed))
     count = max(1, math.ceil(time / longest))
-    if count > _MOST_PASSES:
+    if count > CHOSEN.most_passes:
         raise PlanError(
             f"{time:g} s in this area take {count} passes of {longest:.2g} s, more than "
-            f"{_MOST_PASSES}: give more room or less time"
+            f"{CHOSEN.most_passes}: give more room or less time"
         )
     passes: list[Pass] = []
     known = tires
@@ -220,7 +216,7 @@ def hardest(tires: PlausibleTires, space: Space, of: Steering) -> Maneuver:
     """
     sizes = _AMPLITUDES * Search(tires=tires, space=space, duration=1.0, guided=False).largest_angle
     every = [of(float(size)) for size in sizes]
-    t = steps_of(tires, min(every[0].duration, PROBED * tires.vehicle.froude_time))
+    t = steps_of(tires, min(every[0].duration, CHOSEN.probed * tires.vehicle.froude_time))
     delta = np.column_stack([one.steering(t)[:, 0] for one in every])
     slip = np.abs(free_motion(tires, delta, space.speed).slip[..., 0]).max(axis=0)
     kept = (slip <= tires.slip_at(space.share)[0][:, None]).all(axis=0)
@@ -231,7 +227,7 @@ def slalom_of(vehicle: Vehicle, duration: float, frequency: float | None = None)
     """Return slaloms by their amplitude.
     duration : [s].   frequency : [Hz]; None takes 0.27 sqrt(g/L), 0.5 Hz for a sedan.
     """
-    f = SLALOM / vehicle.froude_time if frequency is None else frequency
+    f = CHOSEN.slalom / vehicle.froude_time if frequency is None else frequency
     return lambda amplitude: Slalom(
         amplitude=amplitude, frequency=f, onset=0.0, rate_limit=2.1 * math.pi * f * amplitude,
         duration=duration,
@@ -242,7 +238,7 @@ def random_of(vehicle: Vehicle, duration: float, seed: int) -> Steering:
     """Return random steerings by their amplitude, swings half as fast again as those of a slalom.
     duration : [s].
     """
-    f = 1.5 * SLALOM / vehicle.froude_time
+    f = 1.5 * CHOSEN.slalom / vehicle.froude_time
     return lambda amplitude: RandomSteer(
         amplitude=amplitude, frequency=f, seed=seed, onset=0.0,
         rate_limit=2.1 * math.pi * f * amplitude, duration=duration,
@@ -257,7 +253,9 @@ def _rivals(tires: PlausibleTires, space: Space, time: float, error: float) -> t
         if _rated(tires, space, [slalom], float(times) * time).error <= error:
             late = float(times) * time
             break
-    drawn = [hardest(tires, space, random_of(tires.vehicle, time, seed)) for seed in range(_RANDOM)]
+    drawn = [
+        hardest(tires, space, random_of(tires.vehicle, time, seed)) for seed in range(CHOSEN.random)
+    ]
     first = _rated(tires, space, [slalom], time)._replace(name="slalom", catches_up=late)
     return first, _rated(tires, space, drawn, time)
 

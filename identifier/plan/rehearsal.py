@@ -6,13 +6,12 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array
+from identifier.plan.chosen import CHOSEN
 from identifier.plan.motion import Hold
 from models.maneuvers import Maneuver
 from models.plant import Plant, StepwisePlant
 from models.recordings import Recording
 
-LEAD = 1.0  # s straight ahead before the pass
-PERIOD = 0.01  # s, of who steers
 Course = Callable[
     [Array], Array
 ]  # times since the entry [s] (n,) -> X, Y [m], heading [rad] (n, 3)
@@ -25,18 +24,28 @@ def rehearse(
 
     speed : [m/s].
 
-    The recording, from `LEAD` seconds before the maneuver on, with true forces; X, Y [m] and
+    The recording, from `CHOSEN.lead` seconds before the maneuver on, with true forces; X, Y [m] and
     heading [rad] of each of its samples (n, 3).
     """
-    stepwise, before = StepwisePlant(plant, period=PERIOD), round(LEAD / PERIOD)
+    stepwise, before = (
+        StepwisePlant(plant, period=CHOSEN.period),
+        round(CHOSEN.lead / CHOSEN.period),
+    )
     X, Y, psi = map(float, course(np.zeros(1))[0])
     state = stepwise.start(
-        speed, X=X - LEAD * speed * np.cos(psi), Y=Y - LEAD * speed * np.sin(psi), psi=psi
+        speed,
+        X=X - CHOSEN.lead * speed * np.cos(psi),
+        Y=Y - CHOSEN.lead * speed * np.sin(psi),
+        psi=psi,
     )
-    t = PERIOD * np.arange(before + round(steering.duration / PERIOD) + 1, dtype=np.float64)
-    middle = t + 0.5 * PERIOD - LEAD  # angles are held: at the middle of it they are not late
+    t = CHOSEN.period * np.arange(
+        before + round(steering.duration / CHOSEN.period) + 1, dtype=np.float64
+    )
+    middle = (
+        t + 0.5 * CHOSEN.period - CHOSEN.lead
+    )  # angles are held: at the middle of it they are not late
     planned = np.where(middle < 0.0, 0.0, steering.steering(np.maximum(middle, 0.0))[:, 0])
-    wanted = course(np.maximum(t - LEAD, 0.0))
+    wanted = course(np.maximum(t - CHOSEN.lead, 0.0))
     rows: list[Any] = []
     for k in range(t.size):
         x = state.x

@@ -21,24 +21,13 @@ from scipy.optimize import differential_evolution
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
+from identifier.plan.chosen import CHOSEN
 from identifier.plan.information import asked, covariance_after, expected_error
 from identifier.plan.motion import NO_HOLD, Entry, Guide, Motion, hold_of, simulate, steps_of
 from identifier.plan.tires import PlausibleTires
 from models.maneuvers import SampledSteer
 from models.rules import require_positive, require_within
 from models.vehicle import GRAVITY
-
-_POPULATION, GENERATIONS = 32, 100
-_STALLED, GAIN = 20, 0.01  # generations after which a search ends that brought less than a share
-SWING = 0.75  # sqrt(L/g): least mean duration of a change from angle to angle, 0.4 s in a sedan
-_CHIRP = math.log(3.0)  # largest, of the last to the mean duration, and of the mean to the first
-CALM = 0.5  # share of the grip that the rear axle may still need at the end of a pass
-REAR = 0.97  # share of the grip that no rear axle passes, whatever the tires
-OVERHANG = 0.32  # wheelbases by which a car reaches beyond its axles
-_HALF_WIDTH = 0.33  # wheelbases, of a car without a chassis
-_WIDER = 1.12  # of the body over its track
-_LARGEST_HEADING = math.radians(60.0)  # at the entry
-FEWEST, MOST = 3, 14  # changes of the angle; where a pass has more, they are driven mirrored
 
 
 class PlanError(TireidError, ValueError):
@@ -71,7 +60,7 @@ class Space:
             **{name: getattr(self, name) for name in ("length", "width", "speed", "rate_limit")},
         )
         require_within(PlanError, 0.0, 1e3, margin=self.margin)
-        require_within(PlanError, 0.2, REAR, share=self.share)
+        require_within(PlanError, 0.2, CHOSEN.rear, share=self.share)
         require_within(PlanError, math.radians(1.0), math.radians(60.0), max_angle=self.max_angle)
 
 
@@ -85,11 +74,11 @@ class _Body(NamedTuple):
 
 def body_of(tires: PlausibleTires) -> _Body:
     car = tires.vehicle
-    over = OVERHANG * car.wheelbase
-    side = _HALF_WIDTH * car.wheelbase
+    over = CHOSEN.overhang * car.wheelbase
+    side = CHOSEN.half_width * car.wheelbase
     if car.chassis is not None:
         track = max(car.chassis.track_front, car.chassis.track_rear)
-        side = 0.5 * _WIDER * track
+        side = 0.5 * CHOSEN.wider * track
     return _Body(car.l_f + over, car.l_r + over, side)
 
 
@@ -114,7 +103,7 @@ def swing_time(tires: PlausibleTires, space: Space) -> float:
     from the slip of the wanted share of the grip to the same slip on the other side.
     """
     across = math.pi * float(tires.slip_at(space.share)[0, 0]) / space.rate_limit
-    return max(SWING * tires.vehicle.froude_time, across)
+    return max(CHOSEN.swing * tires.vehicle.froude_time, across)
 
 
 class _Steerings(NamedTuple):
@@ -173,20 +162,20 @@ class Search:
     def swings(self) -> int:
         """How many changes of the angle there are before they repeat."""
         wanted = round(self.duration / swing_time(self.tires, self.space))
-        return max(FEWEST, round(wanted / self.repeats))
+        return max(CHOSEN.fewest, round(wanted / self.repeats))
 
     @property
     def repeats(self) -> int:
         """How often the swings are driven, every other time mirrored."""
         wanted = self.duration / swing_time(self.tires, self.space)
-        return max(1, math.ceil(wanted / MOST))
+        return max(1, math.ceil(wanted / CHOSEN.most))
 
     @property
     def largest_angle(self) -> float:
         """Angle that no swing passes [rad]: a bend at the grip, and the slip it takes."""
         car, grip = self.tires.vehicle, float(self.tires.grip[0].mean())
         bend = car.wheelbase * grip * GRAVITY / self.space.speed**2
-        return min(self.space.max_angle, bend + 1.5 * float(self.tires.slip_at(REAR)[0, 0]))
+        return min(self.space.max_angle, bend + 1.5 * float(self.tires.slip_at(CHOSEN.rear)[0, 0]))
 
     def steerings(self, numbers: Array) -> _Steerings:
         """Return the steerings that numbers between -1 and 1 stand for; rates are kept.
@@ -194,7 +183,7 @@ class Search:
         """
         N, space = self.swings, self.space
         u, (chirp, place, heading) = numbers[:, : N - 1], numbers[:, N - 1 :].T
-        spans = np.exp(_CHIRP * chirp[:, None] * np.linspace(-1.0, 1.0, N))
+        spans = np.exp(CHOSEN.chirp * chirp[:, None] * np.linspace(-1.0, 1.0, N))
         spans *= self.duration / self.repeats / spans.sum(axis=1, keepdims=True)
         angles = np.zeros((len(numbers), N + 1))
         angles[:, 1:N] = u * self.largest_angle
@@ -209,7 +198,7 @@ class Search:
         spans = np.tile(spans, self.repeats)
         times = np.column_stack([np.zeros(len(numbers)), np.cumsum(spans, axis=1)])
         body = body_of(self.tires)
-        psi = _LARGEST_HEADING * heading
+        psi = CHOSEN.largest_heading * heading
         free = 0.5 * space.width - space.margin - body.side
         X = space.margin + body.behind * np.cos(psi) + body.side * np.abs(np.sin(psi))
         return _Steerings(times, angles, Entry(X, 0.5 * space.width + free * place, psi))
@@ -244,10 +233,10 @@ class Search:
     def violation(self, motion: Motion) -> Array:
         """Return by how much motions break a limit, not positive where they are possible, (m,)."""
         slip = np.abs(motion.slip).max(axis=0)  # (2, m, k)
-        limit = self.tires.slip_at(REAR).T  # (2, k)
+        limit = self.tires.slip_at(CHOSEN.rear).T  # (2, k)
         over = [slip[1] / limit[1] - 1.0]
         over += [slip[:, :, 0].T / self.tires.slip_at(self.space.share)[0] - 1.0]
-        over += [np.abs(motion.slip[-1, 1]) / self.tires.slip_at(CALM)[:, 1] - 1.0]
+        over += [np.abs(motion.slip[-1, 1]) / self.tires.slip_at(CHOSEN.calm)[:, 1] - 1.0]
         outside = self.beyond(motion) / self.tires.vehicle.wheelbase
         worst = [one.max(axis=1) for one in (*over, outside)]
         return np.asarray(np.sum(np.maximum(worst, 0.0), axis=0))
@@ -262,11 +251,11 @@ class Search:
         2).
         """
         N = self.swings
-        size = np.exp(rng.uniform(math.log(0.05), 0.0, (_POPULATION, 1)))
+        size = np.exp(rng.uniform(math.log(0.05), 0.0, (CHOSEN.population, 1)))
         sign = np.where(np.arange(N - 1) % 2 == 0, 1.0, -1.0)
-        u = size * sign * rng.uniform(-0.2, 1.0, (_POPULATION, N - 1))
-        u *= rng.choice([-1.0, 1.0], (_POPULATION, 1))
-        rest = rng.uniform(-1.0, 1.0, (_POPULATION, 3)) * [1.0, 0.9, 0.3]
+        u = size * sign * rng.uniform(-0.2, 1.0, (CHOSEN.population, N - 1))
+        u *= rng.choice([-1.0, 1.0], (CHOSEN.population, 1))
+        rest = rng.uniform(-1.0, 1.0, (CHOSEN.population, 3)) * [1.0, 0.9, 0.3]
         return np.column_stack([u, rest])
 
     def best(
@@ -281,15 +270,15 @@ class Search:
 
         def after(*_: object) -> bool:
             if progress is not None:
-                progress(len(least) / GENERATIONS)
-            possible = least[-1] < 1.0 and len(least) > _STALLED
-            return possible and least[-1] > (1.0 - GAIN) * least[-1 - _STALLED]
+                progress(len(least) / CHOSEN.generations)
+            possible = least[-1] < 1.0 and len(least) > CHOSEN.stalled
+            return possible and least[-1] > (1.0 - CHOSEN.gain) * least[-1 - CHOSEN.stalled]
 
         found = differential_evolution(
             costs,
             [(-1.0, 1.0)] * (self.swings + 2),
             init=self.beginnings(rng),
-            maxiter=GENERATIONS,
+            maxiter=CHOSEN.generations,
             mutation=(0.3, 0.8),
             recombination=0.8,
             tol=0.0,

@@ -19,13 +19,11 @@ from codegen.arrays import Array
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.curve import unit_matrix
 from identifier.axle.prior import fiala_weights
+from identifier.plan.chosen import CHOSEN
 from models.vehicle import Vehicle
 
-SPREAD = 0.3  # of stiffness and of friction, either way
 STEERING_LAG = 0.04  # s, where no vehicle file tells: that of the sedan's
-DRAWN = 6  # curves of a learnt model
 SLIPS = np.linspace(0.0, 0.5, 501)[1:]  # rad, where curves are looked at
-FLAT = 0.98  # of the largest force of a curve: slip that matters ends where it is reached
 
 
 def _steering_lag_of(vehicle: Vehicle, given: float | None) -> float:
@@ -71,7 +69,7 @@ class PlausibleTires:
         neutral = (front * rear) ** 0.5
         if rear < front:
             front = rear = neutral
-        low, high = 1.0 - SPREAD, 1.0 + SPREAD
+        low, high = 1.0 - CHOSEN.spread, 1.0 + CHOSEN.spread
         cases = (
             (front, rear, friction, 1.0), (low * front, low * rear, friction, low),
             (high * front, high * rear, friction, high), (neutral, neutral, low * friction, high),
@@ -98,8 +96,8 @@ class PlausibleTires:
         cls, model: AxleModel, rng: np.random.Generator, *, steering_lag: float | None = None
     ) -> Self:
         """Return the tires that a car may have of which a model was learnt."""
-        drawn = model.band.samples(DRAWN, rng)
-        late = 1.0 + SPREAD * np.array([0.0, *np.resize([-1.0, 1.0], DRAWN)])
+        drawn = model.band.samples(CHOSEN.drawn, rng)
+        late = 1.0 + CHOSEN.spread * np.array([0.0, *np.resize([-1.0, 1.0], CHOSEN.drawn)])
         return cls(
             vehicle=model.vehicle,
             method=replace(AxleIdentifier.for_vehicle(model.vehicle), ladder=model.ladder),

@@ -20,6 +20,7 @@ import numpy as np
 from codegen.errors import TireidError
 from identifier.paper.laws import DrivingError, Gains, diagonal
 from identifier.stability.bounds import small_gain
+from identifier.stability.chosen import CHOSEN
 from identifier.stability.loop import root
 from identifier.stability.operation import Operation
 from identifier.stability.sampled_bound import (
@@ -30,9 +31,6 @@ from identifier.stability.sampled_bound import (
     output_layer,
 )
 from models.rules import require_positive
-
-_LAG_RULE = 1.0 / math.tan(math.radians(22.5))  # a/Ω for 45 degrees of lag through two equal poles
-FASTEST = 0.2  # largest a dt
 
 
 class DesignError(TireidError, ValueError):
@@ -80,7 +78,7 @@ def decay_rate(bandwidth: float, minimal_decay: float = 0.0) -> float:
     bandwidth : highest frequency of steering that matters [Hz].
     minimal_decay : smallest a that the network's input allows [1/s]; a keeps 1.5 times it.
     """
-    return max(_LAG_RULE * 2.0 * math.pi * bandwidth, 1.5 * minimal_decay)
+    return max(CHOSEN.lag_rule * 2.0 * math.pi * bandwidth, 1.5 * minimal_decay)
 
 
 def design_gains(
@@ -111,11 +109,11 @@ def design_gains(
         V_max=V_max, capacity=capacity,
     )  # fmt: skip
     a = decay_rate(bandwidth, minimal_decay)
-    if not a * dt <= FASTEST:
+    if not a * dt <= CHOSEN.fastest:
         raise DesignError(
-            f"a dt must not pass {FASTEST}, it is {a * dt:.3g}: sample every "
-            f"{1e3 * FASTEST / a:.3g} ms, or ask for a bandwidth of "
-            f"{FASTEST / (_LAG_RULE * 2.0 * math.pi * dt):.3g} Hz"
+            f"a dt must not pass {CHOSEN.fastest}, it is {a * dt:.3g}: sample every "
+            f"{1e3 * CHOSEN.fastest / a:.3g} ms, or ask for a bandwidth of "
+            f"{CHOSEN.fastest / (CHOSEN.lag_rule * 2.0 * math.pi * dt):.3g} Hz"
         )
     lam, A_d = a, diagonal(a)
     g = _gain_for_phase_margin(

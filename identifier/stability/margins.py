@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
+from identifier.stability.chosen import CHOSEN
 from identifier.stability.loop import (
     Integrator,
     Loop,
@@ -29,9 +30,6 @@ from identifier.stability.loop import (
     scaled_matrices,
 )
 from identifier.stability.lyapunov import require_hurwitz
-
-_LARGEST_FACTOR = 1e6
-_AT_ONCE = 150  # points of a grid whose eigenvalues are found together
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,7 +53,7 @@ def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> 
     def growth_at(log_factors: Array) -> Array:
         return growth_rate(scaled_matrices(loop, np.exp(log_factors)), integrator, dt)
 
-    span = np.log(_LARGEST_FACTOR)
+    span = np.log(CHOSEN.largest_factor)
     crossing = _first_crossing(growth_at, np.linspace(-span, span, 1801), 1e-11 * _rate(loop))
     if crossing is None:
         return _GainMargin(factor=np.inf, frequency=np.nan)
@@ -91,7 +89,7 @@ def _first_crossing(
     """
     growth = np.empty(0)
     while growth.size < grid.size and not np.any(growth > threshold):
-        growth = np.append(growth, growth_at(grid[growth.size : growth.size + _AT_ONCE]))
+        growth = np.append(growth, growth_at(grid[growth.size : growth.size + CHOSEN.at_once]))
     unstable = np.flatnonzero(growth > threshold)
     if unstable.size == 0:
         return None

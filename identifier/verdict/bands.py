@@ -14,21 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.axle.band import (
-    AT_SPEEDS,
-    CENTERS,
-    LEAST,
-    MOST,
-    MOST_COLOR,
-    SPEEDS,
-    BandCalibration,
-    ranges_of,
-    sensor_noise,
-)
+from identifier.axle.band import BandCalibration, ranges_of, sensor_noise
+from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
 from identifier.axle.learning import Regression
 from identifier.band import LEVEL, Band, BandSpread, normal_quantile
 from identifier.run import History
 from identifier.tire_model import TireModel
+from identifier.verdict.chosen import CHOSEN
 from identifier.verdict.judging import judge
 from identifier.verdict.motion import Evidence, Windows, evidence, modelled_force
 from identifier.verdict.parts import asked_run, taught_elsewhere
@@ -36,9 +28,6 @@ from identifier.verdict.verdict import Verdict
 from models.recordings import Recording
 from models.recordings.portion import portion
 
-SHARED = 10.0  # windows of all ranges that count in each, so that few windows decide nothing
-_INDEPENDENT = 0.5  # of the windows, which overlap by half
-ELSEWHERE = (1.65, 0.68, 0.93, 1.1, 1.22, 1.35)
 # of an instant of another drive, over a window of a part left out, by range of slip: means hide
 # errors of quick passes through zero; chosen on 256 random cars, seeds 100 to 131 and 200 to 231
 
@@ -100,8 +89,8 @@ def calibrated(
 
     speeds = found.windows.mean(recording.v_x)
     speed = float(np.sqrt(np.mean(speeds**2)))
-    one, each = found.measured.shape, (len(CENTERS), *found.measured.shape)
-    within = np.searchsorted(SPEEDS, speeds / model.vehicle.froude_speed, side="right")
+    one, each = found.measured.shape, (len(AXLE_CHOSEN.centers), *found.measured.shape)
+    within = np.searchsorted(AXLE_CHOSEN.speeds, speeds / model.vehicle.froude_speed, side="right")
     empty = np.zeros((3, *each))
     missed = Missed(np.full(one, np.nan), empty[0], empty[1], empty[2], within)
     given = BandCalibration.declared(speed)
@@ -129,7 +118,7 @@ def _spread_by_range(
     band: Band[Any], recording: Recording, windows: Windows
 ) -> tuple[Array, Array, Array]:
     """Return share, scaled and fixed of `Missed`, (6, m, 2) each."""
-    size, count = np.abs(band.model.lagged_slip(recording)), len(CENTERS)
+    size, count = np.abs(band.model.lagged_slip(recording)), len(AXLE_CHOSEN.centers)
     within, v_x = ranges_of(size), np.tile(windows.mean(recording.v_x), count)
     share = np.array([windows.mean(1.0 * (within == k)) for k in range(count)])
     total = np.array([windows.mean(size * (within == k)) for k in range(count)])
@@ -144,7 +133,10 @@ def calibration(
     """Return factors and color of errors on segments that did not teach; None: too few windows.
     noise : variance of the sensors' white noise in them (2,).
     """
-    factors, speeds = np.ones((2, len(CENTERS))), np.ones((2, len(AT_SPEEDS)))
+    factors, speeds = (
+        np.ones((2, len(AXLE_CHOSEN.centers))),
+        np.ones((2, len(AXLE_CHOSEN.at_speeds))),
+    )
     for i in range(2):
         asked = np.isfinite(missed.error[:, i])
         share, *spread = (values[:, asked, i] for values in missed[1:-1])
@@ -153,9 +145,9 @@ def calibration(
         if not np.isfinite(everywhere):
             continue
         squares = np.array([_shared(*pair, everywhere) for pair in zip(needed, share, strict=True)])
-        factors[i] = ELSEWHERE * np.sqrt(squares)
-        needed = needed / np.maximum(squares[:, None], LEAST**2)
-        for k in range(len(AT_SPEEDS)):
+        factors[i] = CHOSEN.elsewhere * np.sqrt(squares)
+        needed = needed / np.maximum(squares[:, None], AXLE_CHOSEN.least**2)
+        for k in range(len(AXLE_CHOSEN.at_speeds)):
             mine = missed.within[asked] == k
             speeds[i, k] = np.sqrt(_shared(needed[:, mine].ravel(), share[:, mine].ravel(), 1.0))
     if (factors == 1.0).all():
@@ -163,17 +155,19 @@ def calibration(
     color = [color_of(missed.error[:, i], windows) for i in range(2)]
     return replace(
         given,
-        factors=np.clip(factors, LEAST, MOST),
-        speeds=np.clip(speeds, LEAST, MOST),
+        factors=np.clip(factors, AXLE_CHOSEN.least, AXLE_CHOSEN.band_most),
+        speeds=np.clip(speeds, AXLE_CHOSEN.least, AXLE_CHOSEN.band_most),
         color=np.array(color),
     )
 
 
 def _shared(values: Array, share: Array, everywhere: float) -> float:
-    """Return the quantile of a range, `SHARED` windows of all ranges counted in."""
+    """Return the quantile of a range, `CHOSEN.shared` windows of all ranges counted in."""
     own, count = quantile(values, share), float(share.sum())
     return (
-        (count * own + SHARED * everywhere) / (count + SHARED) if np.isfinite(own) else everywhere
+        (count * own + CHOSEN.shared * everywhere) / (count + CHOSEN.shared)
+        if np.isfinite(own)
+        else everywhere
     )
 
 
@@ -184,7 +178,9 @@ def quantile(values: Array, share: Array) -> float:
     order = np.argsort(values)
     count = np.cumsum(share[order])
     total = float(count[-1]) if count.size else 0.0
-    needed = LEVEL * (total + 1.0 / _INDEPENDENT)  # as if one more window were farther out than all
+    needed = LEVEL * (
+        total + 1.0 / CHOSEN.independent
+    )  # as if one more window were farther out than all
     at = int(np.searchsorted(count, needed))
     return float(values[order[at]]) if at < values.size else float("inf")
 
@@ -211,4 +207,8 @@ def color_of(error: Array, windows: Windows) -> float:
         if alike <= 0.0:
             break
         total += 2.0 * alike
-    return float(np.clip(total * windows.duration / Regression().correlation_time, 1.0, MOST_COLOR))
+    return float(
+        np.clip(
+            total * windows.duration / Regression().correlation_time, 1.0, AXLE_CHOSEN.most_color
+        )
+    )

@@ -5,8 +5,8 @@ and sums up to one: y = Σ g_k (dξ/dt + v_x r/g)_k, where the derivative is mov
 h = Σ g_k (T cos δ)_k. Where |F/F_z - φ_w cos δ| <= e (1 + β) + τ ρ at every instant, the same holds
 of the means, whatever the force does: a mean of errors is no larger than the largest.
 
-The bound that is estimated is `RESERVE` times the least one with which any curve fits the drive,
-and a little more: the quick part of errors, which means hide, has to find room in it.
+The bound that is estimated is `CHOSEN.reserve` times the least one with which any curve fits the
+drive, and a little more: the quick part of errors, which means hide, has to find room in it.
 """
 
 from dataclasses import replace
@@ -28,14 +28,12 @@ from identifier.axle.learning import Regression
 from identifier.axle.model import AxleModel
 from identifier.run import History
 from identifier.tire_model import AXLES, TireModel
-from identifier.verdict.motion import FEWEST, WINDOW, Windows, brisk_from, impulse_signals
+from identifier.verdict.chosen import CHOSEN
+from identifier.verdict.motion import Windows, brisk_from, impulse_signals
 from identifier.verdict.parts import asked_run
 from models.recordings import Recording
 
-_OVERLAPPING = 4  # moments that begin within the length of one
-RESERVE = 2.1  # over the least bound: chosen on 68 random cars of seeds 400 to 425
 _OVER_ERROR = 0.25 * Regression().error  # static axle loads, added before the reserve
-SLOWEST = 1e-3  # static axle loads/s: a drive straight ahead shows no rate
 _OVER_LATENESS = Regression().lateness  # s, added before the reserve
 
 
@@ -54,8 +52,8 @@ def strips_of(model: TireModel, recording: Recording, road: Array | None = None)
     if recording.logged_v_y is None or not isinstance(model, AxleModel):
         return None
     drives = recording.v_x >= brisk_from(model)
-    windows = Windows.where(drives, recording, WINDOW, _OVERLAPPING)
-    if len(windows) < FEWEST:
+    windows = Windows.where(drives, recording, CHOSEN.window, CHOSEN.overlapping)
+    if len(windows) < CHOSEN.fewest:
         return None
     units, doubt = model.signals_of(recording)
     g, slope = triangle(windows.n, recording.dt)
@@ -110,8 +108,10 @@ def guaranteed(
     box = limits.curves
     strips = strips_of(run.model, run.portion.recording, run.road)
     if strips is not None and run.until is not None:
-        strips = strips.until(int(np.searchsorted(strips.t, run.until - WINDOW, side="right")))
-    if strips is None or len(strips.t) < FEWEST:
+        strips = strips.until(
+            int(np.searchsorted(strips.t, run.until - CHOSEN.window, side="right"))
+        )
+    if strips is None or len(strips.t) < CHOSEN.fewest:
         return carries
     chosen = _estimated_bound(strips, box) if given is None else given
     corners = []
@@ -134,7 +134,7 @@ def fastest(strips: Strips) -> tuple[float, float]:
     """Return the largest rate of the force that a drive shows, of both axles [static axle
     loads/s].
     """
-    front, rear = np.maximum(strips.rate.max(axis=0), SLOWEST)
+    front, rear = np.maximum(strips.rate.max(axis=0), CHOSEN.slowest)
     return float(front), float(rear)
 
 
@@ -142,8 +142,11 @@ def _estimated_bound(strips: Strips, box: HalfSpaces) -> ForceBound:
     """Return the bound that a drive tells: the least that any curve keeps, with a reserve."""
     (e_f, tau_f), (e_r, tau_r) = (least_bound(strips, axle, box) for axle in range(2))
     return ForceBound(
-        error=(RESERVE * (e_f + _OVER_ERROR), RESERVE * (e_r + _OVER_ERROR)),
-        lateness=(RESERVE * (tau_f + _OVER_LATENESS), RESERVE * (tau_r + _OVER_LATENESS)),
+        error=(CHOSEN.reserve * (e_f + _OVER_ERROR), CHOSEN.reserve * (e_r + _OVER_ERROR)),
+        lateness=(
+            CHOSEN.reserve * (tau_f + _OVER_LATENESS),
+            CHOSEN.reserve * (tau_r + _OVER_LATENESS),
+        ),
     )
 
 

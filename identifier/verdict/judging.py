@@ -15,15 +15,9 @@ from identifier.estimate.drive import Drive
 from identifier.reproducibility import beyond_known
 from identifier.run import History, state_index
 from identifier.tire_model import AXLES, Reached, TireModel
+from identifier.verdict.chosen import CHOSEN
 from identifier.verdict.friction import RoadFriction, road_friction
-from identifier.verdict.motion import (
-    FEWEST,
-    WINDOW,
-    Evidence,
-    evidence,
-    lateral_noise,
-    motion_error,
-)
+from identifier.verdict.motion import Evidence, evidence, lateral_noise, motion_error
 from identifier.verdict.verdict import (
     MOST_MISSED,
     PERCENT,
@@ -36,9 +30,6 @@ from identifier.verdict.verdict import (
 from models.recordings import Recording
 from models.recordings.portion import Portion, portion
 from models.vehicle import GRAVITY
-
-_SECANT = 0.01  # rad, to which the slope of a curve is taken: play makes none at zero
-ROADS = 3  # segments of another friction that are listed one by one
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,7 +132,7 @@ def _asked(
     if own and found is not None:
         other = model.drives.road_differs(recording.t[part.samples])
         found = found.where(~other[found.windows.starts])
-    if found is None or len(found.windows) < FEWEST:
+    if found is None or len(found.windows) < CHOSEN.fewest:
         return None
     judged, some = found.but_a_segment()
     left_out = None
@@ -241,7 +232,7 @@ def _unsure(asked: _Asked) -> Iterator[Objection]:
 
 def _no_tire(asked: _Asked) -> Iterator[Objection]:
     loads = np.array(asked.model.vehicle.axle_loads)
-    stiffness = asked.model.force(np.array([_SECANT]))[0] / _SECANT
+    stiffness = asked.model.force(np.array([CHOSEN.secant]))[0] / CHOSEN.secant
     least, most = RULES.stiffness
     for axle, each, C in zip(AXLES, stiffness / loads, stiffness, strict=True):
         if not least <= each <= most:
@@ -311,9 +302,9 @@ def _at_bound(one: Reached) -> Objection:
 def _roads(found: RoadFriction | None) -> list[Objection]:
     """Return a note for each of the first segments on another road than that which taught."""
     roads = () if found is None else found.roads
-    listed = [Objection("another_road", None, one.text, False) for one in roads[:ROADS]]
-    if len(roads) > ROADS:
-        more = f"and {len(roads) - ROADS} more segments of another friction"
+    listed = [Objection("another_road", None, one.text, False) for one in roads[: CHOSEN.roads]]
+    if len(roads) > CHOSEN.roads:
+        more = f"and {len(roads) - CHOSEN.roads} more segments of another friction"
         listed.append(Objection("another_road", None, more, False))
     return listed
 
@@ -371,7 +362,7 @@ def _reach(model: TireModel, recording: Recording) -> str:
 
 
 def _too_short(model: TireModel) -> Verdict:
-    few = f"fewer than {FEWEST} windows of {WINDOW:g} s are driven briskly"
+    few = f"fewer than {CHOSEN.fewest} windows of {CHOSEN.window:g} s are driven briskly"
     finding = Objection("too_short", None, f"{few}: there is nothing to judge by", True)
     numbers = tuple(Number(*one, valid=False) for one in model.estimates())
     return Verdict(findings=(finding,), numbers=numbers, measures={})

@@ -14,16 +14,10 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from identifier.axle.car import Car, axle_impulse, car_numbers
 from identifier.tire_model import TireModel
+from identifier.verdict.chosen import CHOSEN
 from models.recordings import Recording
 from models.sensors import white_noise
 from models.vehicle import GRAVITY, Vehicle
-
-WINDOW = 0.3  # T [s]: shorter ones show the noise of the sensors, longer ones no transient
-BRISK = 0.6  # speed in sqrt(g L) from which a window counts; slower, slip angles mean little
-FEWEST = 8  # windows, below which nothing can be said
-_SEGMENT = 0.3  # share of the windows that may be missed in one piece
-_REST_MISSED = 0.08  # of the force elsewhere, where a piece is,
-_CONFINED = 0.6  # and of what is missed with the piece
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +35,7 @@ class Windows:
         """Return the windows of a recording.
         min_speed : a window counts where the car is never slower [m/s], in one segment.
         """
-        return cls.where(recording.v_x >= min_speed, recording, WINDOW)
+        return cls.where(recording.v_x >= min_speed, recording, CHOSEN.window)
 
     @classmethod
     def where(
@@ -172,19 +166,21 @@ class Evidence:
         One segment may be missed, as before a sensor has settled, where all the rest is explained:
         it is left out. None is where all is explained, or more than one segment is missed.
         """
-        if (self.missed <= _REST_MISSED).all():
+        if (self.missed <= CHOSEN.rest_missed).all():
             return self, None
         first, last = self._worst_segment()
         place = np.arange(len(self.windows))
         rest = self.where((place < first) | (place >= last))
-        confined = (rest.missed <= np.minimum(_REST_MISSED, _CONFINED * self.missed.max())).all()
-        if len(rest.windows) >= FEWEST and confined:
+        confined = (
+            rest.missed <= np.minimum(CHOSEN.rest_missed, CHOSEN.confined * self.missed.max())
+        ).all()
+        if len(rest.windows) >= CHOSEN.fewest and confined:
             return rest, (first, last)
         return self, None
 
     def _worst_segment(self) -> tuple[int, int]:
         """Return the segment in which most is missed: first window, past last."""
-        n = max(1, int(_SEGMENT * len(self.windows)))
+        n = max(1, int(CHOSEN.segment * len(self.windows)))
         size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
         missed = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
         total = np.concatenate([[0.0], np.cumsum(missed)])
@@ -202,14 +198,14 @@ def clean_rms(signal: Array, noise: Array) -> Array:
 
 def brisk_from(model: TireModel) -> float:
     """Return the speed [m/s] from which a window counts."""
-    return max(model.min_speed, BRISK * model.vehicle.froude_speed)
+    return max(model.min_speed, CHOSEN.brisk * model.vehicle.froude_speed)
 
 
 def evidence(model: TireModel, recording: Recording, road: Array | None = None) -> Evidence | None:
     """Return what a model explains of a drive; None where too little of it is driven."""
     vehicle = model.vehicle
     windows = Windows.of(recording, brisk_from(model))
-    if len(windows) < FEWEST:
+    if len(windows) < CHOSEN.fewest:
         return None
     return Evidence(
         windows=windows,
@@ -222,12 +218,10 @@ def evidence(model: TireModel, recording: Recording, road: Array | None = None) 
 # A frozen model against measured motion, without true forces: the mean of (F_f + F_r)/m is the
 # lateral acceleration, that of (l_f F_f - l_r F_r)/I_z the yaw acceleration.
 
-_MOMENT = 0.2  # s, over which both are meant
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionError:
-    """What forces miss of the measured motion, root mean square of means over `_MOMENT`.
+    """What forces miss of the measured motion, root mean square of means over `CHOSEN.moment`.
 
     The noise of the sensors, another mass or inertia and a banked road are in it too: where it is
     small the forces are right, where it is large they need not be wrong.
@@ -254,7 +248,7 @@ def motion_error(
     force : lateral axle forces (n, 2) [N], frame of the body.
     counted : samples that count (n,); a window counts where all of its samples do, in one segment.
     """
-    windows = Windows.where(counted, recording, _MOMENT, round(_MOMENT / recording.dt))
+    windows = Windows.where(counted, recording, CHOSEN.moment, round(CHOSEN.moment / recording.dt))
     if not len(windows):
         return None
     m, I_z, l_f, l_r = vehicle.bicycle[:4]

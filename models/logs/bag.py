@@ -23,7 +23,6 @@ from codegen.arrays import Array
 from models.limits import limits
 from models.logs.cdr import (
     ORDERS,
-    PREFIX,
     CdrError,
     Definitions,
     Field,
@@ -33,6 +32,7 @@ from models.logs.cdr import (
     layout_of,
     numbers,
 )
+from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.growing import Growing
@@ -41,10 +41,6 @@ from models.logs.magic import BAG_METADATA, MCAP, ROS1, SQLITE
 from models.logs.stamps import typical_rate
 from models.schema import CHUNK, most_unpacked, read_text, require_dense, require_few
 
-_NS = 1e9  # in a second
-_OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
-_PROBED = 20  # messages that a rate is taken from
-_TOGETHER, _BYTES = 2048, 1 << 24  # messages that are read at a time, and of how much at most
 _STAMPS = ("header.stamp.", "stamp.")
 _TIME = ("sec", "nanosec")
 
@@ -90,7 +86,7 @@ def open_(path: Path) -> GroupedLog[_Place]:
     zero = min((topic.zero for topic in topics if topic.stamp), default=first)
     found: list[tuple[str, Listed, _Place]] = [
         (_TF, Listed(name=f"{one.name}/{field}", unit="m" * (k < 3), samples=one.t.size,
-                    rate=typical_rate((one.t - one.t[0]) / _NS)), (one, k))
+                    rate=typical_rate((one.t - one.t[0]) / CHOSEN.ns)), (one, k))
         for one in moving
         for k, field in enumerate(_OF_TF)
     ]  # fmt: skip
@@ -125,7 +121,9 @@ def _samples(
             frames.setdefault(moving.name, (moving, {}))[1][listed.name] = moving.values[:, k]
         else:
             fields.setdefault(place[0], {})[listed.name] = place[1]
-    done = [Samples(one.name, (one.t - zero) / _NS, values) for one, values in frames.values()]
+    done = [
+        Samples(one.name, (one.t - zero) / CHOSEN.ns, values) for one, values in frames.values()
+    ]
     readings = {
         topic.name: _Reading(path, definitions, topic, some) for topic, some in fields.items()
     }
@@ -157,13 +155,13 @@ def _transforms(raw: bytes) -> Iterator[tuple[str, int, tuple[float, ...]]]:
     """Yield the transforms of a message: parent to child, stamp [ns], translation and rotation.
     It is a sequence of: seconds, nanoseconds, name of the parent, name of the child, 7 doubles.
     """
-    order, place = ORDERS.get(bytes(raw[:2])), PREFIX
+    order, place = ORDERS.get(bytes(raw[:2])), CHOSEN.prefix
     if order is None:
         raise CdrError("a message is not plain CDR")
 
     def read(form: str, size: int) -> tuple[Any, ...]:
         nonlocal place
-        place += -(place - PREFIX) % size
+        place += -(place - CHOSEN.prefix) % size
         values = struct.unpack_from(order + form, raw, place)
         place += struct.calcsize(order + form)
         return values
@@ -275,7 +273,7 @@ def _with_zero(found: list[tuple[_Topic, int]]) -> list[_Topic]:
     stamped = [topic.zero for topic, _ in found if topic.stamp is not None]
     received = [first for _, first in found]
     apart = any(
-        abs(topic.zero - first) > _OTHER_CLOCK * _NS
+        abs(topic.zero - first) > CHOSEN.other_clock * CHOSEN.ns
         for topic, first in found
         if topic.stamp is not None
     )
@@ -296,7 +294,7 @@ def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int 
     """
     received: list[int] = []
     stamps: list[int] = []
-    for _, time, raw in islice(_messages(bag, [topic]), _PROBED):
+    for _, time, raw in islice(_messages(bag, [topic]), CHOSEN.bag_probed):
         try:
             layout = layout_of(definitions, topic.kind, raw)
         except CdrError:
@@ -310,7 +308,7 @@ def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int 
         raise CdrError("it holds no message")
     first = stamps[0] if stamps else 0
     times = np.array(stamps if first else received, dtype=np.int64)
-    return received[0], first or None, typical_rate((times - times[0]) / _NS)
+    return received[0], first or None, typical_rate((times - times[0]) / CHOSEN.ns)
 
 
 def _messages(bag: Any, topics: Sequence[_Topic]) -> Iterator[tuple[str, int, bytes]]:
@@ -339,7 +337,7 @@ class _Reading:
         self.times.append(time)
         self.raws.append(raw)
         self.bytes += len(raw)
-        if len(self.raws) == _TOGETHER or self.bytes > _BYTES:
+        if len(self.raws) == CHOSEN.bag_together or self.bytes > CHOSEN.bytes:
             self._read()
 
     def _read(self) -> None:
@@ -368,7 +366,7 @@ class _Reading:
                 f"{self.path}: {self.topic.name} must have {self.topic.messages} messages, it has "
                 f"{len(self.clock)}; was the bag cut off?"
             )
-        t = (self.clock.finished() - self.topic.zero) / _NS
+        t = (self.clock.finished() - self.topic.zero) / CHOSEN.ns
         values = {name: one.finished() for name, one in self.parts.items()}
         return Samples(self.topic.name, t, values)
 

@@ -26,29 +26,24 @@ from numpy.typing import NDArray
 from codegen.arrays import Array, blocks, filled
 from codegen.escape import shown
 from models.limits import limits
+from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples
 from models.logs.growing import Growing
 from models.logs.log import Listed, RecordingError
 from models.logs.magic import HEAD, frames_in
 from models.logs.mdf import is_bus, opened
-from models.logs.stamps import CALENDAR, nanoseconds, since, typical_rate
+from models.logs.stamps import nanoseconds, since, typical_rate
 from models.schema import LONGEST_NAME, read_bytes, require_few
 
 _FRAME = "CAN_DataFrame"  # of MDF
 _NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
-_TOGETHER = 1 << 16  # frames that are stored at a time
-_SHORT = 0x7FF  # largest identifier of 11 bits
 _EXTENDED = 1 << 31  # marks an identifier of 29 bits
-_IDENTIFIER = (1 << 29) - 1
-_INFLATION = 1032  # most bytes that deflate makes of one
 _OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
-_CONTAINER, _DEFLATED = 10, 2
 _METHOD = struct.Struct("<H14x")  # of a container, before its data
 _FILE_SIZE = struct.Struct("<Q")  # of BLF, at byte 16 of its header
 
 _Key = tuple[str, int]  # bus, identifier with _EXTENDED
-_FROM_ALL = 0xFE  # address that a database of J1939 gives where any may send
 
 
 def _group_of(identifier: int) -> int:
@@ -94,7 +89,7 @@ class _Gathered:
     def add(self, time: float, data: bytes) -> None:
         self._times.append(time)
         self._bytes += data[: self.width]
-        if len(self._times) == _TOGETHER:
+        if len(self._times) == CHOSEN.can_together:
             self._store()
 
     def extend(self, times: Array, data: NDArray[np.uint8]) -> None:
@@ -154,11 +149,11 @@ def _gather(path: Path, kind: str, known: _Known) -> _Log:
                 found[key] = _Gathered(width)
             found[key].add(message.timestamp, message.data)
             count += 1
-            if count % _TOGETHER == 0:
+            if count % CHOSEN.can_together == 0:
                 require_few(RecordingError, str(path), count, "samples", "frames")
     frames = {key: one.finished() for key, one in found.items()}
     first = min((float(kept.t.min()) for kept in frames.values()), default=0.0)
-    if first > CALENDAR:
+    if first > CHOSEN.calendar:
         for key, kept in frames.items():
             frames[key] = kept._replace(t=since(kept.t, first))
     return _Log(f"CAN {kind}", frames, others)
@@ -263,14 +258,14 @@ def _of_table(path: Path) -> Iterator[_Frame]:
                 # SavvyCAN counts whole microseconds, all others seconds.
                 time = float(cell) * (1e-6 if many and "." not in cell else 1.0)
                 given = row[at["long"]].strip().lower() if at["long"] >= 0 else ""
-                extended = given in ("true", "1") if given else identifier > _SHORT
+                extended = given in ("true", "1") if given else identifier > CHOSEN.short
                 bus = row[at["bus"]].strip() if at["bus"] >= 0 else "0"
             except (ValueError, IndexError):
                 raise RecordingError(
                     f"{path}: line {number} must hold a frame: time, identifier and bytes in "
                     f"hexadecimal, not {shown(','.join(row))}"
                 ) from None
-            yield _Frame(time, identifier & _IDENTIFIER, data, bus, extended)
+            yield _Frame(time, identifier & CHOSEN.identifier, data, bus, extended)
 
 
 def _require_whole_blf(path: Path) -> None:
@@ -288,10 +283,10 @@ def _require_whole_blf(path: Path) -> None:
             if signature != b"LOBJ" or length < _OBJECT.size or length > size:
                 return  # the reader says so
             body = length - _OBJECT.size
-            if kind == _CONTAINER and body * _INFLATION > most:
+            if kind == CHOSEN.container and body * CHOSEN.inflation > most:
                 data = file.read(body)
                 size_of = len(data) - _METHOD.size
-                if size_of > 0 and _METHOD.unpack_from(data)[0] == _DEFLATED:
+                if size_of > 0 and _METHOD.unpack_from(data)[0] == CHOSEN.deflated:
                     unpacked = zlib.decompressobj().decompress(data[_METHOD.size :], int(most) + 1)
                     size_of = len(unpacked)
                 require_few(
@@ -318,8 +313,8 @@ def _of_mdf(path: Path, known: _Known) -> _Log:
                 known_others = {name.partition(".")[0] for name in names} & set(_NO_DATA)
                 others["error and remote" if known_others else "other"] += samples
                 continue
-            for first in range(0, samples, _TOGETHER):
-                part = _of_group(file, number, first, min(_TOGETHER, samples - first))
+            for first in range(0, samples, CHOSEN.can_together):
+                part = _of_group(file, number, first, min(CHOSEN.can_together, samples - first))
                 _sort(part, known, found, others)
     return _Log("CAN MDF4", {key: _in_order(one.finished()) for key, one in found.items()}, others)
 
@@ -357,8 +352,8 @@ def _of_group(file: Any, number: int, first: int, count: int) -> _Part:
     identifiers, data = signal("ID"), signal("DataBytes")
     bytes_ = np.asarray(data.samples, dtype=np.uint8).reshape(count, -1)
     raw = identifiers.samples.astype(np.int64)
-    ids = raw & _IDENTIFIER
-    is_long = whole("IDE", (raw & _EXTENDED != 0) | (ids > _SHORT)) != 0
+    ids = raw & CHOSEN.identifier
+    is_long = whole("IDE", (raw & _EXTENDED != 0) | (ids > CHOSEN.short)) != 0
     return _Part(
         np.asarray(identifiers.timestamps, dtype=np.float64),
         np.where(is_long, ids | _EXTENDED, ids),
@@ -387,8 +382,6 @@ def _sort(part: _Part, known: _Known, found: dict[_Key, _Gathered], others: Coun
 
 # Signals of frames, by a DBC.
 
-_FLOATS = (16, 32, 64)  # bits of a signal that is a float
-_LONGEST_SIGNAL = 64  # bits
 # Names that a DBC gives to values that are no numbers.
 _NO_NUMBER = re.compile(
     r"\b(?:sna|snv|invalid|ung(?:ue|ü)ltig|not[ _]?(?:avail\w*|valid)|unavailable|undefined|error"
@@ -550,7 +543,7 @@ def _read_dbc(path: Path) -> _Dbc:
     groups = {
         _group_of(key): key
         for key, one in messages.items()
-        if key & _EXTENDED and (j1939 or one.protocol == "j1939" or key & 0xFF == _FROM_ALL)
+        if key & _EXTENDED and (j1939 or one.protocol == "j1939" or key & 0xFF == CHOSEN.from_all)
     }
     widths = {key: one.length for key, one in messages.items()}
     return _Dbc(messages, _Known(widths, groups), faults)
@@ -558,9 +551,9 @@ def _read_dbc(path: Path) -> _Dbc:
 
 def _fault(message: Any, signal: Any) -> str:
     """Return the rule that a signal breaks, with the value; "" where it breaks none."""
-    sizes = _FLOATS if signal.is_float else range(1, _LONGEST_SIGNAL + 1)
+    sizes = CHOSEN.floats if signal.is_float else range(1, CHOSEN.longest_signal + 1)
     if signal.length not in sizes:
-        allowed = "16, 32 or 64" if signal.is_float else f"1 to {_LONGEST_SIGNAL}"
+        allowed = "16, 32 or 64" if signal.is_float else f"1 to {CHOSEN.longest_signal}"
         return f"must have {allowed} bits, it has {signal.length}"
     _, end = _bytes_of(signal)
     return "" if end <= message.length else f"lies beyond its frame of {message.length} bytes"

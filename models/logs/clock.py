@@ -7,7 +7,7 @@ faster one is the mean since the instant before. So v_y at 50, 20 and 10 Hz besi
 costs 1.0, 1.04 and 1.2 times the error of models that were taught at full rate; values that are
 held cost 1.2, 1.8 and 2.2 times (`benchmarks/several_rates.py`: random cars, CarMaker).
 
-A gap is where a channel has no sample for longer than `LONGEST_GAP`, or than 2.5 of its own
+A gap is where a channel has no sample for longer than `CHOSEN.longest_gap`, or than 2.5 of its own
 intervals: a car can build up or lose all its lateral force meanwhile. It ends a segment.
 """
 
@@ -19,14 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, blocks, filled, large
+from models.logs.chosen import CHOSEN
 from models.logs.log import Channel, RecordingError
-from models.logs.stamps import CALENDAR, not_rising, since
-
-LONGEST_GAP = 0.1  # [s]
-_GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
-SLOWEST = 0.11  # [s]: longest typical interval of a channel, 10 Hz with jitter
-_OWN_CLOCK = 0.4  # share of empty cells from which a channel is taken to be slower than its rows
-_ON_STEP = 0.01  # share of a step within which an instant is that of a sample
+from models.logs.stamps import not_rising, since
 
 
 class Segment(NamedTuple):
@@ -54,7 +49,7 @@ def holes(channel: Channel) -> NDArray[np.intp]:
     Where 40 % are empty, or all, there are none: it is a slower channel in a table, or nothing.
     """
     empty = np.flatnonzero(np.isnan(channel.values))
-    return empty if empty.size < _OWN_CLOCK * channel.values.size else empty[:0]
+    return empty if empty.size < CHOSEN.own_clock * channel.values.size else empty[:0]
 
 
 def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
@@ -72,7 +67,7 @@ def gaps(t: Array, longest: float) -> NDArray[np.intp]:
     """Return the index of each sample that comes after a gap.
     t : rising time stamps [s], (n,).   longest : time without a sample that is none yet [s].
     """
-    limit = max(longest * (1.0 + 1e-6), _GAP_INTERVALS * typical_step(t))
+    limit = max(longest * (1.0 + 1e-6), CHOSEN.gap_intervals * typical_step(t))
     found = [part.start + 1 + np.flatnonzero(steps > limit) for part, steps in _steps(t)]
     return np.concatenate([np.zeros(0, dtype=np.intp), *found])
 
@@ -111,7 +106,7 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Seg
     longest : time without a sample that is no gap yet [s].
     """
     zero = min(float(raw.t[0]) for raw in raws.values())
-    if zero > CALENDAR:
+    if zero > CHOSEN.calendar:
         times = {id(raw.t): since(raw.t, zero) for raw in raws.values()}
         near = {name: raw._replace(t=times[id(raw.t)]) for name, raw in raws.items()}
         return [_later(one, zero) for one in on_one_clock(near, dt, longest)]
@@ -148,7 +143,7 @@ def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]
     for t in times:
         cuts = gaps(t, longest)
         first = t[np.concatenate([[0], cuts])]
-        last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - _ON_STEP) * _interval(t)
+        last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - CHOSEN.on_step) * _interval(t)
         own = list(zip(first.tolist(), last.tolist(), strict=True))
         found, i, j = [], 0, 0
         while i < len(spans) and j < len(own):
@@ -174,14 +169,14 @@ def sampled(raw: Raw, grid: Array, dt: float) -> Array:
 
 def _sampled(raw: Raw, grid: Array, dt: float, interval: float) -> Array:
     """Return the same at some instants, of a signal with a typical interval [s]."""
-    last = np.searchsorted(raw.t, grid + _ON_STEP * dt, side="right") - 1
+    last = np.searchsorted(raw.t, grid + CHOSEN.on_step * dt, side="right") - 1
     if interval < dt / 1.5:
-        first = np.searchsorted(raw.t, grid - dt + _ON_STEP * dt, side="right")
+        first = np.searchsorted(raw.t, grid - dt + CHOSEN.on_step * dt, side="right")
         return _mean_since(raw.values, last, np.minimum(first, last))
     before = np.maximum(last - 1, 0)
     now, step = raw.values[last], raw.t[last] - raw.t[before]
     ahead = np.maximum(grid - raw.t[last], 0.0)
-    goes_on = (last > 0) & (step <= _GAP_INTERVALS * interval) & (ahead > _ON_STEP * dt)
+    goes_on = (last > 0) & (step <= CHOSEN.gap_intervals * interval) & (ahead > CHOSEN.on_step * dt)
     share = np.minimum(ahead, step) / np.where(step > 0.0, step, 1.0)
     return np.where(goes_on, now + share * (now - raw.values[before]), now)
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from codegen.arrays import Array, filled
 from models.limits import limits
+from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples, noted, require_room
 from models.logs.log import Listed, RecordingError
@@ -25,13 +26,11 @@ from models.schema import LONGEST_NAME, require_dense, require_few
 
 _NUMERIC_4, _NUMERIC_3 = frozenset(range(6)), frozenset((0, 1, 2, 3, *range(9, 17)))
 _WORDS_4, _WORDS_3 = frozenset((7, 8, 9, 10, 11)), frozenset((11, 12))
-_FORMULA_4, _FORMULA_3 = 3, 10  # kinds of conversion
 # A formula is computed only where it is one: numbers, x, operators and functions.
 _FORMULA = re.compile(
     r"(?:[\s\d.+\-*/(),]|\d[eE][+-]?\d|\b[xX]1?\b|\b(?:sin|cos|tan|asin|acos|atan|sinh|cosh|tanh"
     r"|exp|log|log10|abs|sqrt|pow)\b)*"
 )
-_VALUES, _TIME = (0, 6), 1  # types of a channel, of what a master counts
 # Why a channel is not listed, by its kind.
 _REASONS = {
     "word": "enumerations and texts are no signals",
@@ -40,8 +39,6 @@ _REASONS = {
     "clockless": "there is no time beside",
     "frames": 'frames of a bus need a DBC, in the [file] of log.toml dbc = "car.dbc"',
 }
-_TOGETHER = 1 << 23  # numbers that are read at a time
-_PROBED = 200  # samples of a clock that its rate is taken from
 
 
 class _Place(NamedTuple):
@@ -62,7 +59,7 @@ def _samples(path: Path, asked: Sequence[_Asked]) -> list[Samples]:
 
 def _of_group(path: Path, file: Any, mine: Sequence[_Asked]) -> Samples:
     """Read channels of one group, as many at a time as the memory takes."""
-    several = max(1, _TOGETHER // max(mine[0][0].samples, 1))
+    several = max(1, CHOSEN.mdf_together // max(mine[0][0].samples, 1))
     t: Array | None = None
     values: dict[str, Array] = {}
     for k in range(0, len(mine), several):
@@ -121,11 +118,11 @@ class _Found:
             return
         # Other masters are angles, distances or counts.
         clock = master is not None and (
-            not is_4 or int(group.channels[master].sync_type) in (0, _TIME)
+            not is_4 or int(group.channels[master].sync_type) in (0, CHOSEN.time)
         )
         rate = float("nan")
         if clock and samples:
-            probed = min(samples, _PROBED)
+            probed = min(samples, CHOSEN.mdf_probed)
             t = file.get_master(number, record_offset=0, record_count=probed)
             rate = typical_rate(np.asarray(t, dtype=np.float64))
         for index, channel in enumerate(group.channels):
@@ -173,7 +170,7 @@ def _kind(group: Any, index: int, is_4: bool) -> str:
     channel = group.channels[index]
     if group.channel_dependencies[index]:
         return "array"
-    if is_4 and int(channel.channel_type) not in _VALUES:
+    if is_4 and int(channel.channel_type) not in CHOSEN.values:
         return "word"
     if channel.data_type not in (_NUMERIC_4 if is_4 else _NUMERIC_3):
         return "word"
@@ -184,7 +181,7 @@ def _kind_of_conversion(conversion: Any, is_4: bool) -> str:
     if conversion is None:
         return "number"
     kind = int(conversion.conversion_type)
-    if kind == (_FORMULA_4 if is_4 else _FORMULA_3):
+    if kind == (CHOSEN.formula_4 if is_4 else CHOSEN.formula_3):
         raw = conversion.formula
         text = raw.decode("latin-1").strip(" \0") if isinstance(raw, bytes) else str(raw)
         return "number" if _FORMULA.fullmatch(text) else "formula"
@@ -221,13 +218,10 @@ def _numbers(path: Path, name: str, samples: Any) -> Array:
 # groups and channels must end; before a group is read its channels must lie in its records, and its
 # records in the file.
 
-_MOST_BLOCKS = 1_000_000  # of data
-_BUS_EVENT = 1 << 1  # flag of a group of channels that holds frames of a bus
-
 
 def is_bus(group: Any) -> bool:
     """Whether a group of channels of an MDF4 file holds frames of a bus."""
-    return bool(int(group.channel_group.flags) & _BUS_EVENT)
+    return bool(int(group.channel_group.flags) & CHOSEN.bus_event)
 
 
 class _Form(NamedTuple):
@@ -317,7 +311,7 @@ def _require_fitting(path: Path, group: Any, is_4: bool) -> None:
         require_dense(RecordingError, str(path), total, packed, "groups of channels")
         here = group.data_location == 0
         if (
-            number > _MOST_BLOCKS
+            number > CHOSEN.most_blocks
             or total > 1e6 * limits().megabytes
             or (here and int(block.address) + stored > file_size)
         ):

@@ -10,6 +10,7 @@ import numpy as np
 
 from codegen.escape import shown
 from models.logs.arrow import doubles, whole_numbers, words
+from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
 from models.logs.log import RecordingError
 from models.logs.spelling import unit_in_name
@@ -17,9 +18,7 @@ from models.logs.stamps import MISSING, nanoseconds
 from models.logs.table import Cells, Columns, Gathered, Kind, TableLog
 from models.schema import LONGEST_NAME, require_dense, require_few, require_file
 
-_HEAD = 400  # rows that tell what columns are
 _WHAT = "a Parquet file"  # that a file is read as
-_BATCH = 1 << 16  # rows that are read at once
 
 
 def open_parquet(path: Path) -> TableLog:
@@ -60,14 +59,14 @@ class _ParquetTable:
     def first_rows(self, column: int) -> list[str]:
         with one_line(self.path, _WHAT):
             if column not in self._head:
-                return ["?"] * min(self.rows, _HEAD)
+                return ["?"] * min(self.rows, CHOSEN.head)
             return _as_text(self._head[column], self.schema.field(column).type)
 
     @cached_property
     def _head(self) -> dict[int, Any]:
         """The first rows of the columns that may be read, which all are looked at."""
         columns = [k for k, one in enumerate(self.schema) if _is_read(one.type)]
-        first = next(self._batches(columns, _HEAD), [])
+        first = next(self._batches(columns, CHOSEN.head), [])
         return dict(zip(columns, first, strict=False))
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
@@ -87,7 +86,7 @@ class _ParquetTable:
         gathered = Gathered(self.path, wanted, self.columns.names, "row", run)
         order = list(wanted)
         with one_line(self.path, _WHAT):
-            for batch in self._batches(order, _BATCH):
+            for batch in self._batches(order, CHOSEN.batch):
                 rows = np.arange(1, len(batch[0]) + 1) + len(gathered)
                 columns = {
                     column: self._column(column, wanted[column], cells, rows)

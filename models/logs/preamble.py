@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from codegen.escape import shown
+from models.logs.chosen import CHOSEN
 from models.logs.log import RecordingError
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
 from models.logs.stamps import nanoseconds
@@ -27,16 +28,12 @@ from models.logs.units import PER_SECOND, quantities, time_unit
 from models.schema import require_few
 
 HEAD, _LINES = 1 << 18, 1500  # bytes and lines that are looked at
-_ROWS = 400  # of data that tell what columns are
-_TAIL = 40  # last lines of them that tell how cells are written
 BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
 _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLANKS: "blanks"}
 COMMENT = ("#", "%", "//")
 _PADDING = " \t,;|\"'"  # that a spreadsheet leaves of an empty line
 _ONES = "1" + " ".join(_DELIMITERS)  # of a line in which every cell is 1, if any is
 MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
-_MANY = 300  # cells of a line that tell how all are written
-_CLEAR = 0.9  # share of cells that a way of reading must make numbers to be sure
 
 _DOT = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
 _COMMA = re.compile(r"[-+]?(?:\d+|\d*,\d+)(?:[eE][-+]?\d+)?")
@@ -55,12 +52,10 @@ _GIVEN_STEP = re.compile(
     r"|delta[ _]?[xt]\b|\bd[tx]\b)"
     r"[^\d\n]{0,20}(\d*\.?\d+(?:e-?\d+)?)(?:\W{0,5}(ms|us|s|sec)\b)?"
 )
-_RATES = (1.0, 1e5)  # [Hz]
 # RaceCapture describes a channel in one cell: "Speed"|"mph"|0.0|150.0|10, its range and rate.
 _DESCRIBED = re.compile(r'"?(?P<name>[^"|]+)"?\|"?(?P<unit>[^"|]*)"?(?:\|[-+.\deE]*){1,3}')
 _CONTROLS = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _QUOTED = re.compile(r'["\r\n\x00]')  # what a reader of CSV does more with than to split
-_LONGEST_INSTANT = 60  # characters
 _LONGEST_CELL = csv.field_size_limit()  # characters
 
 
@@ -128,7 +123,7 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     if section is not None:
         return _racelogic(path, lines, encoding, section)
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
-    way = _way(filled[-_TAIL:])
+    way = _way(filled[-CHOSEN.tail :])
     if way is None:
         return _no_data(path, lines, encoding)
     require_few(RecordingError, str(path), way.width, "columns", "columns")
@@ -220,7 +215,7 @@ def _is_number(cell: str, decimal: str, thousands: str = "") -> bool:
 
 
 def _is_instant(cell: str) -> bool:
-    maybe = len(cell) < _LONGEST_INSTANT and _MAYBE_INSTANT.fullmatch(cell) is not None
+    maybe = len(cell) < CHOSEN.longest_instant and _MAYBE_INSTANT.fullmatch(cell) is not None
     return maybe and nanoseconds(cell) is not None
 
 
@@ -232,7 +227,7 @@ def _way(tail: list[str]) -> _Way | None:
         width, often = Counter(map(len, rows)).most_common(1)[0] if rows else (0, 0)
         if width < 2:
             continue
-        cells = [cell for row in rows if len(row) == width for cell in row[:_MANY] if cell]
+        cells = [cell for row in rows if len(row) == width for cell in row[: CHOSEN.many] if cell]
         for decimal, thousands in ((".", ""), (",", ""), (".", ","), (",", ".")):
             if thousands == delimiter and not any(thousands in cell for cell in cells):
                 continue
@@ -252,7 +247,7 @@ def _numbers(delimiter: str, decimal: str) -> re.Pattern[str]:
 
 
 def _numbers_in(line: _Line, way: _Way) -> int:
-    cells = [cell for cell in line.cells[:_MANY] if cell]
+    cells = [cell for cell in line.cells[: CHOSEN.many] if cell]
     return sum(_is_number(cell, way.decimal, way.thousands) for cell in cells)
 
 
@@ -261,7 +256,7 @@ def _is_data(line: _Line, way: _Way) -> bool:
     if _numbers(way.delimiter, way.decimal).fullmatch(line.text) and line.text.strip(_ONES):
         return True  # as most lines are: nothing but numbers, not all of them 1, which is a unit
     cells = line.cells
-    filled = [cell for cell in cells[:_MANY] if cell]
+    filled = [cell for cell in cells[: CHOSEN.many] if cell]
     right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
     return right > 0 and 2 * right >= len(filled) and not is_units_row(cells)
 
@@ -300,7 +295,7 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     ]
     again = (names_line.text,) if units_line is None else (names_line.text, units_line.text)
     rows = (line.cells for line in lines[first:])
-    data = tuple(islice((row for row in rows if len(row) == len(names)), _ROWS))
+    data = tuple(islice((row for row in rows if len(row) == len(names)), CHOSEN.rows))
     made_by = _maker(lines[:first])
     words = [
         _encoding_word(encoding),
@@ -338,7 +333,7 @@ def _given_rate(preamble: Sequence[str]) -> float:
             rate = PER_SECOND[time_unit(found[2] or "s")] / step if step else 0.0
         else:
             continue
-        if _RATES[0] <= rate <= _RATES[1]:
+        if CHOSEN.rates[0] <= rate <= CHOSEN.rates[1]:
             return rate
     return 0.0
 
@@ -346,7 +341,9 @@ def _given_rate(preamble: Sequence[str]) -> float:
 def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
     """Return the lines above the data, the nearest first, and the index of the first data."""
     above = [k for k, line in enumerate(lines) if line.text.strip(_PADDING)]
-    full = sorted(_numbers_in(lines[k], way) for k in above[-_TAIL:])[len(above[-_TAIL:]) // 2]
+    full = sorted(_numbers_in(lines[k], way) for k in above[-CHOSEN.tail :])[
+        len(above[-CHOSEN.tail :]) // 2
+    ]
     first = None
     zone: list[int] = []
     for place in range(len(above) - 1, -1, -1):
@@ -419,7 +416,7 @@ def _all_instants(cells: Sequence[str]) -> bool:
 
 
 def _sure(share: float) -> str:
-    return "sure" if share > _CLEAR else "likely" if share > 0.6 else "a guess"
+    return "sure" if share > CHOSEN.preamble_clear else "likely" if share > 0.6 else "a guess"
 
 
 def _encoding_word(encoding: str) -> str:
@@ -493,7 +490,7 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
     units = [known["time"] if a.lower() == "time" else u for a, u in zip(names, units, strict=True)]
     first = at["data"] + 1
     data = [cells for line in lines[first:] if len(cells := cells_of(line, BLANKS)) == len(names)]
-    way = _way([line for line in lines[first:] if line.strip()][-_TAIL:])
+    way = _way([line for line in lines[first:] if line.strip()][-CHOSEN.tail :])
     decimal = "." if way is None else way.decimal
     words = (
         _encoding_word(encoding),
@@ -506,7 +503,7 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
         columns=Columns(names, tuple(units), (True,) * len(names), words),
         first=first + 1,
         decimal=decimal,
-        rows=tuple(data[:_ROWS]),
+        rows=tuple(data[: CHOSEN.rows]),
         made_by="Racelogic VBOX",
     )
 

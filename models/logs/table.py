@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.escape import shown
+from models.logs.chosen import CHOSEN
 from models.logs.growing import Growing
 from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
 from models.logs.spelling import unit_in_name, without_unit
@@ -29,8 +30,6 @@ from models.logs.stamps import (
 from models.schema import LONGEST_NAME, limits, require_few
 
 _RUN = "run"
-_LONG = 8  # columns at most of a table with a row for each value
-_MOST_WORDS = 10_000  # names of runs in one log
 
 
 class Kind(Enum):
@@ -164,10 +163,10 @@ class Gathered:
                     f"characters, {self._place} {row} has {shown(word.strip())}"
                 )
         new = [codes.setdefault(word.strip(), len(codes)) for word in words.names]
-        if len(codes) > _MOST_WORDS:
+        if len(codes) > CHOSEN.most_words:
             raise RecordingError(
                 f"{self._path}: {self._names[column]} must name runs, it has more than "
-                f"{_MOST_WORDS} different words"
+                f"{CHOSEN.most_words} different words"
             )
         coded: NDArray[np.int32] = np.array(new, dtype=np.int32)[words.codes]
         return coded
@@ -256,7 +255,9 @@ class TableLog:
     def may_be_long(self) -> bool:
         """Whether a row may be one value of a channel that it names."""
         return (
-            len(self.names) <= _LONG and not all(self._columns.numeric) and _RUN not in self.names
+            len(self.names) <= CHOSEN.long
+            and not all(self._columns.numeric)
+            and _RUN not in self.names
         )
 
     @cached_property

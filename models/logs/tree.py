@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from models.logs.chosen import CHOSEN
 from models.logs.stamps import NAMES
 
 # Of a variable: a name that a clock has, and the unit that may follow it.
@@ -29,8 +30,6 @@ _RATES = (
     "fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate", "freq",
 )  # fmt: skip
 _STEPS = ("dt", "ts", "sampletime", "sampleperiod", "samplinginterval", "samplingtime", "deltat")
-_LEAST_RATE, _MOST_RATE = 1.0, 1e5  # [Hz]
-_MOST_COLUMNS = 1000  # of a matrix that is a table of signals
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -183,7 +182,7 @@ class _Walk:
             if samples not in leaf.shape:
                 continue
             along = 0 if rows == samples else 1
-            if leaf.shape[1 - along] > _MOST_COLUMNS:
+            if leaf.shape[1 - along] > CHOSEN.most_columns:
                 break
             for signal in _lines(leaf, name, unit, along, clock, columns):
                 self.signals.append(signal)
@@ -202,7 +201,7 @@ class _Walk:
         if word in _RATES + _STEPS and leaf.shape == (1, 1):
             value = float(leaf.load()[0, 0])
             rate = value if word in _RATES or not value else 1.0 / value
-            self.rate = rate if _LEAST_RATE <= rate <= _MOST_RATE else self.rate
+            self.rate = rate if CHOSEN.least_rate <= rate <= CHOSEN.most_rate else self.rate
 
 
 def _lines(
@@ -268,7 +267,7 @@ def _unit_of_clock(name: str) -> str | None:
 
 def _clock_inside(leaf: Leaf, name: str) -> Clock | None:
     """Return the first column of a matrix, or row of a wide one, where it rises as a clock does."""
-    if min(leaf.shape) < 2 or min(leaf.shape) > _MOST_COLUMNS or max(leaf.shape) < 3:
+    if min(leaf.shape) < 2 or min(leaf.shape) > CHOSEN.most_columns or max(leaf.shape) < 3:
         return None
     clock = Clock(name, leaf, 0, "")
     steps = np.diff(times_of(clock))

@@ -12,16 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, thinning
+from models.recordings.chosen import CHOSEN
 from models.recordings.record import Recording
-
-WINDOW = 0.2  # [s]: keeps maneuvers up to 2 Hz, averages 20 samples of noise at 100 Hz
-STRIDE = 0.05  # [s], longer where a recording is: evenly over it, as many as of `LONG` samples
-_SLOWEST = 0.5  # [m/s]: below it slip and curvature are noise, for scale cars too
-_TURNS = 0.2  # of what a channel reaches, beyond which the car turns
-_ALIKE, _BEYOND_CHANCE = 0.7, 16.0  # least correlation, and least square of its t, of a sign
-_LEAST = 0.1  # [m/s^2], rms, below which nothing turns
-_LONGEST = 8.0  # [m], wheelbase by which steering says how much it turns at least
-_TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may countersteer
 
 
 class Means(NamedTuple):
@@ -53,7 +45,7 @@ class Means(NamedTuple):
         """Where the tail is not out, so that steering and turn go together, (k,)."""
         if self.v_y is None:
             return np.ones(self.r.size, dtype=np.bool_)
-        return ~((self.v_y * self.r < 0.0) & (np.abs(self.v_y) > _TAIL_OUT * self.v_x))
+        return ~((self.v_y * self.r < 0.0) & (np.abs(self.v_y) > CHOSEN.tail_out * self.v_x))
 
     @property
     def acceleration(self) -> Array:
@@ -97,9 +89,9 @@ def windows(recording: Recording) -> Means:
     Moving: v_x above 0.5 m/s and above 30 % of its 95th percentile.
     """
     n, dt = len(recording), recording.dt
-    width = max(round(WINDOW / dt), 1)
-    start = np.arange(0, max(n - width, 0), max(round(STRIDE / dt), 1) * thinning(n))
-    fast = max(_SLOWEST, 0.3 * float(np.percentile(recording.v_x[:: thinning(n)], 95)))
+    width = max(round(CHOSEN.evidence_window / dt), 1)
+    start = np.arange(0, max(n - width, 0), max(round(CHOSEN.stride / dt), 1) * thinning(n))
+    fast = max(CHOSEN.slowest, 0.3 * float(np.percentile(recording.v_x[:: thinning(n)], 95)))
     start = start[_sums(lambda at: (recording.v_x[at] < fast) + 0.0, n, start, width) == 0.0]
     start = start[recording.within_a_segment(start, width)]
 
@@ -134,7 +126,7 @@ def least_squares(X: Array, y: Array) -> Fit:
     size = np.sqrt(np.mean(X**2, axis=0)) + 1e-300
     theta, *_ = np.linalg.lstsq(X / size, y, rcond=None)
     rest = y - (X / size) @ theta
-    independent = max(y.size * STRIDE / WINDOW - X.shape[1], 1.0)
+    independent = max(y.size * CHOSEN.stride / CHOSEN.evidence_window - X.shape[1], 1.0)
     covariance = np.linalg.pinv((X / size).T @ (X / size) / y.size) * np.mean(rest**2) / independent
     total = float(np.sum((y - y.mean()) ** 2)) + 1e-300
     return Fit(
@@ -159,7 +151,7 @@ def turning(a: Array, b: Array) -> NDArray[np.bool_]:
     """
     some: NDArray[np.bool_] = np.zeros(a.size, dtype=np.bool_)
     for one in (a, b):
-        some |= np.abs(one) > _TURNS * np.percentile(np.abs(one), 99)
+        some |= np.abs(one) > CHOSEN.turns * np.percentile(np.abs(one), 99)
     return some
 
 
@@ -170,13 +162,13 @@ def pair(a: Array, b: Array, keep: NDArray[np.bool_] | None = None) -> Pair:
     some = turning(a, b)
     if keep is not None:
         some &= keep
-    seconds = float(np.count_nonzero(some)) * STRIDE
+    seconds = float(np.count_nonzero(some)) * CHOSEN.stride
     if seconds < 2.0:
         return Pair(0.0, 0, seconds)
     x, y = (_less_offset(one, some) for one in (a, b))
     rho = correlation(x, y)
     chance = rho**2 * max(seconds - 2.0, 0.5) / max(1.0 - rho**2, 1e-9)
-    sure = abs(rho) > _ALIKE and chance > _BEYOND_CHANCE
+    sure = abs(rho) > CHOSEN.evidence_alike and chance > CHOSEN.beyond_chance
     return Pair(rho, int(np.sign(rho)) if sure else 0, seconds)
 
 
@@ -194,7 +186,7 @@ def course_rate(recording: Recording) -> tuple[Array, Array] | None:
     Over windows of 0.2 s one after the other; None without a v_y, or with less than 2 s.
     """
     v_y, dt = recording.logged_v_y, recording.dt
-    width = round(max(WINDOW / dt, 1.0))
+    width = round(max(CHOSEN.evidence_window / dt, 1.0))
     n = len(recording) // width
     if v_y is None or n * width * dt < 2.0:
         return None
@@ -209,9 +201,13 @@ def course_rate(recording: Recording) -> tuple[Array, Array] | None:
     before, after = (mean(recording.v_x, at) + 1j * mean(v_y, at) for at in (some, some + width))
     r = 0.5 * (mean(recording.r, some) + mean(recording.r, some + width))
     speed = np.abs(before)
-    fast = speed > max(_SLOWEST, 0.3 * float(np.percentile(speed, 95))) if speed.size else speed > 0
+    fast = (
+        speed > max(CHOSEN.slowest, 0.3 * float(np.percentile(speed, 95)))
+        if speed.size
+        else speed > 0
+    )
     turned: Array = np.angle(after[fast] * np.conj(before[fast])) / (width * dt)
-    return (turned, r[fast]) if turned.size * WINDOW >= 2.0 else None
+    return (turned, r[fast]) if turned.size * CHOSEN.evidence_window >= 2.0 else None
 
 
 def steering(w: Means) -> Steering | None:
@@ -232,7 +228,7 @@ def proportional(w: Means) -> bool:
     size = np.abs(w.v_x * w.delta)
     most = float(np.percentile(size, 95))
     large, middle = size > 0.7 * most, (size > 0.3 * most) & (size <= 0.7 * most)
-    if min(np.count_nonzero(large), np.count_nonzero(middle)) * STRIDE < 0.5:
+    if min(np.count_nonzero(large), np.count_nonzero(middle)) * CHOSEN.stride < 0.5:
         return False
     steered, turned = (
         float(np.sqrt(np.mean(one[large] ** 2) / max(np.mean(one[middle] ** 2), 1e-300)))
@@ -259,8 +255,8 @@ def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
     together = pair(r[keep], kinematic[keep])
     felt = 0.0 if w.a_y is None else float(np.std(w.a_y))
     turned, steered = (float(np.sqrt(np.mean((w.v_x * one) ** 2))) for one in (r, kinematic))
-    moving = max(turned, felt, steered / _LONGEST)
-    if together.sign == 0 or moving < _LEAST:
+    moving = max(turned, felt, steered / CHOSEN.longest)
+    if together.sign == 0 or moving < CHOSEN.least:
         return None
     r, kinematic = r[keep], kinematic[keep]
     some = turning(r, kinematic)

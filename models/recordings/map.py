@@ -21,7 +21,7 @@ from typing import Any
 
 from codegen.escape import shown
 from models.files import resolved, write_atomically
-from models.logs.clock import LONGEST_GAP
+from models.logs.chosen import CHOSEN as LOGS_CHOSEN
 from models.logs.door import open_log
 from models.logs.log import LogFile, RecordingError
 from models.logs.signals import (
@@ -86,7 +86,7 @@ class LogMap:
     clock: str = ""
     clock_unit: str = ""
     rate: float | None = None
-    longest_gap: float = LONGEST_GAP
+    longest_gap: float = LOGS_CHOSEN.longest_gap
     holes: str = _REFUSE
     order: str = _REFUSE
     low_pass: float | None = None

@@ -22,16 +22,8 @@ from codegen import Scan
 from codegen.arrays import Array, blocks, large
 from models.logs.log import RecordingError
 from models.logs.signals import AXLES, WHEELS
+from models.recordings.chosen import CHOSEN
 from models.recordings.wheels import DRIVEN, Wheels
-
-_SLIP, _NOISE = 0.03, 0.05  # more than this share of the speed, and [m/s], is no usual slip
-_ALIKE = 0.01  # wheels that differ by this share, and NOISE, have no slip that tells them apart
-_WINDOW = 0.05  # [s], over which the acceleration of a wheel is taken
-_MEMORY = 0.15  # [s], over which that of the car is
-_BRAKED, _ROLLS_OUT = -1.0, -0.3  # [m/s²]: wheels are braked below, driven above the second
-_UNSURE = 0.25  # of the largest acceleration: how far it may have changed while nothing is trusted
-_PATIENCE = 2.0  # [s]: after it wheels that all agree again are believed the sooner
-_SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
 
 
 class _Rolled(NamedTuple):
@@ -54,9 +46,9 @@ def rolled(
     """
     names, most = _sources(speeds, wheels), wheels.acceleration
     n, v_x = r.size, large((r.size,))
-    span = max(1, round(_WINDOW / dt))
+    span = max(1, round(CHOSEN.rolled_window / dt))
     free = [bool(wheels.driven) and not set(group) & set(_pushed(wheels)) for group in names]
-    rule = np.array([dt, most, most + _NOISE / (span * dt)])
+    rule = np.array([dt, most, most + CHOSEN.noise / (span * dt)])
     scan, constants = _trust_scan(len(names)), {"rule": rule, "free": np.array(free, dtype=float)}
     gated = held = 0
     trust: Array | None = None
@@ -76,7 +68,9 @@ def rolled(
         trust = record["trust_final"]
         v_x[part] = record["v"].ravel()
         held += int(np.count_nonzero(record["held"] > 0.0))
-        agree = np.abs(rows - v_x[part, None]) <= _NOISE + _SLIP * np.abs(v_x[part, None])
+        agree = np.abs(rows - v_x[part, None]) <= CHOSEN.noise + CHOSEN.slip * np.abs(
+            v_x[part, None]
+        )
         gated += int(np.count_nonzero(~agree.all(axis=1)))
     return _Rolled(v_x, gated, held)
 
@@ -114,14 +108,16 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: _Rule) -> _Trust:
     v, a, since, known = trust
     dt, most, limit, free = rule
     ahead, passed = v + a * dt, since + dt
-    near, alike = (_NOISE + share * ca.fabs(ahead) for share in (_SLIP, _ALIKE))
+    near, alike = (
+        CHOSEN.noise + share * ca.fabs(ahead) for share in (CHOSEN.slip, CHOSEN.rolled_alike)
+    )
 
     steady = ca.fabs(rates) <= limit
     agree = ca.logic_and(ca.mmax(c) - ca.mmin(c) <= near, ca.logic_all(steady))
-    doubt = _UNSURE * most * since
-    doubt = ca.if_else(agree, doubt * (1.0 + since / _PATIENCE), doubt)
-    slow = ca.fmax(ca.fabs(ahead), ca.mmax(ca.fabs(c))) < _SLOW
-    doubt = ca.if_else(slow, _SLOW, doubt)
+    doubt = CHOSEN.unsure * most * since
+    doubt = ca.if_else(agree, doubt * (1.0 + since / CHOSEN.patience), doubt)
+    slow = ca.fmax(ca.fabs(ahead), ca.mmax(ca.fabs(c))) < CHOSEN.rolled_slow
+    doubt = ca.if_else(slow, CHOSEN.rolled_slow, doubt)
     likely = ca.logic_and(ca.logic_or(slow, steady), ca.fabs(c - ahead) <= near + doubt)
     some = ca.logic_any(likely)
 
@@ -130,20 +126,20 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: _Rule) -> _Trust:
     v_held, a_held = ca.if_else(astray, v, ahead), ca.if_else(astray, 0.0, a)
 
     # Driven wheels run ahead of the car, however little.
-    likely = _rather(likely, free, ca.logic_not(a > _BRAKED))
-    likely = _rather(likely, ca.fabs(rates - a) <= _UNSURE * most, ca.SX(0.0))
+    likely = _rather(likely, free, ca.logic_not(a > CHOSEN.braked))
+    likely = _rather(likely, ca.fabs(rates - a) <= CHOSEN.unsure * most, ca.SX(0.0))
     best = ca.if_else(
-        a > _ROLLS_OUT,
+        a > CHOSEN.rolls_out,
         _lowest(c, likely),
-        ca.if_else(a < _BRAKED, -_lowest(-c, likely), _nearest(c, likely, ahead)),
+        ca.if_else(a < CHOSEN.braked, -_lowest(-c, likely), _nearest(c, likely, ahead)),
     )
     kept = ca.logic_and(likely, ca.fabs(c - best) <= alike)
     reach = most * dt + doubt
     now = ca.fmin(ca.fmax(_mean(c, kept), ahead - reach), ahead + reach)
     # After a while, what was trusted before says little of how it goes on.
-    slope = ca.if_else(since > _MEMORY, _mean(rates, kept), (now - known) / passed)
+    slope = ca.if_else(since > CHOSEN.memory, _mean(rates, kept), (now - known) / passed)
     slope = ca.fmin(ca.fmax(slope, -most), most)
-    a_now = a + (1.0 - ca.exp(-passed / _MEMORY)) * (slope - a)
+    a_now = a + (1.0 - ca.exp(-passed / CHOSEN.memory)) * (slope - a)
     return _Trust(
         ca.if_else(some, now, v_held),
         ca.if_else(some, a_now, a_held),

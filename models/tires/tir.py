@@ -19,6 +19,7 @@ from typing import Literal, NamedTuple
 from codegen.errors import TireidError
 from codegen.escape import shown
 from models.schema import read_bytes
+from models.tires.chosen import CHOSEN
 from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
 
 # Units of a tire property file: which keys have one, and what it is in SI.
@@ -49,8 +50,6 @@ def _unit_in_si(dimension: str, unit: str) -> float:
     raise ValueError(f"[UNITS] {dimension} = {unit!r} is not one of {', '.join(known)}")
 
 
-_LARGEST = 1e12  # of a number, in the unit of the file: a stiffness in N/km fits
-_SOME = 10  # lines in a message
 _KEY = re.compile(r"[A-Za-z_]\w*")
 _SECTION = re.compile(r"\[(.*?)\]")
 _LINE_END = re.compile(r"\r\n|\r|\n")  # alone: str.splitlines also ends a comment at cp1252's "..."
@@ -109,8 +108,10 @@ class TirFile:
     def _parsed(self, key: str, entry: _Entry) -> float:
         if _NUMBER.fullmatch(entry.value):
             value = float(entry.value.upper().replace("D", "E"))
-            if _LARGEST < abs(value) < math.inf:
-                raise self.error(f"line {entry.line}: {key} must be below {_LARGEST:g}, is {value}")
+            if CHOSEN.largest < abs(value) < math.inf:
+                raise self.error(
+                    f"line {entry.line}: {key} must be below {CHOSEN.largest:g}, is {value}"
+                )
             if math.isfinite(value):
                 return value
         raise self.error(
@@ -132,7 +133,7 @@ class TirFile:
 
     def _require_one(self, key: str, lines: Collection[int]) -> None:
         if len(lines) > 1:
-            some = ", ".join(str(line) for line in list(lines)[:_SOME])
+            some = ", ".join(str(line) for line in list(lines)[: CHOSEN.some])
             raise self.error(f"{key} has different values in lines {some}")
 
     def _unit(self, key: str) -> float:
@@ -212,7 +213,6 @@ def _unquoted(value: str) -> str:
 # MF-Tyre 6.x and the motorcycle's MF-MCTyre reuse most of the names in other equations, and their
 # files often keep an old label. So a file is judged by its coefficients as well as by its labels.
 
-_FITTYPS = (5, 6, 21, 51, 52)  # MF-Tyre up to 5.2 under its several numbers; 60 and above is 6.x
 _FORMATS = ("PAC2002", "MF05", "MF52", "MFTYRE", "MFTYRE52", "DELFTTYRE", "USER")
 _PRESSURE = ("PPX1", "PPX2", "PPX3", "PPX4", "PPY1", "PPY2", "PPY3", "PPY4")
 # No equation of 5.2 has these. Zero is how programs that list all names say "not used": a tire of
@@ -224,7 +224,6 @@ _MARKS_OF_OTHERS = (
 # value of PKY4 at which K_y of 6.x is that of 5.2. PHY3 is what 6.x has no more: a file that calls
 # itself 5.2 and has it was extended for a program that asks for all names.
 _PRESSURES_OF_OTHERS = ("INFLPRES", "NOMPRES")
-_PKY4_OF_52 = 2.0
 
 # MF-Tyre 5.0 often fits a negative mu_y. Its sign is free: B = K/(C D) takes it too, and the curve
 # is the same in (-B, -D); D_Vyk = mu_y F_z (RVY1 + ...) is the only other place of mu_y.
@@ -278,7 +277,7 @@ def _require_mf52(tir: TirFile) -> None:
     """Refuse other models, whose coefficients have the same names and another meaning."""
     fittyp = tir.number("FITTYP")
     model = tir.text("PROPERTY_FILE_FORMAT", "")
-    if fittyp is not None and fittyp not in _FITTYPS:
+    if fittyp is not None and fittyp not in CHOSEN.fittyps:
         what = "Magic Formula 6.x" if fittyp >= 60 else "an unknown model"
         raise tir.error(
             f"FITTYP = {fittyp:g} is {what}; its equations differ, only MF 5.2 and PAC2002 are read"
@@ -291,7 +290,10 @@ def _require_mf52(tir: TirFile) -> None:
         )
     found = {key: value for key in _MARKS_OF_OTHERS if (value := tir.number(key))}
     if "PHY3" in tir and (model or fittyp is not None):
-        same = {*_PRESSURES_OF_OTHERS, *(["PKY4"] if found.get("PKY4") == _PKY4_OF_52 else [])}
+        same = {
+            *_PRESSURES_OF_OTHERS,
+            *(["PKY4"] if found.get("PKY4") == CHOSEN.pky4_of_52 else []),
+        }
         found = {key: value for key, value in found.items() if key not in same}
     if marks := [f"{key} = {value:g}" for key, value in found.items()]:
         label = f"it calls itself {model}" if model else "it has no PROPERTY_FILE_FORMAT"

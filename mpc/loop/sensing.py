@@ -18,6 +18,7 @@ from models.sensors import Sensor, SensorError
 from models.tires import Tire
 from models.vehicle import GRAVITY, Vehicle
 from mpc.cars import CarState
+from mpc.loop.chosen import CHOSEN
 from mpc.path.path import Path
 
 _EXACT = Sensor()
@@ -113,9 +114,6 @@ def inertial_unit() -> CarSensors:
     )
 
 
-_BIAS_A_Y, _BIAS_R = 0.05, 0.001  # m/s², rad/s: standard deviations from one unit to the next
-
-
 def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
     """Return the sensors of a car without v_y: inertial unit, wheel speed, steering, localization.
 
@@ -128,7 +126,7 @@ def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
     """
     if rng is None:
         return CarSensors(v_y=None, body_fixed=True)
-    same, (bias_r, bias_a_y) = inertial_unit(), rng.normal(0.0, [_BIAS_R, _BIAS_A_Y])
+    same, (bias_r, bias_a_y) = inertial_unit(), rng.normal(0.0, [CHOSEN.bias_r, CHOSEN.bias_a_y])
     return replace(
         same,
         v_y=None,
@@ -257,9 +255,6 @@ class SpeedProfile:
 # The driven axle also holds the speed against the drag of cornering, so that this limit lies a few
 # per cent below the sum of what the tires could give to the side alone.
 
-_RAMP_TIME = 20.0  # s
-_LARGEST_ANGLE = 0.3  # rad at friction 1: beyond the peak of any tire for the road
-
 
 def cornering_limit(
     vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0, *, speed: float = 20.0
@@ -276,8 +271,10 @@ def cornering_limit(
 @cache
 def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float, speed: float) -> float:
     """Drive the ramp once for each car and road: setting up a drive asks a dozen times."""
-    rate = _LARGEST_ANGLE * mu / _RAMP_TIME
-    ramp = StepSteer(amplitude=_LARGEST_ANGLE * mu, rate_limit=rate, onset=0.1, duration=_RAMP_TIME)
+    rate = CHOSEN.largest_angle * mu / CHOSEN.ramp_time
+    ramp = StepSteer(
+        amplitude=CHOSEN.largest_angle * mu, rate_limit=rate, onset=0.1, duration=CHOSEN.ramp_time
+    )
     plant = Plant(vehicle, cast(Tire | None, tire))
     run = plant.simulate(ramp, speed=speed, friction=Friction(scale=mu))
     return float(np.abs(run.a_y).max())

@@ -18,15 +18,12 @@ from scipy.interpolate import BSpline
 
 from codegen.arrays import Array
 from models.rules import require_positive
+from mpc.path.chosen import CHOSEN
 from mpc.path.line import Line, PathError
 from mpc.path.path import Path
 from mpc.path.waypoints import sample
 
 _DEGREE = 5
-_KNOTS = 1.0  # m, about their distance
-_PER_INTERVAL = 4  # places between two knots where limits hold
-_GENTLY = 5.0  # m³: weight of ∫ (dκ/ds)² ds against the peak of |κ| [1/m]
-_CONE_SPACING = 3.0  # m
 _OPTIONS: dict[str, Any] = {
     "print_time": False,
     "ipopt": {"print_level": 0, "sb": "yes", "tol": 1e-9, "max_iter": 500},
@@ -53,7 +50,9 @@ class Gate:
 
     def cones(self) -> Array:
         """Return X, Y of its cones [m], (k, 2), at most 3 m from one another."""
-        x = np.linspace(self.start, self.end, ceil((self.end - self.start) / _CONE_SPACING) + 1)
+        x = np.linspace(
+            self.start, self.end, ceil((self.end - self.start) / CHOSEN.cone_spacing) + 1
+        )
         rows = [np.column_stack((x, np.full_like(x, y))) for y in (self.right, self.left)]
         return np.vstack([row for row in rows if np.isfinite(row).all()])
 
@@ -90,7 +89,7 @@ def _straightest(
     easing: float,
 ) -> tuple[BSpline, Array]:
     """Return the line as a spline and its knots; a course is asked for once for each drive."""
-    intervals = max(_DEGREE + 1, ceil((end[0] - start[0]) / _KNOTS))
+    intervals = max(_DEGREE + 1, ceil((end[0] - start[0]) / CHOSEN.knots))
     inner = np.linspace(start[0], end[0], intervals + 1)
     t = np.concatenate((np.full(_DEGREE, start[0]), inner, np.full(_DEGREE, end[0])))
     c = _coefficients(t, inner, gates, start, end, clearance, easing)
@@ -109,7 +108,7 @@ def _coefficients(
 ) -> Array:
     n = t.size - _DEGREE - 1
     edges = np.concatenate([[gate.start, gate.end] for gate in gates])
-    x = np.linspace(inner[0], inner[-1], _PER_INTERVAL * (inner.size - 1) + 1)
+    x = np.linspace(inner[0], inner[-1], CHOSEN.per_interval * (inner.size - 1) + 1)
     x = np.unique(np.concatenate((x, edges[(edges > x[0]) & (edges < x[-1])])))
     c, k = ca.MX.sym("c", n), ca.MX.sym("k")
     basis = [_basis(t, x, order) for order in range(4)]
@@ -129,7 +128,7 @@ def _coefficients(
     rows = ca.vertcat(y, ends, kappa - k, -kappa - k, easing * kappa_ds - k, -easing * kappa_ds - k)
     upper = np.concatenate((high, np.zeros(4 + 4 * x.size)))
     lower = np.concatenate((low, np.zeros(4), np.full(4 * x.size, -np.inf)))
-    cost = k + _GENTLY * ca.sum1(np.gradient(x) * ca.sqrt(stretch) * kappa_ds**2)
+    cost = k + CHOSEN.gently * ca.sum1(np.gradient(x) * ca.sqrt(stretch) * kappa_ds**2)
     problem = {"x": ca.vertcat(c, k), "f": cost, "g": rows}
     solver: Any = ca.nlpsol("line", "ipopt", problem, _OPTIONS)
     guess = np.append(np.linspace(start[1], end[1], n), 0.05)
@@ -159,13 +158,10 @@ def _basis(t: Array, x: Array, order: int) -> Any:
 # The offset of part 1 is taken between right cones. The standard leaves the line to the driver;
 # ours is the one of smallest peak curvature, see the gates above.
 
-_CAR_WIDTH = 1.8  # m
-_NARROWEST, _WIDEST = 1.0, 2.6  # m, of a car
-
 
 def iso_3888_1(
     *,
-    car_width: float = _CAR_WIDTH,
+    car_width: float = CHOSEN.car_width,
     margin: float = 0.05,
     run_in: float = 40.0,
     run_out: float = 40.0,
@@ -194,7 +190,7 @@ def iso_3888_1(
 
 def iso_3888_2(
     *,
-    car_width: float = _CAR_WIDTH,
+    car_width: float = CHOSEN.car_width,
     margin: float = 0.05,
     run_in: float = 40.0,
     run_out: float = 40.0,
@@ -224,8 +220,10 @@ def iso_3888_2(
 
 
 def _checked(car_width: float) -> float:
-    if not _NARROWEST <= car_width <= _WIDEST:
-        raise PathError(f"car_width must be {_NARROWEST} to {_WIDEST} m, it is {car_width}")
+    if not CHOSEN.narrowest <= car_width <= CHOSEN.widest:
+        raise PathError(
+            f"car_width must be {CHOSEN.narrowest} to {CHOSEN.widest} m, it is {car_width}"
+        )
     return car_width
 
 
@@ -255,9 +253,6 @@ def _path(
         spacing=spacing,
     )
     return Path.from_line(line, name=name, cones=np.vstack([gate.cones() for gate in gates]))
-
-
-_EASING = 6.0  # m
 
 
 def slalom(
@@ -291,4 +286,4 @@ def slalom(
     places = [(i * gap, *sides[i % 2]) for i in range(cones)]
     gates = [Gate(start=x, end=x, right=right, left=left) for x, right, left in places]
     half, runs = 0.5 * car_width + margin, (run_in, run_out)
-    return _path("slalom", gates, half, _EASING, runs, spacing)
+    return _path("slalom", gates, half, CHOSEN.easing, runs, spacing)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
+from mpc.path.chosen import CHOSEN
 from mpc.path.line import Ends, Line, PathError, check_line
 from mpc.path.waypoints import line_through, read_waypoints
 
@@ -26,11 +27,6 @@ from mpc.path.waypoints import line_through, read_waypoints
 
 # s [m] -> X, Y [m], ψ [rad], κ [1/m]
 _PointOf: TypeAlias = Callable[[float], tuple[float, float, float, float]]
-
-_LONGEST_STEP = 1.0  # m; shorter than any turn that a car can drive, so that no step skips a bend
-_SMALLEST_SLOPE = 0.3  # of 1 - κ e_y: near the center of a turn every s is as close as the next
-_TOLERANCE = 1e-9  # m
-_STEPS = 200
 
 
 class Projection(NamedTuple):
@@ -68,15 +64,15 @@ def _walk_to_foot(
     deviation there.
     """
     s = near
-    for _ in range(_STEPS):
+    for _ in range(CHOSEN.steps):
         X_s, Y_s, psi, kappa = point_of(s)
         cos_psi, sin_psi = math.cos(psi), math.sin(psi)
         along = (X - X_s) * cos_psi + (Y - Y_s) * sin_psi
         e_y = (Y - Y_s) * cos_psi - (X - X_s) * sin_psi
-        step = along / max(1.0 - kappa * e_y, _SMALLEST_SLOPE)
-        step = min(max(step, -_LONGEST_STEP), _LONGEST_STEP)
+        step = along / max(1.0 - kappa * e_y, CHOSEN.smallest_slope)
+        step = min(max(step, -CHOSEN.longest_step), CHOSEN.longest_step)
         goal = min(max(s + step, near - search_distance), near + search_distance)
-        if abs(goal - s) < _TOLERANCE:
+        if abs(goal - s) < CHOSEN.tolerance:
             break
         s = goal
     return Projection(float(s), float(e_y), float(psi), float(kappa))

@@ -20,10 +20,8 @@ from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
 from models.vehicle import Vehicle, load_ratio
-from mpc.tires.tire import DOUBT_STEP, N_DOUBTS, Pair, Point, PredictionTire, TireStructure
-
-_N_COMMON = 3
-_N_AXLE = 2  # beside the w_j
+from mpc.tires.chosen import CHOSEN
+from mpc.tires.tire import Pair, Point, PredictionTire, TireStructure
 
 
 class Axle(NamedTuple):
@@ -59,7 +57,7 @@ class LadderAxles(TireStructure):
 
     @property
     def _static(self) -> int:
-        return _N_COMMON + self.units + 2 * (_N_AXLE + self.units)
+        return CHOSEN.n_common + self.units + 2 * (CHOSEN.n_axle + self.units)
 
     def slip(self, at: Point) -> Pair:
         """Return the slip angles, errors of the sensors taken off [rad]."""
@@ -94,9 +92,9 @@ class LadderAxles(TireStructure):
     def at_friction(self, weights: Array, ratio: float) -> Array:
         """Return `weights` (n_weights,) of another friction: 1/α_j over it, W times it."""
         w, n = weights.copy(), self.units
-        w[_N_COMMON : _N_COMMON + n] /= ratio  # 1/α_j
-        axles = w[_N_COMMON + n : self._static].reshape(2, -1)  # a view
-        axles[:, _N_AXLE:] *= ratio
+        w[CHOSEN.n_common : CHOSEN.n_common + n] /= ratio  # 1/α_j
+        axles = w[CHOSEN.n_common + n : self._static].reshape(2, -1)  # a view
+        axles[:, CHOSEN.n_axle :] *= ratio
         return w
 
     def similar(self, at: Point, ratio: Any) -> Point:
@@ -112,10 +110,10 @@ class LadderAxles(TireStructure):
         return front, rear
 
     def _weights(self, w: Any) -> tuple[Any, tuple[Axle, Axle]]:
-        n, size = self.units, _N_AXLE + self.units
-        start = _N_COMMON + n
+        n, size = self.units, CHOSEN.n_axle + self.units
+        start = CHOSEN.n_common + n
         front, rear = (w[start + i * size : start + (i + 1) * size] for i in (0, 1))
-        return w[_N_COMMON:start], (
+        return w[CHOSEN.n_common : start], (
             Axle(front[0], front[1], front[2:]),
             Axle(rear[0], rear[1], rear[2:]),
         )
@@ -165,7 +163,7 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     mounted = any((model.sensors.v_y_angle, model.sensors.steering_gain))
     if mounted:
         weights = np.append(weights, [model.sensors.v_y_angle, model.sensors.steering_gain])
-    doubt = model.band.half(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
+    doubt = model.band.half(CHOSEN.doubt_step * np.arange(CHOSEN.n_doubts, dtype=np.float64)).T
     pressed = model.vehicle.has_downforce
     structure = LadderAxles(units=ladder.size, pressed=pressed, mounted=mounted)
     return PredictionTire(structure, weights, model.vehicle, doubt)
@@ -175,19 +173,12 @@ def fit_tire(model: FittedModel) -> PredictionTire:
     """Return the prediction tire of a fit: its curves in hidden units, read by its sensors.
     model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out.
     """
-    doubt = model.band.half(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
+    doubt = model.band.half(CHOSEN.doubt_step * np.arange(CHOSEN.n_doubts, dtype=np.float64)).T
     return axle_tire(model.in_units())._replace(doubt=doubt)
 
 
 def _downforce(vehicle: Vehicle) -> tuple[float, ...]:
     return vehicle.downforce if vehicle.has_downforce else ()
-
-
-UNITS = 6
-NARROWEST = 0.25  # α_1 over the slip F_max/C at which the linear tire would reach the peak force
-WORST = 0.02  # largest error of a fit over the largest force
-SAMPLES = 400
-SMALL = 1e-3  # rad; the slope at zero is read here, well above rounding
 
 
 class CurveFitError(TireidError, ValueError):
@@ -198,7 +189,7 @@ def slip_grid(largest: float) -> Array:
     """Return slips from near 0 to the largest [rad], dense where the curve bends, (k,).
     largest : end of the grid [rad].
     """
-    grid: Array = largest * (np.arange(1, SAMPLES + 1) / SAMPLES) ** 2
+    grid: Array = largest * (np.arange(1, CHOSEN.samples + 1) / CHOSEN.samples) ** 2
     return grid
 
 
@@ -207,18 +198,18 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
     alpha : slips [rad], positive and rising, (k,).
     force : of the axles at these slips [N], (2, k).
     """
-    first = min(int(np.searchsorted(alpha, SMALL)), alpha.size - 1)
+    first = min(int(np.searchsorted(alpha, CHOSEN.small)), alpha.size - 1)
     stiffness, peak = force[:, first] / alpha[first], np.abs(force).max(axis=1)
     if not (stiffness > 0.0).all():
         raise CurveFitError(f"force must rise with slip at zero, its slope is {stiffness} N/rad")
-    narrowest = NARROWEST * float((peak / stiffness).min())
-    ladder = np.array([narrowest * 2.0**j for j in range(UNITS)])
+    narrowest = CHOSEN.narrowest * float((peak / stiffness).min())
+    ladder = np.array([narrowest * 2.0**j for j in range(CHOSEN.units)])
     T = np.tanh(alpha[:, None] / ladder)
-    W = np.empty((2, UNITS))
+    W = np.empty((2, CHOSEN.units))
     for i, name in enumerate(("front", "rear")):
         W[i] = np.linalg.lstsq(T, force[i], rcond=None)[0]
         error = np.abs(T @ W[i] - force[i]).max() / peak[i]
-        if not error <= WORST:
+        if not error <= CHOSEN.worst:
             raise CurveFitError(
                 f"the {name} force curve is fitted to {100 * error:.2g} % of its peak only"
             )
@@ -232,8 +223,6 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
 # where tires make less of it. So F_i(α) is the solution of F = Σ tires(α; loads and camber at F).
 
 SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
-LARGEST_SLIP = 0.5  # rad, where the table ends; less where friction is low
-HALVINGS = 50
 
 
 def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> PredictionTire:
@@ -247,7 +236,7 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     """
     chassis = vehicle.require_chassis()
     tire = tire_of(vehicle) if tire is None else tire
-    alpha = slip_grid(LARGEST_SLIP * min(mu, 1.0))
+    alpha = slip_grid(CHOSEN.largest_slip * min(mu, 1.0))
     grid = np.concatenate([[0.0], alpha])
     force = np.stack([cornering_force(vehicle, tire, axle, grid, mu) for axle in (0, 1)])
     force = force[:, 1:] - force[:, :1]  # wheels that are not mirrored push at zero slip, too
@@ -259,7 +248,7 @@ def mounted_tire(vehicle: Vehicle, tire: Tire, rear: Tire | None = None) -> Pred
     """Return two tires an axle at its static load, without lag.
     vehicle : the car; it needs no chassis.   rear : tire of the rear axle; None takes the same.
     """
-    alpha = slip_grid(LARGEST_SLIP)
+    alpha = slip_grid(CHOSEN.largest_slip)
     x = ca.SX.sym("alpha")
     force = []
     for one, load in zip((tire, tire if rear is None else rear), vehicle.axle_loads, strict=True):
@@ -282,7 +271,9 @@ def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: f
     camber = (c.roll_camber_front, c.roll_camber_rear)[axle] * roll
     made = ca.Function("axle", [x, F], [_both_sides(tire, x, camber, ca.vertsplit(loads), mu)])
     low, high = np.zeros_like(alpha), np.full_like(alpha, 3.0 * max(mu, 1.0) * vehicle.weight)
-    for _ in range(HALVINGS):  # more side force shifts more load, and less is made: one solution
+    for _ in range(
+        CHOSEN.halvings
+    ):  # more side force shifts more load, and less is made: one solution
         middle = 0.5 * (low + high)
         more = np.array(made(alpha[None], middle[None])).ravel() > middle
         low, high = np.where(more, middle, low), np.where(more, high, middle)

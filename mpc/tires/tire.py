@@ -13,6 +13,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.vehicle import Vehicle
+from mpc.tires.chosen import CHOSEN
 
 Pair: TypeAlias = tuple[Any, Any]  # front, rear: SX expressions or numbers
 
@@ -110,11 +111,6 @@ class SmallSlip(TireStructure):
         return delta - (v_y + car.l_f * r) * per_speed, -(v_y - car.l_r * r) * per_speed
 
 
-N_DOUBTS = 26
-DOUBT_STEP = 0.02  # rad
-_RELATIVE, _FLOOR = 0.066, 0.016  # half a band of 90 % of what a learnt tire misses at best
-
-
 class PredictionTire(NamedTuple):
     """A structure with its weights (n_weights,), and the car that they are of.
     doubt : half the band of 90 % of the axle forces at slips 0, 0.02, … 0.5 rad [N], (2, 26); None
@@ -135,9 +131,9 @@ class PredictionTire(NamedTuple):
         """Return the doubt (2, 26) [N]; where none is given, that of a tire learnt well."""
         if self.doubt is not None:
             return self.doubt
-        slip = DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)
-        floor = _FLOOR * np.array(self.vehicle.axle_loads)[:, None]
-        return np.hypot(_RELATIVE * curves_at(self, slip), floor)
+        slip = CHOSEN.doubt_step * np.arange(CHOSEN.n_doubts, dtype=np.float64)
+        floor = CHOSEN.floor * np.array(self.vehicle.axle_loads)[:, None]
+        return np.hypot(CHOSEN.relative * curves_at(self, slip), floor)
 
 
 # How far slip is of use, and what the tracker believes beyond: a curve that goes on rising.
@@ -147,10 +143,7 @@ class PredictionTire(NamedTuple):
 # there. So it believes F(x) + rise (α - x) beyond the slip x that is of use: more slip never gives
 # less.
 
-_FLAT = 0.05  # of the slope at zero: the peak is reached within a per cent or two of its force
-LEAST_RISE = 0.04  # of the slope at zero; a little less than where slip ends to be of use
 SLIPS = np.linspace(0.0, 0.5, 251)  # rad
-_SPEED = 15.0  # m/s; curves of slip do not depend on it, but where the car has downforce
 
 
 class ValidSlip(NamedTuple):
@@ -175,7 +168,7 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
     slopes = curve_slopes(tire)
     slip = np.minimum(most, _useful(slopes))
     there = [np.interp(x, SLIPS, axle) for x, axle in zip(slip, slopes, strict=True)]
-    return ValidSlip(slip, np.maximum(np.maximum(there, LEAST_RISE * slopes[:, 0]), 0.0))
+    return ValidSlip(slip, np.maximum(np.maximum(there, CHOSEN.least_rise * slopes[:, 0]), 0.0))
 
 
 def curves_at(tire: PredictionTire, slip: Array) -> Array:
@@ -183,7 +176,7 @@ def curves_at(tire: PredictionTire, slip: Array) -> Array:
     slip : of both axles [rad], (k,).
     """
     x = ca.SX.sym("slip")
-    at = Point(0.0, 0.0, 0.0, _SPEED, Car(*tire.car), ca.SX(tire.weights))
+    at = Point(0.0, 0.0, 0.0, CHOSEN.speed, Car(*tire.car), ca.SX(tire.weights))
     force = ca.densify(ca.vertcat(*tire.structure.force((x, x), at)))
     return np.array(ca.Function("curves", [x], [force])(slip[None]))
 
@@ -230,7 +223,7 @@ def _extrapolated_force(
 
 
 def _useful(slopes: Array) -> Array:
-    flat = slopes < _FLAT * slopes[:, :1]
+    flat = slopes < CHOSEN.flat * slopes[:, :1]
     found = np.where(flat.any(axis=1), SLIPS[flat.argmax(axis=1)], np.inf)
     return np.where(slopes[:, 0] > 0.0, found, np.inf)
 
@@ -239,7 +232,7 @@ def _useful(slopes: Array) -> Array:
 def _slopes(structure: TireStructure) -> ca.Function:
     """Return dF/dα (2, k) of slips (1, k), straight ahead."""
     slip, w, numbers = ca.SX.sym("slip"), ca.SX.sym("w", structure.n_weights), ca.SX.sym("car", 4)
-    at = Point(0.0, 0.0, 0.0, _SPEED, Car(*ca.vertsplit(numbers)), w)
+    at = Point(0.0, 0.0, 0.0, CHOSEN.speed, Car(*ca.vertsplit(numbers)), w)
     force = ca.vertcat(*structure.force((slip, slip), at))
     slope = ca.Function("slope", [slip, numbers, w], [ca.densify(ca.jacobian(force, slip))])
     return slope.map(SLIPS.size, [False, True, True], [False])

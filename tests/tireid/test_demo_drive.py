@@ -26,7 +26,7 @@ def story():
 @pytest.fixture
 def quick(monkeypatch, undrawn):
     """Short films and empty pictures: both have tests of their own."""
-    monkeypatch.setattr(frames, "MOST", 4)
+    monkeypatch.setattr(frames, "CHOSEN", frames.CHOSEN._replace(most=4))
 
 
 def test_learnt_tires_steer_as_the_true_ones_and_learning_stays_on_the_road(story, tmp_path, quick):

@@ -14,6 +14,7 @@ from mpc.loop.record import Drive, Plan
 from mpc.path import Path
 from tireid.animation import film as frames
 from tireid.animation import write_film
+from tireid.animation.chosen import CHOSEN as ANIMATION_CHOSEN
 from tireid.animation.ground import Camera
 from tireid.animation.known import KnownCurves
 from tireid.animation.scene import Scene
@@ -167,7 +168,7 @@ def test_the_camera_sees_what_is_ahead_to_the_right_and_left_above():
     ids=["lane", "course", "gif"],
 )
 def test_the_film_is_crisp_and_small_and_moves(drives, kind, frame_bytes, tmp_path, monkeypatch):
-    monkeypatch.setattr(frames, "MOST", 6)
+    monkeypatch.setattr(frames, "CHOSEN", frames.CHOSEN._replace(most=6))
     file = tmp_path / f"drive.{kind}"
     write_film(file, drives, CURVES, title="made up")
     with Image.open(file) as film:
@@ -175,18 +176,20 @@ def test_the_film_is_crisp_and_small_and_moves(drives, kind, frame_bytes, tmp_pa
         assert film.info["loop"] == 0
         assert film.size == (960, 600)
     assert file.stat().st_size < frame_bytes * len(pictures)
-    assert len(pictures) >= frames.MOST  # what stays at the end may be one picture that is held
-    for before, after in pairwise(pictures[: frames.MOST]):
+    assert (
+        len(pictures) >= ANIMATION_CHOSEN.most
+    )  # what stays at the end may be one picture that is held
+    for before, after in pairwise(pictures[: ANIMATION_CHOSEN.most]):
         assert (before != after).any()
 
 
 def test_the_last_picture_is_held(tmp_path, monkeypatch):
-    monkeypatch.setattr(frames, "MOST", 2)
+    monkeypatch.setattr(frames, "CHOSEN", frames.CHOSEN._replace(most=2))
     file = tmp_path / "drive.gif"
     write_film(file, ON_LANE, CURVES, title="made up")
     with Image.open(file) as film:
         last = [frame.info["duration"] for frame in ImageSequence.Iterator(film)][-1]
-    assert last >= 1000.0 / frames.RATE * frames.HOLD
+    assert last >= 1000.0 / ANIMATION_CHOSEN.rate * ANIMATION_CHOSEN.hold
 
 
 GROWN = np.linspace(0.2, 1.0, 11)

@@ -438,7 +438,9 @@ def test_a_store_is_sorted_in_rounds_and_emptied_row_by_row(store, tmp_path, mon
     for out in (whole, parts):
         for row in rows:
             out.keep([row])
-        monkeypatch.setattr(storing, "AT_ONCE", 2 if out is parts else 1000)
+        monkeypatch.setattr(
+            storing, "CHOSEN", storing.CHOSEN._replace(at_once=2 if out is parts else 1000)
+        )
         out.settle()
     assert digest(tmp_path / "a") == digest(tmp_path / "b") == digest(store)
     parts.drop(rows[:3])
@@ -576,7 +578,9 @@ def test_a_store_lies_at_any_address_and_each_portion_costs_one_request(store, m
         assert asked.count("pipe_file") == buckets and asked.count("cat_file") == 3
         assert asked.count("ls") <= 2 and "makedirs" not in asked and "mv" not in asked
         assert away.rows() == rows
-        monkeypatch.setattr(storing, "SMALL", 0)  # then what is asked for is fetched alone
+        monkeypatch.setattr(
+            storing, "CHOSEN", storing.CHOSEN._replace(small=0)
+        )  # then what is asked for is fetched alone
         assert away.rows(("log", "vector")) == Store(store).rows(("log", "vector"))
     finally:
         away._place[0].rm("/fleet", recursive=True)

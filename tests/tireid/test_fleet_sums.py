@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.estimate.information import GRID, SIZE, Information, coordinates
+from identifier.estimate.chosen import CHOSEN as ESTIMATE_CHOSEN
+from identifier.estimate.information import SIZE, Information, coordinates
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import settled
 from identifier.frozen import vehicle_numbers
 from identifier.motion.parameters import INDEX
 from models.vehicle import sedan
+from tireid.fleet.chosen import CHOSEN as FLEET_CHOSEN
 from tireid.fleet.merge import (
-    _APART,
     _CHANGES,
-    _PASSES,
     _TIRES,
     MergeError,
     _key_of,
@@ -119,7 +119,7 @@ def test_a_merged_model_is_the_optimum_of_prior_and_logs():
     assert (one.name, one.logs, one.elsewhere) == (f"{CAR.name} 2026-01 ann", 3, 0)
     assert merged(rows, [])[0].name == "all"
     beliefs, model = Priors.of(CAR), one.model
-    sd = _APART * beliefs.sd[[INDEX[name] for name in _CHANGES]]
+    sd = FLEET_CHOSEN.apart * beliefs.sd[[INDEX[name] for name in _CHANGES]]
 
     def cost(p):
         """Over each log's own errors of sensors, the least."""
@@ -153,7 +153,7 @@ def test_a_log_of_a_wet_road_does_not_lower_the_grip_of_the_others():
     wet = row_of(4, [told_of(tires(friction=0.5), rng, noise=1.0)])
     (alone,), (both,) = merged(dry, []), merged([*dry, wet], [])
     assert (alone.elsewhere, both.elsewhere, both.logs) == (0, 1, 5)
-    far = GRID.index(0.19)
+    far = ESTIMATE_CHOSEN.grid.index(0.19)
     alone, both = (coordinates(one.model.p)[0][far] for one in (alone, both))
     assert both == pytest.approx(alone, rel=0.03)
     told = sum((row.parts[0] for row in [*dry, wet]), Information.nothing())
@@ -228,7 +228,7 @@ def test_a_fleets_prior_is_where_expectation_and_maximization_rest():
         vector = matrix @ one.model.p[_TIRES] - slope[_TIRES]
         known.append((matrix * np.outer(sizes(car), sizes(car)), vector * sizes(car)))
     m, T = m0, S0
-    for _ in range(_PASSES):
+    for _ in range(FLEET_CHOSEN.passes):
         P = [np.linalg.inv(np.linalg.inv(T) + matrix) for matrix, _ in known]
         means = [one @ (np.linalg.solve(T, m) + v) for one, (_, v) in zip(P, known, strict=True)]
         M = np.linalg.inv(5.0 * np.linalg.inv(T) + np.linalg.inv(S0))

@@ -14,7 +14,7 @@ from tireid.commands.plan import _parse_area, _parse_speed
 
 @pytest.fixture(autouse=True)
 def brief(monkeypatch):
-    monkeypatch.setattr(search, "GENERATIONS", 4)
+    monkeypatch.setattr(search, "CHOSEN", search.CHOSEN._replace(generations=4))
 
 
 def plan(out, *words):

@@ -12,17 +12,12 @@ from matplotlib.animation import AbstractMovieWriter, FFMpegWriter, PillowWriter
 
 from codegen.writing import naming
 from mpc.loop.record import Drive
+from tireid.animation.chosen import CHOSEN
 from tireid.animation.known import KnownCurves
 from tireid.animation.scene import Scene
 from tireid.figures.style import LOOK
 from tireid.figures.tires import TireCurve
 from tireid.progress import say
-
-RATE = 10.0  # frames a second; a GIF counts in hundredths of a second
-MOST = 120  # frames: what stays small and quick to draw
-HOLD = 12  # frames for which the last picture stays
-_DOTS = 150  # an inch
-_QUALITY = 45  # of a WebP, to 100
 
 
 def require_ffmpeg() -> str:
@@ -52,18 +47,18 @@ def write_film(
     """
     first = next(iter(drives.values()))
     duration = float(first.t[-1] - first.t[0])
-    instants = np.linspace(0.0, duration, min(MOST, max(2, round(RATE * duration))))
-    pace = RATE * duration / instants.size  # seconds of the drive a second of the film
+    instants = np.linspace(0.0, duration, min(CHOSEN.most, max(2, round(CHOSEN.rate * duration))))
+    pace = CHOSEN.rate * duration / instants.size  # seconds of the drive a second of the film
     scene = Scene(drives, curves, drops=drops, pace=pace, title=title, known=known)
     writer = _writer(file)
     try:
-        with style.context(["default", LOOK]), writer.saving(scene.figure, str(file), _DOTS):
+        with style.context(["default", LOOK]), writer.saving(scene.figure, str(file), CHOSEN.dots):
             for number, t in enumerate(instants, start=1):
                 scene.show(float(t))
                 writer.grab_frame()
                 if number == len(instants) or number % 50 == 0:
                     say(f"film: frame {number} of {len(instants)}")
-            for _ in range(HOLD):
+            for _ in range(CHOSEN.hold):
                 writer.grab_frame()
     except CalledProcessError as error:
         said = str(error.stderr or error).strip().splitlines()
@@ -77,17 +72,17 @@ class _WebpWriter(PillowWriter):
 
     def finish(self) -> None:
         first, *others = self._frames
-        words: dict[str, Any] = {"quality": _QUALITY, "minimize_size": True, "loop": 0}
-        time = round(1000.0 / RATE)
+        words: dict[str, Any] = {"quality": CHOSEN.quality, "minimize_size": True, "loop": 0}
+        time = round(1000.0 / CHOSEN.rate)
         with naming(self.outfile):
             first.save(self.outfile, save_all=True, append_images=others, duration=time, **words)
 
 
 def _writer(file: FilePath) -> AbstractMovieWriter:
     if file.suffix == ".webp":
-        return _WebpWriter(fps=RATE)  # type: ignore[arg-type]
+        return _WebpWriter(fps=CHOSEN.rate)  # type: ignore[arg-type]
     if file.suffix == ".gif":
-        return PillowWriter(fps=RATE)  # type: ignore[arg-type]
+        return PillowWriter(fps=CHOSEN.rate)  # type: ignore[arg-type]
     require_ffmpeg()
     words = ["-pix_fmt", "yuv420p", "-movflags", "+faststart"]
-    return FFMpegWriter(fps=RATE, extra_args=words)  # type: ignore[arg-type]
+    return FFMpegWriter(fps=CHOSEN.rate, extra_args=words)  # type: ignore[arg-type]

@@ -11,12 +11,11 @@ from matplotlib.collections import LineCollection, PolyCollection
 from codegen.arrays import Array
 from mpc.loop.record import Drive
 from mpc.path import Path
+from tireid.animation.chosen import CHOSEN
 from tireid.figures.drive import CONES, PATH, car_shape, friction_label, tire_look
 from tireid.figures.style import PURPLE
 
 _WINDING = np.radians(75.0)  # a path that turns farther than this is shown turned to the right
-_LOOK_BACK, _LOOK_AHEAD = 8.0, 22.0  # stretch whose mean heading is the direction of view [m]
-_LEVEL = 9.0  # a straight path whose sides are this close [m] is not followed sidewards
 
 
 class _View(NamedTuple):
@@ -52,7 +51,9 @@ class Camera:
         self._angle = float(np.mean(path.psi))
         still = _View(np.array([path.X[0], path.Y[0]]), self._angle)
         sides = still.see(np.column_stack([path.X, path.Y]))[:, 1]
-        self._middle = 0.5 * float(sides.min() + sides.max()) if np.ptp(sides) < _LEVEL else None
+        self._middle = (
+            0.5 * float(sides.min() + sides.max()) if np.ptp(sides) < CHOSEN.level else None
+        )
 
     def at(self, s: float) -> _View:
         """Return the view of a car.
@@ -62,7 +63,7 @@ class Camera:
         X, Y, _ = self._path.pose(s)
         center = np.array([float(X), float(Y)])
         if self._winding:
-            stretch = np.linspace(s - _LOOK_BACK, s + _LOOK_AHEAD, 24)
+            stretch = np.linspace(s - CHOSEN.look_back, s + CHOSEN.look_ahead, 24)
             return _View(center, float(np.mean(self._path.pose(stretch)[2])))
         if self._middle is None:
             return _View(center, self._angle)
@@ -73,18 +74,10 @@ class Camera:
         return _View(start + np.array([along, self._middle]) @ ground, self._angle)
 
 
-# What covers what: the ground below, then ghosts, the car, its plan and its forces.
-_BELOW, _GHOST, _CAR, _ABOVE = 0.5, 2.0, 3.0, 4.0
-
 _PLAN = "#333333"
 _DROP: Mapping[str, Any] = {"color": "#AA4499", "linewidth": 1.6, "linestyle": (0, (3, 1.5))}
-_HALF_ROAD = 4.0  # [m]
-_GRID = 5.0  # [m]
-_SHOWN = 60.0  # of the path, to both sides of the car [m]
-_FORCE_LENGTH = 4.0  # of the arrow that is as long as the static load of the axle [m]
 _ARROW = np.array([(0.0, 0.1), (0.0, -0.1), (1.0, -0.1), (1.0, -0.42), (1.7, 0.0), (1.0, 0.42),
                   (1.0, 0.1)])  # fmt: skip
-_SMALLEST = 0.15  # an arrow that would be shorter is left out [m]
 
 
 class Ground:
@@ -103,16 +96,16 @@ class Ground:
         self._plan_at = np.array([plan.period for plan in plans])
         self._plan_lines = [np.column_stack(plan.line(path)) for plan in plans]
         self._room = 1.1 * np.hypot(*(np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())))
-        self._grid = LineCollection([], colors="#E2E2DA", linewidths=0.8, zorder=_BELOW)
+        self._grid = LineCollection([], colors="#E2E2DA", linewidths=0.8, zorder=CHOSEN.below)
         axes.add_collection(self._grid)
-        (self._line,) = axes.plot([], [], zorder=_BELOW, **PATH)
+        (self._line,) = axes.plot([], [], zorder=CHOSEN.below, **PATH)
         (self._cones,) = axes.plot([], [], zorder=1.0, **{**CONES, "markersize": 4.5})
         across = [(_across(path, s), {**_DROP, "label": friction_label(mu)}) for s, mu in drops]
         self._drops = [(ends, axes.plot([], [], **look)[0]) for ends, look in across]
         self._tracks, self._bodies, self._wheels = [], [], []
         for number, label in enumerate(drives):
             color = tire_look(label)["color"]
-            order = _CAR if number == 0 else _GHOST - 0.1 * number
+            order = CHOSEN.car if number == 0 else CHOSEN.ghost - 0.1 * number
             self._tracks += axes.plot([], [], color=color, linewidth=1.4, alpha=0.8, zorder=order)
             faces = [(color, 0.5), (color, 0.95)] if number == 0 else [(color, 0.12)]
             edge: Mapping[str, Any] = {"edgecolors": color, "linewidths": 1.2}
@@ -124,8 +117,10 @@ class Ground:
             self._bodies.append(body)
             self._wheels.append(wheels)
         look: Mapping[str, Any] = {"color": _PLAN, "linewidth": 1.3, "marker": "o", "ms": 2.2}
-        (self._plan,) = axes.plot([], [], zorder=_ABOVE, **look)
-        self._forces = PolyCollection([], facecolors=PURPLE, edgecolors="none", zorder=_ABOVE + 1)
+        (self._plan,) = axes.plot([], [], zorder=CHOSEN.above, **look)
+        self._forces = PolyCollection(
+            [], facecolors=PURPLE, edgecolors="none", zorder=CHOSEN.above + 1
+        )
         axes.add_collection(self._forces)
         self._names = ["path", "plan", *drives]
 
@@ -138,7 +133,7 @@ class Ground:
     def show(self, now: Instant) -> None:
         drive, (k, t, view) = self._drives[0], now
         self._grid.set_segments(self._grid_lines(view))
-        around = drive.s[k] + np.linspace(-_SHOWN, _SHOWN, 121)
+        around = drive.s[k] + np.linspace(-CHOSEN.shown, CHOSEN.shown, 121)
         if not self._path.closed:
             around = np.clip(around, 0.0, self._path.length)
         X, Y, _ = self._path.pose(around)
@@ -172,8 +167,8 @@ class Ground:
         place = np.array([drive.X[k], drive.Y[k]])
         arrows = []
         for axle, x in enumerate((car.l_f, -car.l_r)):
-            length = _FORCE_LENGTH * drive.axle_force[k, axle] / car.axle_loads[axle]
-            if abs(length) < _SMALLEST:
+            length = CHOSEN.force_length * drive.axle_force[k, axle] / car.axle_loads[axle]
+            if abs(length) < CHOSEN.smallest:
                 continue
             head = _ARROW.copy()
             shaft = max(abs(length) - 0.7, 0.01)
@@ -188,7 +183,10 @@ class Ground:
         lines = []
         for axis in (0, 1):
             low, high = view.center[axis] - reach, view.center[axis] + reach
-            for at in np.arange(np.ceil(low / _GRID), np.floor(high / _GRID) + 1.0) * _GRID:
+            for at in (
+                np.arange(np.ceil(low / CHOSEN.grid), np.floor(high / CHOSEN.grid) + 1.0)
+                * CHOSEN.grid
+            ):
                 ends = np.empty((2, 2))
                 ends[:, axis] = at
                 ends[:, 1 - axis] = view.center[1 - axis] + np.array([-1.5, 1.5]) * reach
@@ -199,7 +197,7 @@ class Ground:
 def _across(path: Path, s: float) -> Array:
     """Ends of a line across the path at a place, (2, 2) [m]."""
     X, Y, psi = (float(value) for value in path.pose(s))
-    sides = _HALF_ROAD * np.array([[1.0], [-1.0]])
+    sides = CHOSEN.half_road * np.array([[1.0], [-1.0]])
     ends: Array = np.array([X, Y]) + sides * np.array([-np.sin(psi), np.cos(psi)])
     return ends
 

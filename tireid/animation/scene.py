@@ -18,6 +18,7 @@ from matplotlib.ticker import MaxNLocator
 from codegen.arrays import Array
 from codegen.escape import mathtext
 from mpc.loop.record import Drive
+from tireid.animation.chosen import CHOSEN
 from tireid.animation.ground import Camera, Ground, Instant, sample_at
 from tireid.animation.known import KnownCurves
 from tireid.figures.drive import AT_THE_END, ORACLE, mark_drops, tire_look
@@ -34,9 +35,6 @@ from tireid.figures.style import (
 )
 from tireid.figures.tires import TireCurve, axle_slip
 
-_TAIL = 80  # samples
-_SMALL = 7.0  # points of the text
-_MANY = 9  # entries of a legend that one row does not hold
 _STEERING: Mapping[str, Any] = {"color": BLUE, "linewidth": 1.5, "label": "steered by, now"}
 _LEARNT: Mapping[str, Any] = {"color": SKY, "linewidth": 2.6, "label": "identified so far"}
 
@@ -85,7 +83,7 @@ class _ForcePanel:
                 axes.add_patch(patch)
         axes.set(xlim=(-self._reach, self._reach), ylim=self._limits)
         if axle == 0:
-            axes.set_ylabel(f"force [{self._unit.name}]", fontsize=_SMALL, labelpad=1.0)
+            axes.set_ylabel(f"force [{self._unit.name}]", fontsize=CHOSEN.small, labelpad=1.0)
         else:
             axes.tick_params(labelleft=False)
         _small(axes, AXLES[axle], "slip [deg]")
@@ -98,7 +96,7 @@ class _ForcePanel:
         return marks, names
 
     def show(self, now: Instant) -> None:
-        part = slice(max(0, now.k - _TAIL), now.k + 1)
+        part = slice(max(0, now.k - CHOSEN.tail), now.k + 1)
         self._tail.set_data(self._alpha[part], self._force[part])
         self._now.set_data(self._alpha[now.k : now.k + 1], self._force[now.k : now.k + 1])
         dropped = float(self._drive.s[now.k]) >= self._drop
@@ -182,15 +180,11 @@ class _Overview:
 
 
 def _small(axes: Axes, title: str, label: str) -> None:
-    axes.set_title(title, fontsize=_SMALL + 0.5)
-    axes.set_xlabel(label, fontsize=_SMALL, labelpad=1.0)
-    axes.tick_params(labelsize=_SMALL - 0.5, pad=1.5)
+    axes.set_title(title, fontsize=CHOSEN.small + 0.5)
+    axes.set_xlabel(label, fontsize=CHOSEN.small, labelpad=1.0)
+    axes.tick_params(labelsize=CHOSEN.small - 0.5, pad=1.5)
     axes.xaxis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(nbins=4, steps=[1, 2, 5, 10]))
-
-
-_SIZE = (6.4, 4.0)  # [in]
-_BEHIND, _AHEAD = 12.0, 36.0  # what is shown along the path [m]
 
 
 class Scene:
@@ -216,13 +210,13 @@ class Scene:
         path, self._drive, self._pace = first.path, first, pace
         self._camera = Camera(path)
         with style.context(["default", LOOK]):
-            self.figure = Figure(figsize=_SIZE)
+            self.figure = Figure(figsize=CHOSEN.size)
             FigureCanvasAgg(self.figure)
-            width, height = _SIZE
+            width, height = CHOSEN.size
             box = (0.0, 0.43, 1.0, 0.5)
             ground = self.figure.add_axes(box, xticks=[], yticks=[], frame_on=False)
-            half = 0.5 * (_BEHIND + _AHEAD) * box[3] * height / width
-            ground.set(xlim=(-_BEHIND, _AHEAD), ylim=(-half, half), facecolor="#F6F6F2")
+            half = 0.5 * (CHOSEN.behind + CHOSEN.ahead) * box[3] * height / width
+            ground.set(xlim=(-CHOSEN.behind, CHOSEN.ahead), ylim=(-half, half), facecolor="#F6F6F2")
             self._parts: list[Any] = [Ground(ground, drives, drops)]
             add = self.figure.add_axes
             if path.closed:
@@ -239,7 +233,7 @@ class Scene:
             look: Mapping[str, Any] = {
                 **{"fontsize": 7.0, "handlelength": 1.5, "handletextpad": 0.5},
                 **{"columnspacing": 1.1, "loc": "center", "bbox_to_anchor": (0.5, 0.388)},
-                "ncols": entries if entries < _MANY else (entries + 1) // 2,
+                "ncols": entries if entries < CHOSEN.many else (entries + 1) // 2,
             }
             self.figure.legend([*marks, *more], [*names, *said], **look)
             mono: Mapping[str, Any] = {"family": "DejaVu Sans Mono", "fontsize": 7.5}

@@ -21,14 +21,13 @@ from models.recordings.assembly import wheel_scales, wheel_units
 from models.recordings.map import CUT
 from models.recordings.wheels import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
+from tireid.commands.chosen import CHOSEN
 from tireid.commands.options import add_force, add_log_map, given_map, require_toml
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
-_MOST_NUMBERS = 5e7  # that are read for ranges; of a larger log only those of likely channels
 _CUT_BY_MAP = "rejected without --cut-holes or a map with that key, as of --write"
 _NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
-_LONGEST_NAME = 48  # letters of a channel in the table
 
 
 def add_parser(commands: Any) -> None:
@@ -132,7 +131,7 @@ def _seen(
     log: LogFile, listed: Sequence[Listed], signals: Mapping[str, Signal], run: str | None
 ) -> dict[str, Channel]:
     names = [one.name for one in listed]
-    if sum(one.samples for one in listed) > _MOST_NUMBERS:
+    if sum(one.samples for one in listed) > CHOSEN.most_numbers:
         likely = {channel for signal in signals.values() for channel in signal.channel}
         names = [name for name in names if name in likely]
     return dict(zip(names, log.read(names, run), strict=True)) if names else {}
@@ -155,7 +154,7 @@ def _channels_text(
             samples = int(np.count_nonzero(~np.isnan(channel.values)))
             low, high = (f"{end:.4g}" for end in (finite.min(), finite.max())) if finite.size else (
                 "empty", "")  # fmt: skip
-        name = visible(one.name if len(one.name) <= _LONGEST_NAME else f"{one.name[:44]}...")
+        name = visible(one.name if len(one.name) <= CHOSEN.longest_name else f"{one.name[:44]}...")
         rate = "?" if math.isnan(one.rate) else f"{one.rate:.4g}"
         meant = _meaning(one, signals, proposal, known)
         rows.append([name, visible(one.unit), rate, str(samples), low, high, meant])

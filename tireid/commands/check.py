@@ -14,14 +14,8 @@ from identifier.driving import BANDWIDTH, Driving, natural_driving
 from identifier.frozen import vehicle_numbers
 from identifier.method import Method
 from identifier.methods import LIVE, REFERENCE, certify
-from identifier.paper.design import (
-    PHASE_MARGIN,
-    VARIANTS,
-    PaperIdentifier,
-    design_for,
-    design_text,
-    with_keeping,
-)
+from identifier.paper.chosen import CHOSEN as PAPER_CHOSEN
+from identifier.paper.design import VARIANTS, PaperIdentifier, design_for, design_text, with_keeping
 from identifier.paper.laws import LAWS, Gains
 from identifier.run import History, identify
 from identifier.stability import Certificate, DesignError, Operation
@@ -115,7 +109,7 @@ def add_parser(commands: Any) -> None:
         "--noise-v-y M/S": "largest error of v-y",
         "--noise-r RAD/S": "largest error of r",
         "--noise-delta RAD": "largest error of delta",
-        "--phase-margin DEG": f"for --tune ({PHASE_MARGIN:g} deg)",
+        "--phase-margin DEG": f"for --tune ({PAPER_CHOSEN.phase_margin:g} deg)",
     }
     shared.add_options(parser, float, numbers)
     parser.add_argument("--along", metavar="LOG[:RUN]", help="judge a recorded run too")
@@ -196,7 +190,7 @@ def _method(options: argparse.Namespace, vehicle: Vehicle) -> tuple[str, Method]
     if VARIANTS[law].scaled:
         raise ValueError("--method instantaneous_scaled is a control, tune one of the others")
     driving = replace(natural_driving(vehicle), **_overrides(options))
-    margin = options.phase_margin or PHASE_MARGIN
+    margin = options.phase_margin or PAPER_CHOSEN.phase_margin
     found = design_for(vehicle, driving, law=law, phase_margin=margin)
     known = found.operation(vehicle, driving)
     return law, with_keeping(found, known, options.keep or DEFAULT_KEEPING)

@@ -10,7 +10,7 @@ from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.drive_case import ALL, conditions_of, frozen_tires, labels_of
 from tireid.driving import runs as driving
-from tireid.driving.learn import DURATION
+from tireid.driving.chosen import CHOSEN as DRIVING_CHOSEN
 from tireid.driving.results import NO_FILM, Drives, headline, write_drive_report
 from tireid.output import output_folder
 from tireid.progress import say, tell
@@ -18,7 +18,8 @@ from tireid.progress import say, tell
 _NOT_COMPLETED = 1
 _EPILOG = (
     "Without --weights or --network, frozen tires are identified first: the same car drives on "
-    f"an open field for {DURATION:g} s, steered at random and ever harder until it slides, and "
+    f"an open field for {DRIVING_CHOSEN.duration:g} s, steered at random and ever harder until it "
+    f"slides, and "
     "the tires at the end are used. linear is the tire of the vehicle file, oracle the true tire "
     "of the plant, learning begins with the frozen tires and updates them while driving. Exit "
     "code 0 where the first of the cars reached the end of the path, else 1."

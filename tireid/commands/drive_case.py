@@ -25,8 +25,9 @@ from tireid.commands.options import (
     stored_model,
 )
 from tireid.driving import runs
+from tireid.driving.chosen import CHOSEN as DRIVING_CHOSEN
 from tireid.driving.learn import learning_drive
-from tireid.driving.setup import FRICTIONS, Setup, SpeedWish
+from tireid.driving.setup import Setup, SpeedWish
 from tireid.learning import identify
 from tireid.progress import Progress
 from tireid.verdicts import warn_of
@@ -69,7 +70,7 @@ def _parse_drop(text: str) -> tuple[float, float]:
         raise ValueError(f"--mu-drop wants S:MU, arc length [m] and friction, not {text!r}")
     if not (math.isfinite(s) and s >= 0.0):
         raise ValueError(f"--mu-drop: the place must not be negative, it is {s:g} m")
-    require_within(ValueError, *FRICTIONS, **{"friction of --mu-drop": mu})
+    require_within(ValueError, *DRIVING_CHOSEN.frictions, **{"friction of --mu-drop": mu})
     return s, mu
 
 
@@ -111,7 +112,7 @@ def labels_of(words: Sequence[str]) -> list[str]:
 def conditions_of(options: argparse.Namespace) -> runs.Conditions:
     if not 0.0 < options.laps <= 100.0:
         raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
-    require_within(ValueError, *FRICTIONS, **{"--mu": options.mu})
+    require_within(ValueError, *DRIVING_CHOSEN.frictions, **{"--mu": options.mu})
     require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
     path = _named_path(options.path)
     if options.laps != 1.0 and not path.closed:

@@ -23,7 +23,8 @@ from tireid.commands.options import (
     stored_model,
 )
 from tireid.exchange import ClaimedError, claim
-from tireid.fleet.learn import PART, Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
+from tireid.fleet.chosen import CHOSEN as FLEET_CHOSEN
+from tireid.fleet.learn import Telling, find_logs, learn_fleet, on_a_cluster, on_this_machine
 from tireid.fleet.merge import BY, COLUMNS, Merged, fleet_prior, merge, usable
 from tireid.fleet.store import LogRow, Store, StoreError
 from tireid.fleet.watch import Watching, watch
@@ -90,7 +91,7 @@ def _add_learn(tasks: Any) -> None:
     text = "verdict of each log: does the model reproduce its motion, or none (%(default)s)"
     parser.add_argument("--judge", help=text, **judging)
     text = "longest piece of a log in one row [s] (%(default)g)"
-    add_options(parser, float, {"--part S": (PART, text)})
+    add_options(parser, float, {"--part S": (FLEET_CHOSEN.part, text)})
     flags = {
         "--again": "also identify logs whose row has an error",
         "--replace": "remove earlier rows of these logs from the store: another car "

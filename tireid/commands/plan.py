@@ -13,22 +13,20 @@ from matplotlib.figure import Figure
 from codegen.arrays import Array
 from identifier.frozen import vehicle_numbers
 from identifier.plan import STEERING_LAG, Plan, Rehearsal, Rival, hold_of
-from identifier.plan.search import REAR
+from identifier.plan.chosen import CHOSEN as PLAN_CHOSEN
 from models.files import digest
 from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
 from tireid import __version__, planning
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
+from tireid.commands.chosen import CHOSEN
 from tireid.figures.plan import plan_area_figure, plan_band_figure, plan_steering_figure
 from tireid.figures.style import save_figures
 from tireid.output import output_folder, text_table, write_csv, write_json
 from tireid.progress import Progress, say, tell
 from tireid.report import Headline, Paragraph, Report, Section, Table, write_report
 from tireid.reports.common import READ, REPORT, drawing, origin
-
-_PERIOD = 0.01  # s, of steering.csv
-_RUN_UP = 1.0  # s straight ahead, before each pass
 
 
 def add_parser(commands: Any) -> None:
@@ -123,7 +121,7 @@ def _require_ranges(options: argparse.Namespace) -> None:
     """Refuse by their words, in the units of the command, what no plan is made with."""
     for word, low, high in (
         ("--mu", 0.05, 3.0),
-        ("--grip", 20.0, 100.0 * REAR),
+        ("--grip", 20.0, 100.0 * PLAN_CHOSEN.rear),
         ("--margin", 0.0, 1e3),
         ("--steering-angle", 1.0, 60.0),
         ("--steering-lag", planning.SHORTEST_LAG, planning.LONGEST_LAG),
@@ -192,7 +190,9 @@ def _steering_columns(found: Plan, ratio: float | None) -> dict[str, Array]:
     """
     rows = []
     for k, one in enumerate(found.passes):
-        t = _PERIOD * np.arange(round(one.steering.duration / _PERIOD) + 1, dtype=np.float64)
+        t = CHOSEN.period * np.arange(
+            round(one.steering.duration / CHOSEN.period) + 1, dtype=np.float64
+        )
         delta = one.steering.steering(t)[:, 0]
         r = np.interp(t, one.t, one.motion.r[:, 0, 0])
         held = np.full(t.size, found.space.speed)
@@ -213,7 +213,7 @@ def _path_columns(found: Plan, k: int) -> dict[str, Array]:
     step = 0.4 * car.wheelbase / found.space.speed
     t = np.linspace(0.0, one.steering.duration, max(8, round(one.steering.duration / step)))
     X, Y, psi = one.course(t).T
-    back = np.arange(round(_RUN_UP / step), 0, -1) * step * found.space.speed
+    back = np.arange(round(CHOSEN.run_up / step), 0, -1) * step * found.space.speed
     before = X[0] - back * np.cos(psi[0]), Y[0] - back * np.sin(psi[0])
     return {"X_m": np.append(before[0], X), "Y_m": np.append(before[1], Y)}
 
@@ -251,9 +251,6 @@ def _summary(found: Plan, inputs: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-_PULL = 3.0  # m/s², of a car that comes to speed, and of one that stops
-
-
 def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     """Return what to expect and what is safe, as sentences."""
     space, count = found.space, len(found.passes)
@@ -266,7 +263,7 @@ def plan_words(found: Plan, driven: Sequence[Rehearsal]) -> list[str]:
     ]
     slalom = found.rivals[0]
     said.append(_against(slalom, found))
-    distance = space.speed**2 / (2.0 * _PULL)
+    distance = space.speed**2 / (2.0 * CHOSEN.pull)
     said.append(
         f"Up to {found.lateral_acceleration:.1f} m/s² sideways, {100.0 * space.share:.0f} % of the "
         f"grip of the likely tires; the car stays {found.clearance:.2g} m from the edge with "

@@ -20,6 +20,7 @@ from mpc.tires import CurveFitError, prediction_tire
 from tireid import __version__
 from tireid.animation import write_film
 from tireid.animation.known import known_over_time, steady_curve
+from tireid.driving.chosen import CHOSEN
 from tireid.driving.runs import (
     FROZEN,
     FULL,
@@ -27,12 +28,11 @@ from tireid.driving.runs import (
     LEARNING,
     LINEAR,
     ORACLE,
-    WIDEST,
     Conditions,
     Run,
     run_drive,
 )
-from tireid.driving.setup import PERIOD, PLANT, Setup
+from tireid.driving.setup import PLANT, Setup
 from tireid.figures.drive import (
     AT_THE_END,
     drive_errors_figure,
@@ -65,7 +65,7 @@ def headline(conditions: Conditions) -> str:
     noise += "".join(f", {fault}" for fault in conditions.faults)
     return (
         f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
-        f"{PLANT} {setup.vehicle.name}, {1e3 * PERIOD * conditions.delay:g} ms delay, "
+        f"{PLANT} {setup.vehicle.name}, {1e3 * CHOSEN.period * conditions.delay:g} ms delay, "
         f"{noise}, seed {conditions.seed}"
     )
 
@@ -93,8 +93,8 @@ def inputs_of(
         "plant": PLANT,
         "vehicle": vehicle_numbers(setup.vehicle),
         "chassis": _chassis(setup.vehicle),
-        "delay_ms": 1e3 * PERIOD * conditions.delay,
-        "period_ms": 1e3 * PERIOD,
+        "delay_ms": 1e3 * CHOSEN.period * conditions.delay,
+        "period_ms": 1e3 * CHOSEN.period,
         "noise": conditions.noise,
         **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
         **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
@@ -152,7 +152,7 @@ class Drives(NamedTuple):
         limits = first.problem.limits
         figures = {
             "path": drive_path_figure(drives),
-            "errors": drive_errors_figure(drives, off_path=WIDEST, **on_the_way),
+            "errors": drive_errors_figure(drives, off_path=CHOSEN.widest, **on_the_way),
             "steering": drive_steering_figure(
                 drives, angle_limit=limits.steering, rate_limit=limits.steering_rate, **on_the_way
             ),
@@ -352,7 +352,7 @@ def _drive_warnings(runs: Sequence[Run]) -> list[str]:
         if scores.failures:
             counted = ", ".join(f"{n} {name}" for name, n in scores.failures.items())
             said.append(f"{run.label}: steps of the tracker failed: {counted}.")
-        if scores.solve_ms["p99"] > 1e3 * PERIOD:
+        if scores.solve_ms["p99"] > 1e3 * CHOSEN.period:
             said.append(f"{run.label}: one step in a hundred takes longer than the period.")
         said += [
             f"{run.label} at {t:.2f} s: {printed(text)}."

@@ -35,8 +35,9 @@ from mpc.path import Path
 from mpc.problem import Problem
 from mpc.realtime import NoCompilerError, Tracker
 from mpc.tires import PredictionTire, prediction_tire
+from tireid.driving.chosen import CHOSEN
 from tireid.driving.known import Known, Witness
-from tireid.driving.setup import FRICTIONS, PERIOD, Setup, SpeedWish
+from tireid.driving.setup import Setup, SpeedWish
 from tireid.progress import Progress
 
 
@@ -56,9 +57,6 @@ class _Informer:
         return f"given friction {mu:g}"
 
 
-_NOTED = 0.1  # change of the grip that is worth a note
-
-
 class _BacksOff:
     """Stands between a drive and what learns, and notes where the tracker plans with less grip.
 
@@ -73,7 +71,7 @@ class _BacksOff:
     def observe(self, measured: Measured, tracker: Any) -> str | None:
         """Ask what learns; return what it said, and the grip where that changed."""
         said = None if self._beside is None else self._beside.observe(measured, tracker)
-        if abs(tracker.grip - self._noted) < _NOTED:
+        if abs(tracker.grip - self._noted) < CHOSEN.noted:
             return said
         self._noted = tracker.grip
         grip = f"plans with {tracker.grip:.2f} of the grip"
@@ -94,8 +92,8 @@ def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> Later
     """Return what estimates v_y where no sensor shows it, on the tires of a fit or while it learns
     them.
     """
-    method, start = InertialIdentifier.beginning_with(learnt, vehicle, dt=PERIOD)
-    return LateralVelocity(OnlineIdentifier(method, vehicle, PERIOD, start))
+    method, start = InertialIdentifier.beginning_with(learnt, vehicle, dt=CHOSEN.period)
+    return LateralVelocity(OnlineIdentifier(method, vehicle, CHOSEN.period, start))
 
 
 def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
@@ -105,19 +103,17 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     """
     learnt = learnt.in_units(LADDER)
     try:
-        method = continuing(learnt, vehicle, PERIOD)
+        method = continuing(learnt, vehicle, CHOSEN.period)
     except ValueError as error:
         raise ValueError(f"--tires learning: {error}") from None
     if learnt.kind == AxleModel.kind:
-        method = AxleIdentifier.for_vehicle(vehicle, dt=PERIOD)
-    identifier = OnlineIdentifier(method, vehicle, PERIOD, learnt)
+        method = AxleIdentifier.for_vehicle(vehicle, dt=CHOSEN.period)
+    identifier = OnlineIdentifier(method, vehicle, CHOSEN.period, learnt)
     return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)))
 
 
 LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learning")
 FULL, IMU = SENSORS = ("full", "imu")
-WIDEST = 2.0  # deviation at which a car is off the path [m]
-_PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -199,10 +195,11 @@ def delay_periods(delay: float, name: str = "delay") -> int:
 
     delay : a multiple of the period [s].   name : of the argument, in an error.
     """
-    periods = delay / PERIOD
+    periods = delay / CHOSEN.period
     if not (0.0 <= delay <= 0.1 and abs(periods - round(periods)) < 1e-9):
         raise ValueError(
-            f"{name} must be 0 to 100 ms in steps of {1e3 * PERIOD:g} ms, it is {1e3 * delay:g}"
+            f"{name} must be 0 to 100 ms in steps of {1e3 * CHOSEN.period:g} ms, it is "
+            f"{1e3 * delay:g}"
         )
     return round(periods)
 
@@ -228,15 +225,15 @@ def run_drive(
         tracker = Tracker(
             model,
             problem,
-            period=PERIOD,
-            delay=conditions.delay * PERIOD + lag,
+            period=CHOSEN.period,
+            delay=conditions.delay * CHOSEN.period + lag,
             linearizations=linearizations,
             caution=conditions.caution,
         )
     except NoCompilerError as error:
         raise ValueError(str(error)) from None
     learner = _learner(label, setup, learnt)
-    witness = Witness(learner, PERIOD) if isinstance(learner, Learner) else None
+    witness = Witness(learner, CHOSEN.period) if isinstance(learner, Learner) else None
     beside: LearningTires | None = witness or learner
     with Progress(f"driving on {label} tires") as progress:
         driven = drive_tracker(
@@ -250,8 +247,8 @@ def run_drive(
             learner=_BacksOff(beside) if conditions.caution > 0.0 else beside,
             lateral=conditions.lateral(learnt),
             laps=conditions.laps,
-            widest=WIDEST,
-            plan_every=_PLAN_EVERY,
+            widest=CHOSEN.widest,
+            plan_every=CHOSEN.plan_every,
             name=f"{setup.path.name}, {label}",
             progress=progress,
         )
@@ -336,7 +333,7 @@ def drive(
         raise ValueError(f"laps are of a closed path, {path.name} is not")
     if learning and tire is None:
         raise ValueError("learning goes on from a tire: none is given")
-    require_within(ValueError, *FRICTIONS, friction=friction)
+    require_within(ValueError, *CHOSEN.frictions, friction=friction)
     require_within(ValueError, 0.0, 1.0, caution=caution)
     vehicle.require_chassis()
     setup = Setup(

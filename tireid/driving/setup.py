@@ -18,12 +18,9 @@ from mpc.cars import DoubleTrackCar
 from mpc.loop.sensing import SpeedProfile, cornering_limit
 from mpc.path import Path, grip_speed, steady_speed
 from mpc.tires import PredictionTire, oracle_tire
+from tireid.driving.chosen import CHOSEN
 
 PLANT = "double-track"
-_FASTEST = 30.0  # on a closed course [m/s]
-_ACCELERATION, _BRAKING = 2.0, 3.0  # on a closed course at friction 1 [m/s²]
-PERIOD = 0.01  # control period [s]
-FRICTIONS = (0.05, 1.5)  # least and most over that of the tire's measurement [-]
 
 
 class SpeedWish(NamedTuple):
@@ -52,7 +49,7 @@ class Setup:
     def car(self, *, open_field: bool = False) -> DoubleTrackCar:
         """Return a car on the road, or on a field that has the friction of the start everywhere."""
         friction = Friction(scale=self.mu) if open_field else self.friction()
-        return DoubleTrackCar(self.vehicle, friction=friction, period=PERIOD)
+        return DoubleTrackCar(self.vehicle, friction=friction, period=CHOSEN.period)
 
     def oracle(self, mu: float | None = None) -> PredictionTire:
         """Return the true tire on a road.
@@ -84,9 +81,9 @@ class Setup:
         return grip_speed(
             self.path,
             a_y_max=a_y,
-            v_max=_FASTEST,
-            a_accel=self.mu * _ACCELERATION,
-            a_brake=self.mu * _BRAKING,
+            v_max=CHOSEN.fastest,
+            a_accel=self.mu * CHOSEN.acceleration,
+            a_brake=self.mu * CHOSEN.braking,
         )
 
     def profile(self) -> SpeedProfile:

@@ -15,8 +15,7 @@ from identifier.compare.course import same_and_other
 from identifier.compare.study import Comparison, ranking
 from identifier.reproducibility import AxleRmse
 from tireid.figures import style
-
-_FARTHEST = 300.0  # [%], what is worse is drawn at the end of the axis
+from tireid.figures.chosen import CHOSEN
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:
@@ -38,7 +37,6 @@ _KINDS = {
     _OWN: (style.GREEN, "D", 0.0),
     _OTHER: (style.ORANGE, "s", 0.22),
 }
-_ROW = 0.3  # height of a method [in]
 
 
 @style.styled
@@ -46,11 +44,11 @@ def methods_figure(comparison: Comparison) -> Figure:
     """Draw a row for each method: means over recordings, lines from the best to the worst."""
     rows = {method_label(name): _method_errors(comparison, name) for name in ranking(comparison)}
     lost = {method_label(n) for n, trial in comparison.trials.items() if trial.diverged_at}
-    figure = style.new_figure(style.PAGE, 0.9 + _ROW * len(rows))
+    figure = style.new_figure(CHOSEN.page, 0.9 + CHOSEN.row * len(rows))
     axes = figure.subplots()
     every = [v for row in rows.values() for vs in row.values() for v in vs]
     finite = [value for value in every if np.isfinite(value)]
-    low, high = min(finite, default=1.0), min(max(finite, default=100.0), _FARTHEST)
+    low, high = min(finite, default=1.0), min(max(finite, default=100.0), CHOSEN.compare_farthest)
     axes.set(xscale="log", xlim=(low / 1.2, high * 1.2))
     style.few_ticks(axes.xaxis)
     for position, (label, errors) in enumerate(rows.items()):
@@ -82,18 +80,14 @@ def _draw_row(axes: Axes, position: int, errors: Mapping[str, list[float]]) -> N
         if not values:
             continue
         color, marker, shift = _KINDS[kind]
-        shown = np.minimum(values, _FARTHEST * 1.1)
+        shown = np.minimum(values, CHOSEN.compare_farthest * 1.1)
         y = position + shift
         axes.plot([shown.min(), shown.max()], [y, y], color=color, linewidth=1.0, alpha=0.6)
-        mean = min(float(np.mean(values)), _FARTHEST * 1.1)
+        mean = min(float(np.mean(values)), CHOSEN.compare_farthest * 1.1)
         axes.plot(mean, y, marker, color=color, ms=4.5, clip_on=False, label=kind)
 
 
-_BEST, _WORST = 1.0, 100.0  # [%], ends of the color scale
 # Learnt on one recording, replayed on another: a map of errors for each method.
-
-_DARK = 0.55  # share of the color scale from which text is white
-_LONGEST = 17  # letters of a recording's name beside a map
 
 
 @style.styled
@@ -109,10 +103,10 @@ def matrix_figure(comparison: Comparison) -> Figure:
     size = len(comparison.names)
     columns = min(len(maps), 4 if size <= 4 else 2)
     rows = math.ceil(len(maps) / columns)
-    cell = (style.PAGE - 1.6) / columns / size
-    figure = style.new_figure(style.PAGE, 0.6 + rows * (0.42 + size * min(cell, 0.42)))
+    cell = (CHOSEN.page - 1.6) / columns / size
+    figure = style.new_figure(CHOSEN.page, 0.6 + rows * (0.42 + size * min(cell, 0.42)))
     grid = figure.subplots(rows, columns, squeeze=False)
-    norm, colors = LogNorm(_BEST, _WORST), colormaps["viridis_r"]
+    norm, colors = LogNorm(CHOSEN.best, CHOSEN.worst), colormaps["viridis_r"]
     for axes, (label, frozen) in zip(grid.flat, maps.items(), strict=False):
         _draw_map(axes, comparison, frozen, norm, colors)
         axes.set_title(label, fontsize=7.2)
@@ -139,15 +133,15 @@ def _draw_map(
         for j, name in enumerate(names):
             if learnt in frozen:
                 shares[i, j] = comparison.course.share(name, frozen[learnt][name])
-    shown = np.clip(np.nan_to_num(shares, nan=_WORST), _BEST, _WORST)
+    shown = np.clip(np.nan_to_num(shares, nan=CHOSEN.worst), CHOSEN.best, CHOSEN.worst)
     axes.imshow(shown, norm=norm, cmap=colors, aspect="auto")
     for (i, j), share in np.ndenumerate(shares):
-        dark = norm(shown[i, j]) > _DARK
+        dark = norm(shown[i, j]) > CHOSEN.dark
         text = f"{share:.1f}" if share < 10.0 else f"{share:.0f}" if share < 1e3 else ">999"
         text = "div." if np.isnan(share) else text
         axes.text(j, i, text, ha="center", va="center", color="white" if dark else "black")
     labels = short_names(names).values()
-    cut = [one if len(one) <= _LONGEST else f"{one[: _LONGEST - 1]}…" for one in labels]
+    cut = [one if len(one) <= CHOSEN.longest else f"{one[: CHOSEN.longest - 1]}…" for one in labels]
     letters = [_letter(number) for number in range(len(names))]
     axes.set_xticks(range(len(names)), letters)
     both = [f"{label}  {letter}" for label, letter in zip(cut, letters, strict=True)]

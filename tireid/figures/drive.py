@@ -12,26 +12,23 @@ from codegen.arrays import Array
 from models.faults import SensorFault
 from models.vehicle import Vehicle
 from tireid.figures import style
+from tireid.figures.chosen import CHOSEN
 
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
     from mpc.path import Path
 
-_BINS = 60
-_WIDE = 10.0  # times slower than the median: from there on the axis is logarithmic
-_MILLI = 1e3
-
 
 @style.styled
 def drive_solve_figure(drive: "Drive") -> Figure:
     """Draw the solve times of a drive as a histogram and over time."""
-    times = _MILLI * drive.solve_time
+    times = CHOSEN.drive_milli * drive.solve_time
     median, p99, largest = np.quantile(times, [0.5, 0.99, 1.0])
-    figure = style.new_figure(style.PAGE, 2.7)
+    figure = style.new_figure(CHOSEN.page, 2.7)
     left, right = figure.subplots(1, 2)
-    wide = largest > _WIDE * median
+    wide = largest > CHOSEN.drive_wide * median
     low = float(times.min()) / 1.1 if wide else 0.0
-    bins = (np.geomspace if wide else np.linspace)(low, 1.1 * largest, _BINS)
+    bins = (np.geomspace if wide else np.linspace)(low, 1.1 * largest, CHOSEN.bins)
     left.hist(times, bins=list(bins), color=style.BLUE, alpha=0.8)
     left.set(xlabel="solve time [ms]", ylabel="steps [-]", xlim=(low, 1.1 * largest))
     right.plot(
@@ -50,7 +47,7 @@ def drive_solve_figure(drive: "Drive") -> Figure:
         right.set_yscale("log")
         for axis in (left.xaxis, right.yaxis):
             style.few_ticks(axis)
-    period = f"largest {largest:.3g} ms of a period of {_MILLI * drive.period:g} ms"
+    period = f"largest {largest:.3g} ms of a period of {CHOSEN.drive_milli * drive.period:g} ms"
     right.set_title(period, loc="right")
     left.set_title(f"{times.size} steps")
     style.legend_above(figure)
@@ -74,7 +71,6 @@ CONES: Mapping[str, Any] = {
 }
 ORACLE = "oracle"  # the name of the true tire
 AT_THE_END = " at the end"  # what a label ends with that is of a tire as it was then
-_LATER = (0, (2.5, 0.9))
 _TIRES: Mapping[str, Mapping[str, Any]] = {
     "linear": {"color": style.GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.3},
     "frozen": {"color": style.ORANGE, "linestyle": "-", "linewidth": 1.2},
@@ -86,7 +82,9 @@ _TIRES: Mapping[str, Mapping[str, Any]] = {
 def tire_look(label: str) -> dict[str, Any]:
     """Return color, line style and width of a tire in every figure."""
     look = dict(_TIRES.get(label.split()[0], _TIRES["frozen"]))
-    return look | {"linestyle": _LATER, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
+    return (
+        look | {"linestyle": CHOSEN.later, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
+    )
 
 
 _REPLANNED, _NOTICED = "plans with another tire or grip", "sensor fault noticed"
@@ -106,7 +104,7 @@ def drive_errors_figure(
     off_path : deviation [m] at which a car counts as off the path, drawn where it comes near.
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = style.new_figure(style.PAGE, 5.2)
+    figure = style.new_figure(CHOSEN.page, 5.2)
     panels = figure.subplots(4, 1, sharex=True)
     labels = ("deviation $e_y$\n[m]", "heading error\n[deg]", "lateral acc.\n[m/s²]")
     for label, drive in reversed(list(drives.items())):
@@ -194,9 +192,6 @@ def _roomy(axes: Axes, slowest: float) -> None:
     axes.set_ylim(min(low, slowest), high)
 
 
-_NEAR = 0.75  # a limit is drawn where a command comes this close to it
-
-
 @style.styled
 def drive_steering_figure(
     drives: Mapping[str, "Drive"],
@@ -211,7 +206,7 @@ def drive_steering_figure(
     angle_limit : that the tracker keeps [rad].   rate_limit : that the tracker keeps [rad/s].
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = style.new_figure(style.PAGE, 3.4)
+    figure = style.new_figure(CHOSEN.page, 3.4)
     angle, rate = figure.subplots(2, 1, sharex=True)
     for label, drive in reversed(list(drives.items())):
         look = tire_look(label)
@@ -236,22 +231,15 @@ def drive_steering_figure(
 
 def _limits(axes: Axes, limit: float) -> None:
     low, high = axes.get_ylim()
-    if max(-low, high) > _NEAR * limit:
+    if max(-low, high) > CHOSEN.near * limit:
         for side in (-limit, limit):
             axes.axhline(side, color="#AA4499", linewidth=0.8, linestyle=(0, (4, 2)), label="limit")
 
 
-_FRONT_OVERHANG, _REAR_OVERHANG = 0.32, 0.36  # of the wheelbase, beyond the axles
 # The car from above as polygons: a body and four wheels, the front ones steered.
 #
 # Pictures need a length, a width and wheels; a vehicle without a chassis gets those that are usual
 # for its wheelbase.
-
-_TRACK = 0.57  # of the wheelbase, where no chassis says
-_BODY_BESIDE_TRACK = 0.1  # of the wheelbase: how much wider than the track the body is
-_WHEEL_LENGTH, _WHEEL_WIDTH = 0.24, 0.085  # of the wheelbase
-_CORNERS = 33  # points of the body
-_ROUNDING = 0.3  # of its corners: exponent of a circle that becomes a rectangle
 
 
 class _CarShape(NamedTuple):
@@ -270,16 +258,21 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
     """
     long = vehicle.wheelbase
     chassis = vehicle.chassis
-    tracks = (_TRACK * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
-    half = 0.5 * (max(tracks) + _BODY_BESIDE_TRACK * long)
-    front, rear = vehicle.l_f + _FRONT_OVERHANG * long, -vehicle.l_r - _REAR_OVERHANG * long
-    angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
+    tracks = (
+        (CHOSEN.track * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
+    )
+    half = 0.5 * (max(tracks) + CHOSEN.body_beside_track * long)
+    front, rear = (
+        vehicle.l_f + CHOSEN.front_overhang * long,
+        -vehicle.l_r - CHOSEN.rear_overhang * long,
+    )
+    angle = np.linspace(0.0, 2.0 * np.pi, CHOSEN.corners)
     round_ = np.column_stack([np.cos(angle), np.sin(angle)])
-    body = np.sign(round_) * np.abs(round_) ** _ROUNDING * (0.5 * (front - rear), half)
+    body = np.sign(round_) * np.abs(round_) ** CHOSEN.rounding * (0.5 * (front - rear), half)
     body += (0.5 * (front + rear), 0.0)
     glass = np.array([(0.37, 0.6), (0.23, 0.78), (0.23, -0.78), (0.37, -0.6)]) * (long, half)
     corners = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
-    wheel = 0.5 * long * corners * (_WHEEL_LENGTH, _WHEEL_WIDTH)
+    wheel = 0.5 * long * corners * (CHOSEN.wheel_length, CHOSEN.wheel_width)
     wheels = np.stack(
         [
             wheel @ _turn(angle).T + (x, 0.5 * side * track)
@@ -296,17 +289,7 @@ def _turn(angle: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
-_ROW_LENGTH = 80.0  # a long and narrow path goes on in the next row after about this many meters
-_MOST_ROWS = 5
-_NARROW = 4.0  # from this ratio between its extents on a path is long and narrow
-_MARGIN = 3.0  # around the path [m]
-_RUN_UP = 16.0  # of the straights before and after the cones that is shown [m]
-_INNER_WIDTH = style.PAGE - 0.75  # what labels leave of the page [in]
-_HIGHEST = 5.0  # panel [in]
-_CARS_EVERY = 2.6  # wheelbases between two outlines
-_SMALL = 160.0  # in a picture of more than that [m] cars cannot be seen
-_ZOOM = 44.0  # a part of such a path that is drawn large, where a car was farthest off [m]
-_SEEN = 0.05  # deviations are drawn larger until the largest is this share of the picture
+_INNER_WIDTH = CHOSEN.page - 0.75  # what labels leave of the page [in]
 
 
 @style.styled
@@ -319,14 +302,14 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
     path = next(iter(drives.values())).path
     low, high = _extent(path, drives)
     width, height = high - low
-    if width <= _NARROW * height and max(width, height) > _SMALL:
+    if width <= CHOSEN.narrow * height and max(width, height) > CHOSEN.small:
         return _large(path, drives)
     rows = 1
-    if width > _NARROW * height:
-        rows = min(_MOST_ROWS, max(1, round(width / _ROW_LENGTH)))
+    if width > CHOSEN.narrow * height:
+        rows = min(CHOSEN.most_rows, max(1, round(width / CHOSEN.row_length)))
     step = width / rows
-    inch = min(_INNER_WIDTH / step, _HIGHEST / height)  # of a meter
-    figure = style.new_figure(style.PAGE, rows * (height * inch + 0.3) + 0.6)
+    inch = min(_INNER_WIDTH / step, CHOSEN.highest / height)  # of a meter
+    figure = style.new_figure(CHOSEN.page, rows * (height * inch + 0.3) + 0.6)
     panels = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for row, axes in enumerate(panels):
         ends = float(low[0] + row * step), float(low[0] + (row + 1) * step)
@@ -342,12 +325,15 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
 def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
     """Corners of what is shown: the path with its cones, and the tracks as far as not absurd."""
     places = np.column_stack([path.X, path.Y])
-    low, high = places.min(axis=0) - _MARGIN, places.max(axis=0) + _MARGIN
+    low, high = places.min(axis=0) - CHOSEN.margin, places.max(axis=0) + CHOSEN.margin
     if len(path.cones):
         first, last = path.cones.min(axis=0), path.cones.max(axis=0)
-        low, high = np.minimum(low, first - _MARGIN), np.maximum(high, last + _MARGIN)
-        low[0], high[0] = max(low[0], first[0] - _RUN_UP), min(high[0], last[0] + _RUN_UP)
-    room = 2.0 * _MARGIN
+        low, high = np.minimum(low, first - CHOSEN.margin), np.maximum(high, last + CHOSEN.margin)
+        low[0], high[0] = (
+            max(low[0], first[0] - CHOSEN.run_up),
+            min(high[0], last[0] + CHOSEN.run_up),
+        )
+    room = 2.0 * CHOSEN.margin
     for drive in drives.values():
         driven = np.column_stack([drive.X, drive.Y])
         low[1] = max(min(low[1], driven[:, 1].min() - 2.0), low[1] - room)
@@ -356,11 +342,11 @@ def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
 
 
 def _large(path: "Path", drives: Mapping[str, "Drive"]) -> Figure:
-    figure = style.new_figure(style.PAGE, 3.6)
+    figure = style.new_figure(CHOSEN.page, 3.6)
     whole, part = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
     largest = max(float(np.abs(drive.e_y).max()) for drive in drives.values())
     size = max(float(np.ptp(path.X)), float(np.ptp(path.Y)))
-    times = _round(_SEEN * size / max(largest, 1e-3))
+    times = _round(CHOSEN.seen * size / max(largest, 1e-3))
     whole.plot(path.X, path.Y, **PATH)
     for label, drive in reversed(list(drives.items())):
         X, Y, psi = path.pose(drive.s)
@@ -372,7 +358,7 @@ def _large(path: "Path", drives: Mapping[str, "Drive"]) -> Figure:
     k = int(np.abs(worst.e_y).argmax())
     X0, Y0, _ = (float(value) for value in path.pose(worst.s[k]))
     whole.plot(X0, Y0, marker="s", markersize=9.0, markerfacecolor="none", color="#AA4499")
-    half = 0.5 * _ZOOM
+    half = 0.5 * CHOSEN.zoom
     part.set(xlim=(X0 - half, X0 + half), ylim=(Y0 - half, Y0 + half), aspect="equal")
     _draw(part, path, drives)
     part.set_title(f"the largest deviation, {abs(worst.e_y[k]):.2f} m, to scale")
@@ -399,7 +385,7 @@ def _draw(axes: Axes, path: "Path", drives: Mapping[str, "Drive"]) -> None:
 
 
 def _draw_cars(axes: Axes, drive: "Drive", color: str) -> None:
-    every = _CARS_EVERY * drive.vehicle.wheelbase
+    every = CHOSEN.cars_every * drive.vehicle.wheelbase
     at = np.searchsorted(drive.s, np.arange(drive.s[0], drive.s[-1], every))
     signals = (drive.X, drive.Y, drive.psi, drive.delta)
     shapes = [

@@ -9,12 +9,12 @@ from matplotlib.figure import Figure
 
 from codegen.arrays import Array
 from codegen.escape import mathtext
+from tireid.figures.chosen import CHOSEN
 from tireid.figures.style import (
     AXLES,
     BLACK,
     GREY,
     ORANGE,
-    PAGE,
     SERIES,
     axle_panels,
     legend_above,
@@ -38,7 +38,7 @@ def stiffness_figure(rows: Sequence[LogRow]) -> Figure:
 
     rows : of logs that were learnt; what the verdict refuses is drawn hollow.
     """
-    figure = new_figure(PAGE, 4.4)
+    figure = new_figure(CHOSEN.page, 4.4)
     panels = figure.subplots(2, 1, sharex=True)
     when = _days(rows)
     cars = list(dict.fromkeys(row.vehicle for row in rows))
@@ -82,7 +82,7 @@ def curves_figure(groups: Sequence[Merged]) -> Figure:
 @styled
 def watch_figure(car: str, seen: Seen, alarms: Sequence[Alarm]) -> Figure:
     """Draw how a car's tires differ from its baseline, part by part, and what was noticed."""
-    figure = new_figure(PAGE, 4.8)
+    figure = new_figure(CHOSEN.page, 4.8)
     panels = figure.subplots(len(TITLES), 1, sharex=True)
     minutes = seen.driven / 60.0
     for k, (axes, title) in enumerate(zip(panels, TITLES, strict=True)):

@@ -13,6 +13,7 @@ from identifier.axle.curve import unit_matrix
 from identifier.band import LEVEL
 from identifier.plan import Plan
 from tireid.figures import style
+from tireid.figures.chosen import CHOSEN
 
 _ARROW = 0.07  # lengths of the area: of the arrow at the entry of a pass
 
@@ -21,8 +22,8 @@ _ARROW = 0.07  # lengths of the area: of the arrow at the entry of a pass
 def plan_area_figure(found: Plan) -> Figure:
     """Draw the passes in the area, with every tire that the car may have."""
     space = found.space
-    height = style.PAGE * space.width / space.length
-    figure = style.new_figure(style.PAGE, min(max(1.8, height), style.PAGE))
+    height = CHOSEN.page * space.width / space.length
+    figure = style.new_figure(CHOSEN.page, min(max(1.8, height), CHOSEN.page))
     axes = figure.subplots()
     axes.add_patch(Rectangle((0.0, 0.0), space.length, space.width, fill=False, linewidth=1.2))
     inner = space.length - 2.0 * space.margin, space.width - 2.0 * space.margin
@@ -48,7 +49,7 @@ def plan_area_figure(found: Plan) -> Figure:
 @style.styled
 def plan_steering_figure(found: Plan, ratio: float | None) -> Figure:
     """Draw the angle of the front wheels of each pass, and what force it asks for."""
-    figure = style.new_figure(style.PAGE, 3.4)
+    figure = style.new_figure(CHOSEN.page, 3.4)
     top, bottom = figure.subplots(2, 1, sharex=True)
     for k, one in enumerate(found.passes):
         color = style.SERIES[k % len(style.SERIES)]

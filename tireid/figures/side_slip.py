@@ -11,6 +11,7 @@ from codegen.arrays import Array
 from identifier.compare.course import SIGMAS, SideSlip
 from models.recordings import Recording
 from tireid.figures import style
+from tireid.figures.chosen import CHOSEN
 from tireid.figures.compare import method_label, short_names
 from tireid.figures.drive import ARC
 from tireid.figures.thinned import Signal, drawn_times, shown
@@ -19,13 +20,9 @@ if TYPE_CHECKING:
     from mpc.loop.record import Drive
 
 _FIRST = "inertial"  # which has the band where several estimate v_y
-_MOST = 4  # recordings that are drawn
 _OTHERS = (style.ORANGE, style.GREEN, style.PURPLE, style.AMBER, style.SKY, style.GREY)
-_COLUMNS = 5  # entries of a row of the legend
 _BAND = "within 2 standard deviations"
-_MILLI = 1e3
 _SHADE: Mapping[str, Any] = {"color": style.BLUE, "alpha": 0.2, "linewidth": 0.0}
-_BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
 
 
 @style.styled
@@ -37,7 +34,7 @@ def side_slip_figure(
     Without a recorded v_y there is an estimate with its band, and nothing is missed. A band is
     drawn of the inertial identifier, of the first method with one where it is not there.
     """
-    drawn = list(recordings)[:_MOST]
+    drawn = list(recordings)[: CHOSEN.most]
     given = {name: by_name for name, by_name in given.items() if by_name}
     if not given:
         raise ValueError("no method estimated a lateral velocity")
@@ -45,7 +42,7 @@ def side_slip_figure(
     first = max(given, key=lambda name: (name == _FIRST, has_band[name]))
     known = [recording.logged_v_y is not None for recording in drawn]
     ratios = [ratio for one in known for ratio in ([1.5, 0.9] if one else [1.5])]
-    figure = style.new_figure(style.PAGE, 0.7 + sum(ratios))
+    figure = style.new_figure(CHOSEN.page, 0.7 + sum(ratios))
     panels = iter(figure.subplots(len(ratios), 1, squeeze=False, height_ratios=ratios)[:, 0])
     names = short_names([recording.name for recording in recordings])
     for recording, has_truth in zip(drawn, known, strict=True):
@@ -54,7 +51,7 @@ def side_slip_figure(
         upper.set_title(names[recording.name])
         _draw(upper, next(panels) if has_truth else None, recording, here, first)
     figure.align_ylabels()
-    style.legend_above(figure, columns=_COLUMNS)
+    style.legend_above(figure, columns=CHOSEN.columns)
     return figure
 
 
@@ -69,7 +66,7 @@ def _draw(
     slips = {name: _degrees(one.v_y[part], at) for name, one in given.items()}
     exact = None if truth is None else _degrees(truth[part], at)
     reach = float(np.abs(slips[first] if exact is None else exact).max())
-    limit = _BEYOND * max(reach, 0.1)
+    limit = CHOSEN.beyond * max(reach, 0.1)
     band = given[first].v_y_sd
     if band is not None:
         low, high = (
@@ -110,7 +107,7 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     """Draw the estimated v_y over the true one, and its error, each with the band of two sigma."""
     v_y, band = drive.estimates["v_y"], SIGMAS * drive.estimates["v_y_sd"]
     inertial = drive.estimates["inertial_v_y"]
-    figure = style.new_figure(style.PAGE, 3.6)
+    figure = style.new_figure(CHOSEN.page, 3.6)
     above, below = figure.subplots(2, 1, sharex=True)
     shade: Mapping[str, Any] = {**_SHADE, "label": "estimate, two sigma"}
     look: Mapping[str, Any] = {**style.ONLINE, "label": "estimate"}
@@ -120,10 +117,12 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     above.plot(drive.s, drive.v_y, **style.TRUTH)
     above.plot(drive.s, v_y, **look)
     above.set_ylabel("$v_y$\n[m/s]")
-    below.fill_between(drive.s, -_MILLI * band, _MILLI * band, **shade)
-    below.plot(drive.s, _MILLI * (inertial - drive.v_y), **alone)
-    below.plot(drive.s, _MILLI * (v_y - drive.v_y), **look)
-    reach = 1.2 * _MILLI * float(np.max(np.maximum(band, np.abs(v_y - drive.v_y))))
+    below.fill_between(
+        drive.s, -CHOSEN.side_slip_milli * band, CHOSEN.side_slip_milli * band, **shade
+    )
+    below.plot(drive.s, CHOSEN.side_slip_milli * (inertial - drive.v_y), **alone)
+    below.plot(drive.s, CHOSEN.side_slip_milli * (v_y - drive.v_y), **look)
+    reach = 1.2 * CHOSEN.side_slip_milli * float(np.max(np.maximum(band, np.abs(v_y - drive.v_y))))
     below.set(ylabel="error of it\n[mm/s]", xlabel=ARC, ylim=(-reach, reach))
     below.set_xlim(0.0, float(drive.s[-1]))
     figure.align_ylabels([above, below])

@@ -26,11 +26,10 @@ from codegen.writing import write_file
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.run import History
+from tireid.figures.chosen import CHOSEN
 
 _P = ParamSpec("_P")
 
-PAGE = 7.16  # width of both columns of a paper [in]
-_RESOLUTION = 200  # [dots per inch]
 
 BLACK, GREY, BLUE, ORANGE = "#000000", "#767676", "#0072B2", "#D55E00"
 GREEN, PURPLE, SKY, AMBER = "#009E73", "#AA4499", "#56B4E9", "#E69F00"
@@ -82,7 +81,7 @@ def axle_panels(
 
     room : above and below them [in].
     """
-    figure = new_figure(PAGE, room + sum(heights))
+    figure = new_figure(CHOSEN.page, room + sum(heights))
     ratios: Mapping[str, Any] = {"height_ratios": heights, "squeeze": False}
     panels = figure.subplots(len(heights), 2, sharex=sharex, sharey="row", **ratios)
     for axes, name in zip(panels[0], AXLES, strict=True):
@@ -122,23 +121,23 @@ def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
     with style.context(["default", dict(look)]):
         engine = figure.get_layout_engine()
         if engine is not None:
-            resolution, figure.dpi = figure.dpi, _RESOLUTION  # at fewer dots letters are less exact
+            resolution, figure.dpi = (
+                figure.dpi,
+                CHOSEN.resolution,
+            )  # at fewer dots letters are less exact
             engine.execute(figure)
             figure.dpi = resolution
             figure.set_layout_engine(None)  # that of rcParams, where `LOOK` has none
         yield
 
 
-def figure_png(figure: Figure, *, resolution: int = _RESOLUTION) -> bytes:
+def figure_png(figure: Figure, *, resolution: int = CHOSEN.resolution) -> bytes:
     buffer = BytesIO()
     with laid_out(figure):
         figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
     return buffer.getvalue()
 
 
-# Glyphs as outlines and names of parts from a fixed salt: a drawing looks alike wherever it is
-# opened, and the same figure has the same bytes.
-_CLOUDS = 130  # dots per inch of what is pixels in a drawing
 _VECTOR: dict[str, Any] = {"svg.fonttype": "path", "svg.hashsalt": "tireid"}
 
 
@@ -146,7 +145,9 @@ def figure_svg(figure: Figure) -> bytes:
     """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels."""
     buffer = BytesIO()
     with laid_out(figure, {**LOOK, **_VECTOR}):
-        figure.savefig(buffer, format="svg", dpi=_CLOUDS, metadata={"Date": None, "Creator": None})
+        figure.savefig(
+            buffer, format="svg", dpi=CHOSEN.clouds, metadata={"Date": None, "Creator": None}
+        )
     return buffer.getvalue()
 
 
@@ -169,17 +170,17 @@ AXLES = ("Front axle", "Rear axle")
 _FREEZE, _PREDICTION = "freeze", "after the freeze (prediction)"
 
 
-_FAR = 1e5  # s: of a clock that begins later, as a Unix time does, only the last digits are shown
-_DIGITS_SHOWN = 100.0  # s
-
-
 def _clock_zero(t: Array) -> float:
     """Return what figures take off the times of a recording [s]; 0 where they are as short as is.
 
     t : times of the samples (n,) [s].
     """
     first = float(t[0])
-    return 0.0 if abs(first) < _FAR else _DIGITS_SHOWN * float(np.floor(first / _DIGITS_SHOWN))
+    return (
+        0.0
+        if abs(first) < CHOSEN.far
+        else CHOSEN.digits_shown * float(np.floor(first / CHOSEN.digits_shown))
+    )
 
 
 def frozen_title(t: Array, t_freeze: float) -> str:
@@ -280,9 +281,6 @@ def _bolder(legend: Legend) -> None:
             line.set_alpha(1.0)
 
 
-_FARTHEST = 3.0  # an axis reaches at most this many times beyond the force it is compared with
-
-
 class ForceUnit(NamedTuple):
     """A unit of force on an axis: its name and its size [N]."""
 
@@ -323,7 +321,7 @@ def force_range(reference: Array, *others: Array) -> tuple[float, float]:
     A law that diverges or a model that is far off leaves the panel instead of flattening the rest.
     """
     largest = _finite(reference)
-    bound = _FARTHEST * float(np.abs(largest).max(initial=0.0)) or np.inf
+    bound = CHOSEN.style_farthest * float(np.abs(largest).max(initial=0.0)) or np.inf
     every = np.concatenate([largest, *(_finite(other) for other in others)])
     every = every[np.abs(every) <= 1e12]
     low = max(float(every.min(initial=0.0)), -bound)

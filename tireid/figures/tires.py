@@ -16,6 +16,7 @@ from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
 from models.recordings import Recording
 from tireid.figures import style
+from tireid.figures.chosen import CHOSEN
 from tireid.figures.drive import AT_THE_END, ORACLE, tire_look
 from tireid.figures.thinned import cloud, shown_of_run
 
@@ -207,7 +208,7 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     if not tracks:
         raise TypeError(f"{history.design} has no estimates of the axles")
     at, curves = shown_of_run(history, lambda block: [o.values for o in history.tracks_over(block)])
-    figure = style.new_figure(style.PAGE, 4.4)
+    figure = style.new_figure(CHOSEN.page, 4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
         label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values

@@ -43,12 +43,9 @@ from identifier.verdict import judge_identification
 from models.logs import arrow
 from models.recordings import LogMap, Recording, RecordingError, read_repaired, runs
 from models.vehicle import Vehicle
+from tireid.fleet.chosen import CHOSEN
 from tireid.fleet.store import INDEX, LogRow, Store, information_columns, needed, protocols
 
-_TOGETHER = 8  # logs that a process takes at most at once, and whose rows are written at once
-_PORTIONS = 16  # that few logs are shared into
-PART = 300.0  # s of a log whose information is kept as one
-_DT = 0.01  # s, to which logs are brought
 _Judging = Literal["motion", "none"]
 _DATE = r"\d{4}-\d{2}-\d{2}(?:[T ][\d.:-]+(?:Z|[+-]\d{2}:?\d{2})?)?"
 _FIELD = re.compile(r"\{(\w+)\}")
@@ -90,7 +87,7 @@ class Telling:
     start: TireModel | None = None
     judging: _Judging = "motion"
     check: bool = True
-    part: float = PART
+    part: float = CHOSEN.part
 
     def __post_init__(self) -> None:
         if not 10.0 <= self.part < float("inf"):
@@ -113,7 +110,7 @@ class Telling:
         parts = (
             vehicle,
             (beliefs.mean.tobytes(), beliefs.information.tobytes()),
-            InertialIdentifier.for_vehicle(vehicle, dt=_DT),
+            InertialIdentifier.for_vehicle(vehicle, dt=CHOSEN.dt),
             replace(self.log_map, dbc=""),
             Path(dbc).read_bytes() if dbc else b"",
             None if self.start is None else json.dumps(self.start.to_dict()),
@@ -302,7 +299,7 @@ def _failed(row: LogRow, error: Exception) -> LogRow:
 
 def _of_run(row: LogRow, path: Path, vehicle: Vehicle, telling: Telling) -> LogRow:
     recording, vehicle = read_repaired(
-        path, vehicle, row.run or None, dt=_DT, check=telling.check, log_map=telling.log_map
+        path, vehicle, row.run or None, dt=CHOSEN.dt, check=telling.check, log_map=telling.log_map
     )
     return learnt(row, recording, vehicle, telling)
 
@@ -310,7 +307,7 @@ def _of_run(row: LogRow, path: Path, vehicle: Vehicle, telling: Telling) -> LogR
 def learnt(row: LogRow, recording: Recording, vehicle: Vehicle, telling: Telling) -> LogRow:
     """Return the row with what is learnt of its log.
 
-    recording : the log, at `_DT`.
+    recording : the log, at `CHOSEN.dt`.
     """
     counted_samples(recording, vehicle.lowest_speed)  # refuses a car that never drives
     begin, start = float(recording.t[0]), telling.start
@@ -485,7 +482,7 @@ def learn_fleet(
 
 
 def _portions(tasks: Sequence[_Task]) -> list[tuple[_Task, ...]]:
-    size = min(max(len(tasks) // _PORTIONS, 1), _TOGETHER)
+    size = min(max(len(tasks) // CHOSEN.portions, 1), CHOSEN.together)
     return [tuple(tasks[k : k + size]) for k in range(0, len(tasks), size)]
 
 

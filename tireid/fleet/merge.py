@@ -2,13 +2,13 @@
 
 The information of logs adds up (`identifier.estimate.information`). The model of a group is the
 optimum of their sum and the prior of its car, counted once. Sensors are those of the car, in each
-log off by an error of its own (`_APART` of their prior). Where the evidence of a log asks for
-another friction, by `PRICE` as inside a log, its friction is its own.
+log off by an error of its own (`CHOSEN.apart` of their prior). Where the evidence of a log asks for
+another friction, by `ESTIMATE_CHOSEN.price` as inside a log, its friction is its own.
 
 Cars of a fleet differ: θ_v ~ N(m, T) of each car v, of which its logs give θ̂_v with covariance P_v.
 m and T are found by expectation and maximization (N. Laird and J. Ware, Biometrics 38, 1982), both
-held by the prior of the estimate: m ~ N(m₀, S₀), T as by `_WORTH` more cars. Where the next car
-starts is m, as sure as N(m, T + M), M = (V/T + 1/S₀)⁻¹.
+held by the prior of the estimate: m ~ N(m₀, S₀), T as by `CHOSEN.worth` more cars. Where the next
+car starts is m, as sure as N(m, T + M), M = (V/T + 1/S₀)⁻¹.
 """
 
 import json
@@ -21,14 +21,15 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
+from identifier.estimate.chosen import CHOSEN as ESTIMATE_CHOSEN
 from identifier.estimate.fit import Reach
 from identifier.estimate.information import PLACE, SIZE, Information, coordinates
 from identifier.estimate.model import FittedModel
-from identifier.estimate.priors import ANOTHER_ROAD, OF_AXLES, SENSORS, Priors
-from identifier.estimate.roads import LEAST, PRICE
+from identifier.estimate.priors import OF_AXLES, SENSORS, Priors
 from identifier.estimate.solve import settled
 from identifier.motion.parameters import INDEX, NAMES
 from models.vehicle import Vehicle
+from tireid.fleet.chosen import CHOSEN
 from tireid.fleet.store import INDEX as WHICH
 from tireid.fleet.store import MOVING, LogRow
 
@@ -43,11 +44,7 @@ COLUMNS = (
     "car",
     *_INFORMATION,
 )  # of a row, that are asked for here
-_ROUNDS = 3  # over the rows
-_PASSES = 60  # of expectation and maximization
-_WORTH = 2.0  # cars that the identifier's prior counts as
 _CHANGES = ("steering_zero", "v_y_bias", "v_y_angle")  # of sensors, from log to log
-_APART = 0.1  # their standard deviation, of that of their prior
 _TIRES = [INDEX[name] for name in MOVING if name not in SENSORS]
 _OFF = [INDEX[name] for name in SENSORS]
 _ROAD = INDEX["ln_road"]
@@ -149,7 +146,7 @@ def merge(rows: Callable[[], Iterable[LogRow]], by: Sequence[str]) -> list[Merge
     by : what the logs of a group have in common; empty merges all.
     """
     sums: dict[_Key, _Sum] = {}
-    for _ in range(_ROUNDS):
+    for _ in range(CHOSEN.rounds):
         for key, row in grouped(rows(), by):
             if key not in sums:
                 sums[key] = _Sum(row.declared_car)
@@ -206,15 +203,15 @@ class _Sum:
             return one
         u, slopes = self.at
         along = slopes[:, _ROAD]
-        known = along @ one.matrix @ along + ANOTHER_ROAD**-2
+        known = along @ one.matrix @ along + ESTIMATE_CHOSEN.another_road**-2
         ln_m = float(along @ (one.vector - one.matrix @ u) / known)
         if self.road is None:
             self.ln_m.append(ln_m)
             return one
         away = ln_m - self.road
-        if abs(away) < LEAST or 0.5 * known * away**2 < PRICE:
+        if abs(away) < ESTIMATE_CHOSEN.roads_least or 0.5 * known * away**2 < ESTIMATE_CHOSEN.price:
             return one
-        return one.loosened(along[:, None], np.array([ANOTHER_ROAD]))
+        return one.loosened(along[:, None], np.array([ESTIMATE_CHOSEN.another_road]))
 
     def settled(self) -> tuple[Array, Array]:
         """Return the optimum and its covariance, as of `settled`."""
@@ -239,7 +236,7 @@ def errors_of(beliefs: Priors) -> tuple[Array, Array]:
     along = np.zeros((SIZE, len(_CHANGES)))
     for k, name in enumerate(_CHANGES):
         along[PLACE[name], k] = 1.0
-    return along, _APART * beliefs.sd[[INDEX[name] for name in _CHANGES]]
+    return along, CHOSEN.apart * beliefs.sd[[INDEX[name] for name in _CHANGES]]
 
 
 # Where the next car starts.
@@ -295,13 +292,13 @@ def fleet_prior(cars: Sequence[Merged]) -> _FleetPrior:
     m, T, V = m0, S0, len(listed)
     held = np.linalg.inv(S0)
     matrices, vectors = (np.array([one[k] for one in listed]) for k in (2, 3))
-    for _ in range(_PASSES):
+    for _ in range(CHOSEN.passes):
         between = np.linalg.inv(T)
         P = np.linalg.inv(between + matrices)
         means = np.einsum("vij,vj->vi", P, between @ m + vectors)
         M = np.linalg.inv(V * between + held)
         m = M @ (between @ means.sum(axis=0) + held @ m0)
-        T = (_WORTH * S0 + (means - m).T @ (means - m) + P.sum(axis=0)) / (_WORTH + V)
+        T = (CHOSEN.worth * S0 + (means - m).T @ (means - m) + P.sum(axis=0)) / (CHOSEN.worth + V)
     reach = Reach()
     for one in cars:
         model = one.model

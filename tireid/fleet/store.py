@@ -33,13 +33,10 @@ from identifier.frozen import vehicle_from
 from identifier.motion.parameters import NAMES
 from models.extras import needs
 from models.vehicle import Vehicle, sedan
+from tireid.fleet.chosen import CHOSEN
 
 _Key = tuple[str, str, str]
-_BUCKETS = 16
 _FORMAT = "tireid fleet 3"
-_BATCH = 512  # rows that are read at once
-SMALL = 1 << 22  # bytes of a file that is fetched as one
-_HELD, AT_ONCE = 1 << 26, 1000  # bytes and files of what pends that are sorted at once
 MOVING = [name for name, moves in zip(NAMES, Priors.of(sedan()).moves, strict=True) if moves]
 _OBSERVABLE = np.array([*range(FORCES), *(PLACE[name] for name in MOVING if name in PLACE)])  # of u
 _WHOLE = {
@@ -160,7 +157,7 @@ class LogRow:
     def bucket(self) -> str:
         """The file of its row; the runs of a file lie together."""
         word = hashlib.blake2b(self.key[0].encode(), digest_size=1)
-        return f"bucket-{word.digest()[0] % _BUCKETS:02d}.parquet"
+        return f"bucket-{word.digest()[0] % CHOSEN.buckets:02d}.parquet"
 
     @property
     def declared_car(self) -> Vehicle:
@@ -307,7 +304,7 @@ class Store:
         best: dict[_Key, tuple[Any, int]] = {}
         k = 0
         for path, table in tables.items():
-            for batch in table.select(INDEX).to_batches(_BATCH):
+            for batch in table.select(INDEX).to_batches(CHOSEN.batch):
                 for row in _rows_of(batch):
                     rank = _rank(row, pending=self._pends(path)), k
                     best[row.key] = min(best.get(row.key, rank), rank)
@@ -347,7 +344,7 @@ class Store:
                 parquet.ParquetFile(source) as file,
             ):
                 _require_ours(path, file.schema_arrow)
-                for batch in file.iter_batches(_BATCH, columns=names, use_threads=False):
+                for batch in file.iter_batches(CHOSEN.batch, columns=names, use_threads=False):
                     if "log" in names and batch.column("log").null_count:
                         raise StoreError(
                             f"{path}: log must be the name of a log in every row, one is empty"
@@ -363,7 +360,7 @@ class Store:
         pyarrow, (fs, _) = needed("pyarrow"), self._place
         if "file" in protocols(fs):
             return pyarrow.OSFile(path)
-        if columns is None or size <= SMALL:
+        if columns is None or size <= CHOSEN.small:
             return pyarrow.BufferReader(fs.cat_file(path))
         remote = needed("fsspec.parquet")
         return remote.open_parquet_file(path, fs=fs, columns=list(columns), engine="pyarrow")
@@ -385,7 +382,7 @@ class Store:
             table,
             buffer,
             compression="zstd",
-            row_group_size=8 * _BATCH,
+            row_group_size=8 * CHOSEN.batch,
             use_dictionary=list(_WORDS),
         )
         fs, _ = self._place
@@ -404,7 +401,10 @@ class Store:
         for path, size in self._sizes("pending").items():
             paths.append(path)
             tables.append(self._table(path, size))
-            if len(paths) == AT_ONCE or sum(table.nbytes for table in tables) > _HELD:
+            if (
+                len(paths) == CHOSEN.at_once
+                or sum(table.nbytes for table in tables) > CHOSEN.store_held
+            ):
                 self._settle(paths, tables)
                 paths, tables = [], []
         if paths:

@@ -13,7 +13,8 @@ A change by δ is looked for by a cumulative sum of log-likelihood ratios (E. S.
 
 and ends where g is back at zero. Between false alarms lie at least exp(h) parts on average (G.
 Lorden, Annals of Mathematical Statistics 42, 1971), so that h follows from how many are accepted.
-A part adds at most its share of `_LEAST` of driving: no sensor that fails for a few minutes alarms.
+A part adds at most its share of `CHOSEN.least` of driving: no sensor that fails for a few minutes
+alarms.
 """
 
 import math
@@ -29,17 +30,11 @@ from identifier.estimate.priors import SENSORS, Priors
 from identifier.estimate.solve import settled
 from identifier.motion.parameters import INDEX
 from models.vehicle import Vehicle
+from tireid.fleet.chosen import CHOSEN
 from tireid.fleet.merge import day_of, errors_of, grouped
 from tireid.fleet.store import LogRow
 
-_LEAST = 600.0  # s of driving that an alarm takes at least
-_SHORTEST = 5.0  # s of learning, below which a part says nothing
-_FLOOR = 0.01  # standard deviation of ln C that roads make at least
-_FLOOR_FRICTION = 0.05  # and of ln μ
-_HELD = 10.0  # parts that the fleet's scatter counts as
-_NORMAL = 1.4826  # standard deviation of normal errors over their median absolute deviation
 _CHANGED = [INDEX[name] for name in ("ln_stiffness_f", "ln_stiffness_r", "ln_road")]
-_LARGEST = 0.5  # standard deviation of ln C and ln μ that is believed before
 TITLES = ("stiffness of the front axle", "stiffness of the rear axle", "friction of both axles")
 
 
@@ -224,7 +219,9 @@ class _Compared(NamedTuple):
     def scatter(self) -> Array:
         """Median squared deviation within the baseline, as a variance (3,)."""
         z = self.z[self.baseline]
-        return np.asarray((_NORMAL * np.median(np.abs(z - np.median(z, axis=0)), axis=0)) ** 2)
+        return np.asarray(
+            (CHOSEN.normal * np.median(np.abs(z - np.median(z, axis=0)), axis=0)) ** 2
+        )
 
 
 def _parts_of(row: LogRow) -> list[_Part]:
@@ -232,7 +229,7 @@ def _parts_of(row: LogRow) -> list[_Part]:
     return [
         _Part(row.name, row.date, begin, given)
         for begin, given in zip(row.part_begin, row.parts, strict=True)
-        if given.seconds >= _SHORTEST
+        if given.seconds >= CHOSEN.shortest
     ]
 
 
@@ -268,7 +265,9 @@ def _change_from(given: Information, p: Array, beliefs: Priors) -> tuple[Array, 
     sensors = np.zeros((SIZE, len(SENSORS)))
     sensors[[PLACE[name] for name in SENSORS], np.arange(len(SENSORS))] = 1.0
     along = np.hstack([slopes[:, _CHANGED], sensors])
-    sd = np.array([*(_LARGEST for _ in _CHANGED), *(beliefs.sd[INDEX[name]] for name in SENSORS)])
+    sd = np.array(
+        [*(CHOSEN.largest for _ in _CHANGED), *(beliefs.sd[INDEX[name]] for name in SENSORS)]
+    )
     P = np.linalg.inv(along.T @ given.matrix @ along + np.diag(sd**-2.0))
     value = P @ (along.T @ (given.vector - given.matrix @ u))
     return value[: len(_CHANGED)], np.diag(P)[: len(_CHANGED)]
@@ -277,8 +276,10 @@ def _change_from(given: Information, p: Array, beliefs: Priors) -> tuple[Array, 
 def _summed(one: _Compared, fleet: Array, watching: Watching) -> Seen:
     """Return the cumulative sums of a car's parts after its baseline."""
     count = len(one.baseline)
-    floor = np.array([_FLOOR, _FLOOR, _FLOOR_FRICTION]) ** 2
-    T = np.maximum((_HELD * fleet + count * one.scatter) / (_HELD + count), floor)
+    floor = np.array([CHOSEN.floor, CHOSEN.floor, CHOSEN.floor_friction]) ** 2
+    T = np.maximum(
+        (CHOSEN.watch_held * fleet + count * one.scatter) / (CHOSEN.watch_held + count), floor
+    )
     usual = np.median(one.z[one.baseline], axis=0)
     z, variance = one.z[count:] - usual, one.S[count:] + T
     seconds = np.array([part.information.seconds for part in one.parts[count:]])
@@ -286,7 +287,7 @@ def _summed(one: _Compared, fleet: Array, watching: Watching) -> Seen:
     delta = np.array([watching.stiffness, watching.stiffness, watching.friction])
     sums, g = np.zeros((len(z), 2, 3)), np.zeros((2, 3))
     for k in range(len(z)):
-        most = h * seconds[k] / _LEAST
+        most = h * seconds[k] / CHOSEN.least
         ratio = (
             np.stack([delta * (z[k] - 0.5 * delta), -delta * (z[k] + 0.5 * delta)]) / variance[k]
         )

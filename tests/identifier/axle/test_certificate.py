@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 
 from identifier.axle import AxleIdentifier
 from identifier.axle import learning as steps
-from identifier.axle.along import BEGIN, adjoint, begin_error, certified_along, lessons
+from identifier.axle.along import adjoint, begin_error, certified_along, lessons
 from identifier.axle.certificate import (
     FrictionDrop,
     _widest_range,
@@ -17,7 +17,8 @@ from identifier.axle.certificate import (
     curve_facts,
     jump_by_learning,
 )
-from identifier.axle.covariance import LEAST_VARIANCE, unpacked
+from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
+from identifier.axle.covariance import unpacked
 from identifier.axle.curve import LADDER
 from identifier.run import identify
 
@@ -98,14 +99,14 @@ def test_a_covariance_at_its_floor_is_learnt_with_but_does_not_shrink(design, ca
     n = len(design.ladder)
     places = [0, 7, 13, 18, 22, 25, 27]
     free = identify(recording, car, design).state["UD"][:, :, places]
-    assert LEAST_VARIANCE < free.min() < 1e-5
+    assert AXLE_CHOSEN.least_variance < free.min() < 1e-5
     setup = design.setup(car)
     low = setup.carry["UD"].copy()
-    low[:, places] = LEAST_VARIANCE
+    low[:, places] = AXLE_CHOSEN.least_variance
     state, theta = dict(setup.carry), []
     state["UD"] = low
     for block in setup.run(recording, carry=state):
-        assert block.state["UD"][:, :, places].min() >= LEAST_VARIANCE * (1.0 - 1e-12)
+        assert block.state["UD"][:, :, places].min() >= AXLE_CHOSEN.least_variance * (1.0 - 1e-12)
         theta.append(block.state["W"])
     assert np.ptp(np.concatenate(theta), axis=0).max() < 1e-6 and n == 4
 
@@ -137,7 +138,7 @@ def test_the_worst_errors_of_y_reach_the_bound_and_larger_ones_pass_it(run):
     bound = by_begin + np.abs(g) @ taught.declared[:, i] + abs(reach.moved[i, m])
     assert bound < 1.0
     for share, passes in ((1.0, False), (1.01, True)):
-        error = side * BEGIN**2 * taught.begin[i] @ begin / by_begin
+        error = side * AXLE_CHOSEN.begin**2 * taught.begin[i] @ begin / by_begin
         for k in range(len(g)):
             e = share * side * np.sign(g[k]) * taught.declared[k, i] - taught.h[k, i] @ error
             error = error + taught.gains[k, i] * taught.counts[k, i] * e + taught.moved[k, i]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identifier.baselines import LaggedEkf
-from identifier.baselines.curve_ekf import TYPICAL_SHAPE
+from identifier.baselines.chosen import CHOSEN as BASELINES_CHOSEN
 from identifier.run import identify
 
 STIFFNESS, FRICTION = np.array([11.0, 19.0]), np.array([0.8, 0.95])  # static axle loads
@@ -17,9 +17,9 @@ def a_log(car, curve_drive, rng):
     """A drive on tires of the filter's form and lag; steering and accelerometer are off zero."""
 
     def curve(axle, alpha):
-        B = STIFFNESS[axle] / (TYPICAL_SHAPE * FRICTION[axle])
+        B = STIFFNESS[axle] / (BASELINES_CHOSEN.typical_shape * FRICTION[axle])
         D = FRICTION[axle] * car.axle_loads[axle]
-        return D * np.sin(TYPICAL_SHAPE * np.arctan(B * alpha))
+        return D * np.sin(BASELINES_CHOSEN.typical_shape * np.arctan(B * alpha))
 
     lag = LaggedEkf.for_vehicle(car).relaxation_length
     log = curve_drive(car, curve, n=4000, rng=rng, lag=lag)
@@ -38,7 +38,7 @@ def test_stiffness_friction_and_zeros_are_found(log, car):
     loads = np.array(car.axle_loads)
     np.testing.assert_allclose(B * C * D / loads, STIFFNESS, rtol=0.05)
     np.testing.assert_allclose(D / loads, FRICTION, rtol=0.03)
-    np.testing.assert_array_equal(C, TYPICAL_SHAPE)
+    np.testing.assert_array_equal(C, BASELINES_CHOSEN.typical_shape)
     assert tire.offset[0] == pytest.approx(0.005, abs=5e-4)
     assert history.state["estimate"][-1, 9] == pytest.approx(0.2, abs=0.05)
     another = replace(car, cornering_stiffness_front=3e4, cornering_stiffness_rear=3e5)

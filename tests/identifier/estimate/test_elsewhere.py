@@ -9,9 +9,10 @@ import tireid as ti
 from codegen import find_compiler
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.curve import LADDER
+from identifier.estimate.chosen import CHOSEN as ESTIMATE_CHOSEN
 from identifier.estimate.fit import fit
 from identifier.estimate.method import FitMethod
-from identifier.estimate.model import UNITS, FittedModel
+from identifier.estimate.model import FittedModel
 from identifier.estimate.priors import Priors
 from identifier.export.compiled import CompiledPackage
 from identifier.export.onnx import onnx_bytes
@@ -22,7 +23,8 @@ from identifier.run import identify
 from models.vehicle import sedan
 from mpc.path.gates import iso_3888_2
 from mpc.tires import prediction_tire
-from mpc.tires.tire import DOUBT_STEP, Car, Point
+from mpc.tires.chosen import CHOSEN as TIRES_CHOSEN
+from mpc.tires.tire import Car, Point
 from tireid import exporting
 from tireid.driving.runs import LEARNING, given_tire, make_learner
 from tireid.driving.setup import Setup, SpeedWish
@@ -183,7 +185,7 @@ def test_a_tracker_takes_the_errors_of_the_sensors_off():
         -np.arctan((true - CAR.l_r * r) / v_x),
     )
     np.testing.assert_allclose([float(x) for x in tire.structure.slip(at)], expected)
-    slips = DOUBT_STEP * np.arange(26)
+    slips = TIRES_CHOSEN.doubt_step * np.arange(26)
     np.testing.assert_allclose(tire.doubt.T, model.band.half(slips))
 
 
@@ -217,4 +219,7 @@ def test_who_goes_on_learning_steers_on_what_is_learnt_in_its_units(fitted):
 def test_a_plan_goes_on_from_a_fit(fitted):
     found = plan(CAR, after=fitted, area=(60.0, 20.0), speed=12.0, time=1.5)
     assert found.error_before < 0.03  # of the grip; before learning it is above a tenth
-    assert isinstance(fitted.in_units(), AxleModel) and fitted.in_units().ladder == UNITS
+    assert (
+        isinstance(fitted.in_units(), AxleModel)
+        and fitted.in_units().ladder == ESTIMATE_CHOSEN.units
+    )

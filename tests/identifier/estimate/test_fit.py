@@ -81,7 +81,7 @@ def test_two_logs_tell_more_than_one(learnt):
 
 
 def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt, monkeypatch):
-    monkeypatch.setattr(fitting, "BLOCK", 8.0)
+    monkeypatch.setattr(fitting, "CHOSEN", fitting.CHOSEN._replace(fit_block=8.0))
     blocks = fit([driven(3)], sedan()).model
     np.testing.assert_allclose(blocks.force(GRID), learnt.model.force(GRID), rtol=0.05)
     np.testing.assert_allclose(

@@ -11,19 +11,13 @@ from scipy.integrate import solve_ivp
 from identifier.axle import AxleIdentifier
 from identifier.axle.slip import SHORTEST
 from identifier.plan import PlanError, PlausibleTires, Space, hold_of, make_plan
+from identifier.plan import motion as motion_module
 from identifier.plan import search as search_module
+from identifier.plan.chosen import CHOSEN as PLAN_CHOSEN
 from identifier.plan.information import asked, covariance_after, deviation, expected_error
-from identifier.plan.motion import LEAST_SLOPE, NO_HOLD, Entry, Hold, simulate, steps_of
+from identifier.plan.motion import NO_HOLD, Entry, Hold, simulate, steps_of
 from identifier.plan.plan import _longest_pass, _rated, random_of, slalom_of
-from identifier.plan.search import (
-    CALM,
-    REAR,
-    Search,
-    _Steerings,
-    body_of,
-    edge_distance,
-    swing_time,
-)
+from identifier.plan.search import Search, _Steerings, body_of, edge_distance, swing_time
 from identifier.run import identify
 from models.bicycle import BicycleParameters, bicycle
 from models.plant import Plant
@@ -45,7 +39,7 @@ def found(tires):
     """A plan of one pass, of a short search; and what it said of its progress."""
     shares = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(search_module, "GENERATIONS", 12)
+        patch.setattr(search_module, "CHOSEN", search_module.CHOSEN._replace(generations=12))
         plan = make_plan(tires, SPACE, 3.0, np.random.default_rng(0), shares.append)
     return plan, shares
 
@@ -65,7 +59,7 @@ def equations(tires, k, planned):
     s, share = tires.compliance, tires.sway_share
     stiffness, damping, soft, *_ = tires.method.sway.numbers()
     loads, arms = np.array(CAR.axle_loads), np.array([CAR.l_f, -CAR.l_r])
-    flattest = LEAST_SLOPE * (W / ladder).sum(axis=1)
+    flattest = PLAN_CHOSEN.least_slope * (W / ladder).sum(axis=1)
 
     def rates(t, state):
         v_y, r, _, _, psi, delta, rho, rho_dot = state[:8]
@@ -95,7 +89,7 @@ def equations(tires, k, planned):
 
 @pytest.mark.parametrize("k", [0, 4])
 def test_motion_and_sensitivities_are_those_of_an_integrator(tires, k, monkeypatch):
-    monkeypatch.setattr("identifier.plan.motion.STEP", 0.05 / 16)
+    monkeypatch.setattr(motion_module, "CHOSEN", motion_module.CHOSEN._replace(step=0.05 / 16))
     t, entry = steps_of(tires, 2.0), Entry(np.array([3.0]), np.array([5.0]), np.array([0.2]))
     ours = simulate(tires, 0.1 * np.sin(4.0 * t)[:, None], SPEED, entry, NO_HOLD)
     start = np.zeros(14)
@@ -255,7 +249,7 @@ def test_a_guided_pass_comes_back_to_the_middle_by_no_more_than_may_be_steered(t
 def test_no_swing_is_larger_than_a_bend_at_the_grip_and_its_slip(tires):
     search = Search(tires=tires, space=SPACE, duration=3.0, guided=False)
     bend = CAR.wheelbase * tires.grip[0].mean() * GRAVITY / SPEED**2
-    assert search.largest_angle == pytest.approx(bend + 1.5 * tires.slip_at(REAR)[0, 0])
+    assert search.largest_angle == pytest.approx(bend + 1.5 * tires.slip_at(PLAN_CHOSEN.rear)[0, 0])
     crawling = replace(search, space=replace(SPACE, speed=3.0))
     assert crawling.largest_angle == SPACE.max_angle
 
@@ -264,7 +258,9 @@ def test_each_limit_is_broken_by_as_much_as_is_said(tires):
     search = Search(tires=tires, space=SPACE, duration=3.0, guided=False)
     quiet = search.motion(search.steerings(np.zeros((1, search.swings + 2))))
     assert search.violation(quiet) <= 0.0
-    rear, calm, share = (tires.slip_at(one) for one in (REAR, CALM, SPACE.share))
+    rear, calm, share = (
+        tires.slip_at(one) for one in (PLAN_CHOSEN.rear, PLAN_CHOSEN.calm, SPACE.share)
+    )
 
     def broken(place, value):
         slip = quiet.slip.copy()
@@ -312,7 +308,7 @@ def test_a_search_ends_when_twenty_generations_gain_less_than_a_percent(
         costs.append(0.9 * rate ** len(costs))
         return costs[-1] + 0.01 * np.arange(len(numbers))
 
-    monkeypatch.setattr(search_module, "GENERATIONS", 30)
+    monkeypatch.setattr(search_module, "CHOSEN", search_module.CHOSEN._replace(generations=30))
     monkeypatch.setattr(Search, "costs", told)
     Search(tires=tires, space=SPACE, duration=2.0, guided=False).best(np.random.default_rng(0))
     assert len(costs) == asked_for

@@ -10,6 +10,7 @@ import pytest
 from identifier.axle import AxleIdentifier
 from identifier.plan import Plan, PlanError, PlausibleTires, Space, hold_of, make_plan, rehearse
 from identifier.plan import information as information_module
+from identifier.plan import motion as motion_module
 from identifier.plan import search as search_module
 from identifier.plan.information import asked, covariance_after, deviation, expected_error
 from identifier.plan.motion import NO_HOLD, Entry, Guide, Motion, simulate, steps_of, time_step
@@ -33,7 +34,7 @@ def tires():
 @pytest.fixture
 def brief(monkeypatch):
     """A search of few generations: it finds less, and keeps every limit."""
-    monkeypatch.setattr(search_module, "GENERATIONS", 15)
+    monkeypatch.setattr(search_module, "CHOSEN", search_module.CHOSEN._replace(generations=15))
 
 
 def space(**others):
@@ -66,7 +67,7 @@ def test_a_shorter_step_gives_the_same_motion(tires, monkeypatch):
         return 0.06 * np.sin(4.0 * t)
 
     _, coarse = steered(tires, swing, 3.0)
-    monkeypatch.setattr("identifier.plan.motion.STEP", 0.05 / 8)
+    monkeypatch.setattr(motion_module, "CHOSEN", motion_module.CHOSEN._replace(step=0.05 / 8))
     _, fine = steered(tires, swing, 3.0)
     for name in ("r", "Y"):
         theirs = getattr(fine, name)[::8, 0]
@@ -105,7 +106,7 @@ def test_slip_and_its_sensitivity_are_those_of_a_lag_that_is_integrated(tires):
 
 
 def test_the_identifier_ends_as_sure_as_was_expected_of_it(tires, monkeypatch):
-    monkeypatch.setattr(information_module, "COLOR", 1.0)
+    monkeypatch.setattr(information_module, "CHOSEN", information_module.CHOSEN._replace(color=1.0))
     steer = RandomSteer(
         amplitude=0.06, frequency=0.8, seed=3, onset=0.0, rate_limit=1.0, duration=6.0
     )

@@ -6,8 +6,10 @@ import pytest
 from mpc.handover.road import at_friction
 from mpc.prediction import build_axles, build_dynamics, build_rk4, state_size
 from mpc.realtime import Measurement, Status, Tracker
-from mpc.realtime.caution import GRIPS, N_GRIPS, SURPRISE, set_caution
-from mpc.tires.tire import ALL, DOUBT_STEP, N_DOUBTS, curves_at
+from mpc.realtime.caution import GRIPS, set_caution
+from mpc.realtime.chosen import CHOSEN as REALTIME_CHOSEN
+from mpc.tires.chosen import CHOSEN as TIRES_CHOSEN
+from mpc.tires.tire import ALL, curves_at
 from tests.mpc.realtime.conftest import PROBLEM
 from tests.mpc.test_prediction import TIRES
 
@@ -148,7 +150,11 @@ def watch(s, p, m, axles):
     masses = mass * np.array([l_r, l_f]) / (l_f + l_r)
     r = m.r + s["turning"]
     shown = masses * m.v_y + np.array([inertia, -inertia]) * r / (l_f + l_r)
-    squares, missed, slips = np.zeros(N_GRIPS), np.zeros((N_GRIPS, 2)), s["slips"].copy()
+    squares, missed, slips = (
+        np.zeros(REALTIME_CHOSEN.n_grips),
+        np.zeros((REALTIME_CHOSEN.n_grips, 2)),
+        s["slips"].copy(),
+    )
     impulse = s["impulse"].copy()
     for j, grip in enumerate(GRIPS):
         x = np.array([0.0, 0.0, m.v_y, r, s["wheels"] + s["zero"], *s["slips"][j]])
@@ -159,9 +165,10 @@ def watch(s, p, m, axles):
             continue
         rate = force - masses * v_x * r
         missed[j] = (shown - impulse[j] - PERIOD * rate) / FOLLOWED
-        at = np.abs(s["slips"][j]) / grip / DOUBT_STEP
+        at = np.abs(s["slips"][j]) / grip / TIRES_CHOSEN.doubt_step
         doubt = [
-            np.interp(a, np.arange(N_DOUBTS), row) for a, row in zip(at, p["doubt"], strict=True)
+            np.interp(a, np.arange(TIRES_CHOSEN.n_doubts), row)
+            for a, row in zip(at, p["doubt"], strict=True)
         ]
         expected = p["force_error"] + np.array(doubt) * grip / 1.645
         squares[j] = np.minimum((missed[j] / expected) ** 2, CLIP).sum()
@@ -175,14 +182,17 @@ def watch(s, p, m, axles):
         s["watched"] = 0
     if s["watched"] * PERIOD > SETTLED:
         cost = s["cost"] + PERIOD / ALIKE * 2.0 / (2.0 + squares.min()) * squares
-        s["cost"] = np.minimum(cost - cost.min(), SURPRISE)
+        s["cost"] = np.minimum(cost - cost.min(), REALTIME_CHOSEN.surprise)
         best = int(np.argmin(s["cost"]))
         if abs(front[best]) < 0.3 * GRIPS[best] * p["max_slip"][0]:
             moved = missed[best, 0] / p["stiffness"] * share_of(s["gentle"])
             s["zero"] = np.clip(s["zero"] + moved, -0.1, 0.1)
             s["gentle"] += 1
     best = int(np.argmin(s["cost"]))
-    left = np.minimum((SURPRISE - s["cost"][best + 1 :]) / (SURPRISE - REFUTED), 1.0)
+    left = np.minimum(
+        (REALTIME_CHOSEN.surprise - s["cost"][best + 1 :]) / (REALTIME_CHOSEN.surprise - REFUTED),
+        1.0,
+    )
     least = GRIPS[best] + np.cumprod(left) @ np.diff(GRIPS[best:])
     wanted = 1.0 - p["caution"] * (1.0 - least)
     grip = s["grip"] if s["doubted"] else wanted
@@ -240,9 +250,11 @@ def test_a_friction_is_the_tire_with_weights_of_that_friction():
 
 
 def test_a_wide_band_alone_lowers_no_grip(lagging):
-    force = curves_at(lagging, DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64))
+    force = curves_at(
+        lagging, TIRES_CHOSEN.doubt_step * np.arange(TIRES_CHOSEN.n_doubts, dtype=np.float64)
+    )
     tracker = make(lagging._replace(doubt=0.5 * np.abs(force)), 1.0)
-    assert (tracker.params["prior"] == np.where(GRIPS < 1.0, SURPRISE, 0.0)).all()
+    assert (tracker.params["prior"] == np.where(GRIPS < 1.0, REALTIME_CHOSEN.surprise, 0.0)).all()
     assert slalom(tracker, lagging, peak=0.006).min() > 0.9
 
 
@@ -251,7 +263,11 @@ def test_doubt_tightens_slip_along_the_plan(lagging):
     slips = []
     for share in (0.0, 0.3, 0.6):
         tire = lagging._replace(
-            doubt=share * curves_at(lagging, DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64))
+            doubt=share
+            * curves_at(
+                lagging,
+                TIRES_CHOSEN.doubt_step * np.arange(TIRES_CHOSEN.n_doubts, dtype=np.float64),
+            )
         )
         tracker = make(tire, 1.0)
         tracker.instance.params["grips"] = 1.0  # of the grip nothing is feared

@@ -1,0 +1,114 @@
+"""Numbers that were chosen here, file by file, with their units and reasons."""
+
+import math
+from typing import NamedTuple
+
+
+class Chosen(NamedTuple):
+    """Numbers of this package, by the file that reads them."""
+
+    # accelerometer
+    filtered: float = 0.25  # [s] of means, and between them
+    stride: float = 0.1
+    error: float = 0.02  # of g, and of the acceleration
+    relative: float = 0.03
+    accelerometer_least: float = 0.3  # of the scale of what is missed
+    least_memory: float = 0.25  # [s]
+    # consistency
+    fewest: int = 20  # windows: fewer say nothing, of more that many are taken all over the log
+    consistency_most: int = 500
+    # Curves that are tried, on one grid of c and μ, so that many have the same c/μ: to saturate
+    # them, which costs most, is done once for each of these.
+    fineness: float = 100.0 ** (1.0 / 27.0)
+    stiffnesses: int = 28
+    frictions: int = 15
+    # A stiffness that is twice the declared one costs as much as 14 % of what is left unexplained.
+    disbelief: float = 0.3  # per square of the logarithm of c over the declared one
+    # sqrt(g L), 30 m/s for a sedan; what is faster costs as much per square of a logarithm
+    fast: float = 6.0
+    # share of the variance of φ, below which less that is left says nothing more
+    exact: float = 0.003
+    clear: float = 2.5  # times its noise that a channel must swing for its unit to be identified
+    # slope of a_y on dv_y/dt + v_x r, with the roll of the body
+    rolling: tuple[float, float] = (0.85, 1.25)
+    # diagnosis
+    rounds: int = 2  # to which the ratio of a steering wheel is settled
+    settled: float = 0.02
+    wide: float = 1.0  # of that ratio, by which the screen may be off
+    surely: float = 0.9  # confidence that a law is broken
+    # finding
+    finding_most: float = 0.99  # confidence that is given
+    matters: float = 0.5  # confidence that something is wrong, from which it is given as such
+    # pieces
+    window: float = 0.2  # [s]
+    slowest: float = 0.3  # of the 95th percentile of speed, below which a window does not count
+    piece: float = 60.0  # s, and how many of them are looked at of a drive of hours
+    pieces: int = 10
+    pieces_shortest: int = 200  # samples of such a piece
+    pieces_least: float = 2.0  # s, below which a segment between two gaps is not looked at
+    # readings
+    # that a change must earn: less than it is left by a third in a sum of logarithms
+    gain: float = 1.1
+    freedom: float = 0.5  # that a change must earn beside, whose factor is free
+    # left of each equation, above which more changes are tried together
+    deeper: float = math.log(0.15)
+    kept: int = 8  # readings that are taken further
+    judged: int = 10  # of the best, by laws that need no vehicle
+    readings_most: int = 4  # changes at once
+    same_steering: float = math.log(2.5)
+    same_size: float = math.log(2.2)
+    same_inertia: float = math.log(2.0)
+    # within which nothing is gross
+    finer: int = 5  # golden sections: of an arm, of a steering angle
+    finest: int = 12
+    readings_alike: float = math.log(1.15)  # factors that say the same
+    steepness: float = 3.0  # of the confidence over what the next best reading leaves more
+    alone: float = 2.8  # of a v_y in another unit than v_x, and of one that is an angle in deg
+    unusual: float = 2.0
+    # samples
+    spike: float = 12.0  # times the noise beyond its neighbors
+    freeze: float = 0.3  # [s] that a noisy channel repeats one number
+    moves: float = 0.15  # of the range of v_x r, by which a car must move meanwhile, in any unit
+    # correlation of neighboring second differences, below which they are noise
+    alternate: float = -0.35
+    repeated: float = 0.01  # of a noisy channel: share of repeated samples, and how often
+    few: int = 5
+    caught_up: float = 0.025  # of a rounded channel: share of samples after which it catches up
+    # of a step after a rest, that the next but one has where a channel begins to move
+    goes_on: float = 0.6
+    on_grid: float = 0.9  # of steps that are multiples of the smallest
+    outlier: float = 16.0  # times the variance that is expected of a difference, and not more
+    samples_alike: float = math.log(1.6)  # of the times by which samples of two channels are late
+    coarse: float = 0.05  # quantum over the rms of a channel
+    certain: float = 0.99
+    block: int = 5  # samples in a row that were logged before, of all channels
+    samples_shortest: float = 4.0  # samples that a jump has at least
+    side: int = 12  # samples on each side of a jump
+    jump: float = 5.5  # of the usual disagreement of both sides: in two channels, in a third
+    also: float = 2.5
+    # screen
+    quiet: float = 0.8  # [m/s^2] of v_x r, which a drive must exceed in `_LIVELY` of its windows
+    lively: float = 0.005
+    sure: float = 0.95
+    several: int = 3  # changes at once, beyond which nothing is sure
+    wheel: tuple[float, float] = (5.0, 30.0)  # ratios of a steering wheel to the road wheels
+    near: float = math.log(1.15)  # of a factor to that of a unit
+    # of a drive, from which a channel that does not change is no measurement
+    perfect: float = 0.999
+    # of a drive, from which a channel that reads exactly 0 so long is no measurement
+    often: float = 0.1
+    slow: float = 1.0  # s between samples, from which a clock is in ms
+    # suspects
+    sedan: float = 2.7  # m, wheelbase of whose size the numbers are
+    degrees: float = math.degrees(1.0)  # in a rad
+    # of I_z/(m l_f l_r); cars on the road have 0.9 to 1.1
+    inertia: tuple[float, float] = (0.5, 1.6)
+    small: float = 1.0  # [m] wheelbase, below which a model car may have as little
+    small_inertia: float = 0.3
+    # wheelbases that a car, and what is mounted to it, reach beyond its axles
+    overhang: float = 0.5
+    # l_f over the wheelbase: a load that an axle of a car can have
+    center: tuple[float, float] = (0.25, 0.75)
+
+
+CHOSEN = Chosen()

@@ -1,0 +1,36 @@
+"""Numbers that were chosen here, file by file, with their units and reasons."""
+
+from typing import NamedTuple
+
+
+class Chosen(NamedTuple):
+    """Numbers of this package, by the file that reads them."""
+
+    # gates
+    knots: float = 1.0  # m, about their distance
+    per_interval: int = 4  # places between two knots where limits hold
+    gently: float = 5.0  # m³: weight of ∫ (dκ/ds)² ds against the peak of |κ| [1/m]
+    cone_spacing: float = 3.0  # m
+    car_width: float = 1.8  # m
+    narrowest: float = 1.0  # m, of a car
+    widest: float = 2.6
+    easing: float = 6.0  # m
+    # line
+    # rad in one step; coarser samples would not carry the cubics between them
+    largest_turn: float = 0.3
+    disagreement: float = 0.02  # of a step, or rad; beside what cubics leave out at that turn
+    # path
+    # m; shorter than any turn that a car can drive, so that no step skips a bend
+    longest_step: float = 1.0
+    # of 1 - κ e_y: near the center of a turn every s is as close as the next
+    smallest_slope: float = 0.3
+    tolerance: float = 1e-9  # m
+    steps: int = 200
+    # waypoints
+    fits: int = 4
+    farthest: float = 1e8  # of a way-point from the origin [m]: every map of the earth fits
+    same: float = 1e-6  # of the median gap: way-points as near as this are one
+    pieces: int = 8  # of every interval between knots, for its length
+
+
+CHOSEN = Chosen()
