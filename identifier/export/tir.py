@@ -32,7 +32,7 @@ class _MagicCurve(NamedTuple):
 
 
 def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -> _MagicCurve:
-    """Return the Magic Formula nearest to an axle's curve; refuse one beyond `CHOSEN.most_missed`."""
+    """Return the Magic Formula nearest to an axle's curve, within `CHOSEN.most_missed`."""
     i, known = AXLES.index(axle), model.known_slip
     reach = CHOSEN.reach if known is None else max(CHOSEN.least_reach, float(known[i]))
     beyond = np.linspace(reach, max(CHOSEN.widest, 1.5 * reach), 60)
