@@ -305,15 +305,15 @@ class TireModel(ABC):
             curve of slip, static loads. Else a curve of slip does not look at it.
         """
         slip = np.asarray(alpha, dtype=np.float64)
-        both = self._steady(slip.ravel(), self._curve_speed if v_x is None else v_x)
+        speed = self._curve_speed if v_x is None else v_x
+        both = self._steady(slip.ravel(), speed) if slip.size else np.zeros((0, 2))
         one = of_axle(both.reshape(*slip.shape, 2), axle)
         return float(one) if one.ndim == 0 else one
 
     def _steady(self, alpha: Array, v_x: float) -> Array:
         """Return the steady axle forces at slip angles (k,) [rad] and a speed, (k, 2) [N]."""
         pairs = np.tile(alpha, (2, 1))
-        found = self._force_curve()(pairs, v_x) if alpha.size else pairs
-        return np.array(found, dtype=np.float64).T
+        return np.array(self._force_curve()(pairs, v_x), dtype=np.float64).T
 
     @property
     def stiffness(self) -> Array:

@@ -313,6 +313,12 @@ class Vehicle:
         return self.l_f + self.l_r
 
     @property
+    def inertia_is_estimate(self) -> bool:
+        """Whether the yaw inertia is what `estimate` returns, so that nobody measured it."""
+        guess = estimate(self.mass, self.l_f, self.l_r)["yaw_inertia"]
+        return math.isclose(self.yaw_inertia, guess, rel_tol=1e-3)
+
+    @property
     def weight(self) -> float:
         """Weight m g [N]."""
         return self.mass * GRAVITY

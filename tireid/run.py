@@ -74,8 +74,11 @@ class Run:
         CannotFreezeError
             Where the method estimates a signal, not a model.
         ValueError
-            Where the recording begins after that time.
+            Where the recording begins after that time, or ends before it.
         """
+        end = float(self.recording.t[-1])
+        if t is not None and t > end + self.recording.dt:
+            raise ValueError(f"the recording ends at {end:g} s, before {t:g} s")
         return self.history.freeze(t)
 
     @cached_property
@@ -98,8 +101,8 @@ class Run:
         """Return the tire with a guaranteed band beside the calibrated one.
 
         Where |F/F_z - φ| <= e (1 + β) + τ ρ holds of some curve φ at every instant, the true force
-        lies in its `guarantee`. It is `tire` where the method learns no curve of slip, no lateral
-        velocity was measured, or too little is driven.
+        lies in its `guarantee`, which is None where no lateral velocity was measured or too little
+        is driven.
 
         Parameters
         ----------
@@ -113,8 +116,13 @@ class Run:
         CannotFreezeError
             Where the method estimates a signal, not a model.
         ValueError
-            Where the bound is impossible.
+            Where the bound is impossible, or the method has no set of possible weights: "axle" has.
         """
+        if self.method.limits is None:
+            raise ValueError(
+                f"{type(self.method).__name__} has no set of possible weights, so no guarantee: "
+                'identify with the method "axle"'
+            )
         return guaranteed(self.history, bound, None, self.tire)
 
     def save(self, folder: str | PathLike[str], *, overwrite: bool = False) -> None:

@@ -1,7 +1,7 @@
 """The axle model, frozen: force curves of slip, their lag and sway, and where they are known."""
 
 from dataclasses import asdict, dataclass, replace
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any, Self
 
 import casadi as ca
@@ -397,7 +397,10 @@ class AxleModel(TireModel):
     @classmethod
     def _read(cls, table: Table) -> Self:
         if "own" in table:  # files of earlier versions: the three in one
-            three = dict(zip(BESIDE, table.array("own").T.tolist(), strict=False))
+            own = table.array("own")
+            if own.shape != (2, 3):
+                table.refuse("own", f"must have shape (2, 3), it has {own.shape}")
+            three = dict(zip(BESIDE, own.T.tolist(), strict=True))
             table = Table({**three, **table.data}, "", FrozenModelError)
         numbers: dict[str, Any] = {name: table.array(name) for name in ("ladder", "edges", *ARRAYS)}
         for name, values in numbers.items():
@@ -431,6 +434,9 @@ class AxleModel(TireModel):
         )
 
 
+_declared = lru_cache(maxsize=8)(BandCalibration.declared)  # asked thrice for every band
+
+
 @dataclass(frozen=True, slots=True)
 class _AxleBand(Band[AxleModel]):
     """How unsure an axle model is: by its covariance, and errors that no curve can explain."""
@@ -442,8 +448,9 @@ class _AxleBand(Band[AxleModel]):
     @property
     def calibration(self) -> BandCalibration:
         """That of the model; where there is none, of the declared errors."""
-        brisk = brisk_speed(self.model.vehicle, self.model.min_speed)
-        return self.model.calibration or BandCalibration.declared(brisk)
+        if self.model.calibration is not None:
+            return self.model.calibration
+        return _declared(brisk_speed(self.model.vehicle, self.model.min_speed))
 
     @property
     def speed(self) -> float:

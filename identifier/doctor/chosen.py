@@ -62,6 +62,7 @@ class Chosen(NamedTuple):
     finer: int = 5  # golden sections: of an arm, of a steering angle
     finest: int = 12
     readings_alike: float = math.log(1.15)  # factors that say the same
+    as_good: float = 0.5  # of cost: by so much a wrong sign may be worse than one with a factor
     steepness: float = 3.0  # of the confidence over what the next best reading leaves more
     alone: float = 2.8  # of a v_y in another unit than v_x, and of one that is an angle in deg
     unusual: float = 2.0

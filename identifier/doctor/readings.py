@@ -78,6 +78,13 @@ class Change:
             for name, factor in zip(self.channels, self.factors, strict=True)
         )
 
+    @property
+    def turned(self) -> "Change":
+        """Of a steering angle that is turned and scaled the sign alone; else the same."""
+        if self.code == "steering" and self.factors[0][1] < 0.0:
+            return _sign(*self.channels)
+        return self
+
     def shows_in(self, motion: Motion) -> bool:
         """Return whether a log can tell it: what is hidden in noise has no unit of its own."""
         return self.code not in ("unit", "sideslip") or not motion.hidden >= {*self.channels}
@@ -89,6 +96,8 @@ class Change:
 
     def is_like(self, other: "Change") -> bool:
         """Return whether both say the same, be it by a factor that is a little another one."""
+        if {self.code, other.code} == {"sign", "steering"}:
+            return self.channels == other.channels and self.turned == other.turned
         what = (self.code, self.channels, self.unit)
         pairs = zip(self.factors, other.factors, strict=False)
         near = all(
@@ -207,6 +216,9 @@ def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...
 def _chosen(ranked: list[_Explanation]) -> Read:
     """Return the first of some explanations, and the next that means something else."""
     best, *others = ranked
+    turned = tuple(change.turned for change in best.changes)  # which claims less
+    nearly = best.cost + CHOSEN.as_good
+    best = next((one for one in others if one.changes == turned and one.cost < nearly), best)
     others = [one for one in others if one.cost >= best.cost]
     other = next((one for one in others if _means_else(one, best)), ranked[-1])
     return Read(best=best, other=other)

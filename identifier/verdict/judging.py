@@ -101,7 +101,7 @@ def judge_identification(
     """
     asked = _asked(model, recording, own=True, frozen=frozen)
     if asked is None:
-        return _too_short(model)
+        return _too_short(model, CHOSEN.fewest_taught)
     bounds = model.drives.at_bounds if reached is None else reached
     notes = [Objection(code, None, text, False) for code, text in model.drives.notes]
     return _verdict(asked, [*_findings(asked), *map(_at_bound, bounds), *notes], recording)
@@ -116,7 +116,7 @@ def judge_prediction(
     """
     asked = _asked(model, recording, own=False)
     if asked is None:
-        return _too_short(model)
+        return _too_short(model, CHOSEN.fewest)
     road = _road(asked.recording, model)
     friction = road_friction(model, recording, road) if another_road else None
     verdict = _verdict(asked, [*_findings(asked), *_roads(friction)], recording)
@@ -132,7 +132,8 @@ def _asked(
     if own and found is not None:
         other = model.drives.road_differs(recording.t[part.samples])
         found = found.where(~other[found.windows.starts])
-    if found is None or len(found.windows) < CHOSEN.fewest:
+    fewest = CHOSEN.fewest_taught if own else CHOSEN.fewest
+    if found is None or len(found.windows) < fewest:
         return None
     judged, some = found.but_a_segment()
     left_out = None
@@ -361,8 +362,8 @@ def _reach(model: TireModel, recording: Recording) -> str:
     return f"{speeds[0]:.3g} to {speeds[1]:.3g} m/s, {slip}"
 
 
-def _too_short(model: TireModel) -> Verdict:
-    few = f"fewer than {CHOSEN.fewest} windows of {CHOSEN.window:g} s are driven briskly"
+def _too_short(model: TireModel, fewest: int) -> Verdict:
+    few = f"fewer than {fewest} windows of {CHOSEN.window:g} s are driven briskly"
     finding = Objection("too_short", None, f"{few}: there is nothing to judge by", True)
     numbers = tuple(Number(*one, valid=False) for one in model.estimates())
     return Verdict(findings=(finding,), numbers=numbers, measures={})

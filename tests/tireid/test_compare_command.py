@@ -257,7 +257,7 @@ def test_the_registry_has_every_name_that_is_promised():
 
 
 def test_a_rival_that_is_not_installed_is_told_where_it_is(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("identifier.methods._installed", dict)
+    monkeypatch.setattr("identifier.methods.installed", lambda group: {})
     told = "method washout is not installed: pip install ./benchmarks/rivals"
     words = ["--method", "washout", "--out", tmp_path / "out"]
     assert told in refusal(capsys, ["compare", *words])

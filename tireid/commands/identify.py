@@ -97,6 +97,12 @@ def run(options: argparse.Namespace) -> int:
     _require_distinct([*logs, *others])
     recording = joined(logs)
     without_v_y = any(one.v_y is None for one in (*logs, *others))
+    choice = {"without_v_y": without_v_y, "online": beside}
+    law, design = shared.chosen_method(options, vehicle, seed, **choice)
+    for one in (*logs, *others):
+        check_recording(one, design)
+    if without_v_y:
+        say(f"a log has no lateral velocity: {law} learns, and estimates it")
     say("the doctor looks at the log")
     diagnosis = diagnose(recording, vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()
@@ -104,14 +110,9 @@ def run(options: argparse.Namespace) -> int:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         recording = joined(logs)
         vehicle = repair.on(vehicle)
-    law, design = shared.chosen_method(
-        options, vehicle, seed, without_v_y=without_v_y, online=beside
-    )
-    if without_v_y:
-        say(f"a log has no lateral velocity: {law} learns, and estimates it")
-    for one in (*logs, *others):
-        check_recording(one, design)
-        if options.repair is not None and not options.no_check:
+        law, design = shared.chosen_method(options, vehicle, seed, **choice)
+    if options.repair is not None and not options.no_check:
+        for one in (*logs, *others):
             check_physics(one)
             check_against_vehicle(one, vehicle)
     network = shared.network_model(options, vehicle, design.min_speed)

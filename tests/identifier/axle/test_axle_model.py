@@ -110,8 +110,9 @@ def test_learning_goes_on_from_stored_weights(car, drive, tmp_path):
     earlier = {key: one for key, one in model.to_dict().items() if key not in BESIDE}
     earlier["own"] = np.column_stack([model.compliance, model.sway_share, model.offset]).tolist()
     assert AxleModel.from_dict(earlier, "earlier").to_dict() == model.to_dict()
-    with pytest.raises(FrozenModelError, match="earlier: offset is missing"):
-        AxleModel.from_dict(earlier | {"own": [[0.1, 0.0], [0.1, 0.0]]}, "earlier")
+    for own in ([[0.1, 0.0], [0.1, 0.0]], [[0.1, 0.0, 0.0, 0.0]] * 2, [0.1, 0.0], []):
+        with pytest.raises(FrozenModelError, match=r"earlier: own must have shape \(2, 3\)"):
+            AxleModel.from_dict(earlier | {"own": own}, "earlier")
     again, afresh = identify(second, car, design, start=stored), identify(second, car, design)
     np.testing.assert_array_equal(again.state["W"][0], model.W)
     off = [np.abs(one.axle_force - second.axle_force).mean() for one in (again, afresh)]

@@ -175,7 +175,7 @@ def test_a_band_is_asked_as_a_force_is(model):
     assert low < model.force(0.05, "rear") < high
     both = model.guarantee.at([[0.05, 0.1]])
     assert both[0].shape == (1, 2, 2) and both[0][0, 0, 1] == pytest.approx(low)
-    fast = model.guarantee.fastest[0]
+    fast = model.guarantee.possible.fastest[0]
     slow, quick = (model.guarantee.at(0.05, "front", rate) for rate in (0.0, fast))
     late = model.guarantee.possible.bound.lateness[0] * fast * model.vehicle.axle_loads[0]
     assert slow[0] - quick[0] == pytest.approx(late) == quick[1] - slow[1]

@@ -27,6 +27,7 @@ from models.maneuvers import RandomSteer, SampledSteer
 from models.plant import Plant
 from models.recordings import joined, read_recording, runs
 from models.vehicle import sedan
+from tireid.driving.learn import sample_recording
 
 DEGREES = 180.0 / np.pi
 RECORDED = {"carmaker.csv.gz": CARMAKER, "dart.csv.gz": DART, "dart_imu.csv.gz": DART}
@@ -226,6 +227,15 @@ def test_a_factor_of_the_steering_is_what_it_most_likely_is():
     assert "degrees" in wheel.text
     other = steering_finding(0.5, 1.0)
     assert (other.code, other.sure) == ("factor", False)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_turned_steering_angle_is_sure_whatever_ratio_might_stand_beside_it(seed):
+    log = sample_recording(sedan(), seed=seed)
+    found = diagnose(replace(log, delta_f=-log.delta_f), sedan())
+    (one,) = found.findings
+    assert (one.code, one.channel, one.sure) == ("sign", "delta_f", True)
+    assert found.repair.factor == {"delta_f": -1.0}
 
 
 def test_a_straight_drive_is_told_to_hold_nothing(one):

@@ -1,17 +1,18 @@
 """The estimate finds what was planted, from one log or several, whatever stiffness is told."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-import identifier.estimate.fit as fitting
 from identifier.estimate.fit import fit
 from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
 from identifier.estimate.roads import _cheapest
 from identifier.motion.parameters import INDEX, NAMES
-from models.vehicle import sedan
+from models.vehicle import estimate, sedan
 from tests.identifier.estimate.conftest import DROP, driven
+from tireid.driving.learn import sample_recording
 
 GRID = np.linspace(0.005, 0.06, 12)
 
@@ -80,9 +81,10 @@ def test_two_logs_tell_more_than_one(learnt):
     assert share_missed(both.model, driven(5)).max() < share_missed(learnt.model, driven(5)).max()
 
 
-def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt, monkeypatch):
-    monkeypatch.setattr(fitting, "CHOSEN", fitting.CHOSEN._replace(fit_block=8.0))
-    blocks = fit([driven(3)], sedan()).model
+def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt):
+    found = fit([driven(3)], sedan(), block=8.0)
+    assert len(found.parts) > 1
+    blocks = found.model
     np.testing.assert_allclose(blocks.force(GRID), learnt.model.force(GRID), rtol=0.05)
     np.testing.assert_allclose(
         blocks.band.relative_sd(GRID), learnt.model.band.relative_sd(GRID), rtol=0.7
@@ -136,7 +138,7 @@ def test_a_wrong_steering_ratio_does_not_reach_the_stiffness(ratio, car, drive):
     log = drive()
     right = fit([log], car).model
     found = fit([replace(log, delta_f=ratio * log.delta_f)], car).model
-    np.testing.assert_allclose(found.cornering_stiffness, right.cornering_stiffness, rtol=0.08)
+    np.testing.assert_allclose(found.stiffness, right.stiffness, rtol=0.08)
     assert found["steering_gain"] == pytest.approx(1.0 / ratio - 1.0, abs=0.06)
     assert abs(right["steering_gain"]) < 0.04
 
@@ -152,3 +154,16 @@ def test_the_belief_in_it_is_a_student_one_of_the_same_width(car):
     step[GAIN] = 1e-4 * sd
     slope = (priors.cost(p + step) - priors.cost(p - step)) / (2.0 * step[GAIN])
     assert slope == pytest.approx(priors.around(p)[0][GAIN], rel=1e-5)
+
+
+def test_a_yaw_inertia_that_nobody_measured_does_not_become_a_steering_ratio():
+    """m l_f l_r is 7 % above that of the sedan; given as measured, the ratio takes the error."""
+    car, log = sedan(), sample_recording(sedan())
+    guess = estimate(car.mass, car.l_f, car.l_r)["yaw_inertia"]
+    left_out = replace(car, yaw_inertia=guess)
+    assert left_out.inertia_is_estimate and not car.inertia_is_estimate
+    model = fit([log], left_out).model
+    assert abs(model["steering_gain"]) < 0.06 and not model.drives.notes
+    assert model["ln_inertia"] == pytest.approx(math.log(car.yaw_inertia / guess), abs=0.08)
+    measured = Priors.of(left_out).without(["ln_inertia"])
+    assert fit([log], left_out, measured).model["steering_gain"] > 0.08
