@@ -51,8 +51,7 @@ class ForceBound:
             if not 0.0 < value <= CHOSEN.largest_bound:
                 raise ValueError(
                     f"the bound of an error must be above 0 and at most {CHOSEN.largest_bound:g} "
-                    f"static "
-                    f"axle loads, it is {value:g}"
+                    f"static axle loads, it is {value:g}"
                 )
         for value in self.lateness:
             if not 0.0 <= value <= CHOSEN.longest_lateness:
