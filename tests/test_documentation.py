@@ -95,6 +95,17 @@ def documented_definitions(source: str) -> list[tuple[Documented, str]]:
     return [(node, top) for node, top in found if not is_overload(node)]
 
 
+def listed_names(page: str) -> list[tuple[str, str]]:
+    """Module and name of what the tables of the API list."""
+    found, module = [], ""
+    for line in "".join(re.findall(r"^```\{eval-rst\}\n(.*?)^```$", page, re.M | re.S)).splitlines():
+        if line.startswith(".. currentmodule:: "):
+            module = line.split()[-1]
+        elif re.fullmatch(r"   \w+", line):
+            found.append((module, line.strip()))
+    return found
+
+
 def interface() -> dict[Path, set[str]]:
     """Names of what `tireid` offers and its bases, by the file that defines them.
 
@@ -102,8 +113,11 @@ def interface() -> dict[Path, set[str]]:
     """
     offered = [getattr(ti, name) for name in ti.__all__]
     page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
-    for module, name in re.findall(r"^   ([\w.]+)\.(\w+)$", page, re.M):
-        offered.append(getattr(import_module(module), name))
+    offered += [
+        getattr(import_module(module), name)
+        for module, name in listed_names(page)
+        if module != "tireid"
+    ]
     for module in [one for one in offered if isinstance(one, ModuleType)]:
         offered += [value for name, value in vars(module).items() if not name.startswith("_")]
     named: dict[Path, set[str]] = {}
@@ -236,8 +250,7 @@ class Corner(NamedTuple):
 
 def missing_names(page: str) -> set[str]:
     """Public names of `tireid` that the tables of the API do not list, and what else they list."""
-    tables = re.findall(r"^\.\. autosummary::\n(.*?)^```$", page, re.M | re.S)
-    listed = set(re.findall(r"^   (\w+)$", "".join(tables), re.M))
+    listed = {name for module, name in listed_names(page) if module == "tireid"}
     return {name for name in ti.__all__ if not name.startswith("_")} ^ listed
 
 
