@@ -98,7 +98,8 @@ def documented_definitions(source: str) -> list[tuple[Documented, str]]:
 def listed_names(page: str) -> list[tuple[str, str]]:
     """Module and name of what the tables of the API list."""
     found, module = [], ""
-    for line in "".join(re.findall(r"^```\{eval-rst\}\n(.*?)^```$", page, re.M | re.S)).splitlines():
+    tables = re.findall(r"^```\{eval-rst\}\n(.*?)^```$", page, re.M | re.S)
+    for line in "".join(tables).splitlines():
         if line.startswith(".. currentmodule:: "):
             module = line.split()[-1]
         elif re.fullmatch(r"   \w+", line):

@@ -61,7 +61,7 @@ def test_what_is_declared_holds_after_every_sample(fault, speed, car, drive):
         assert np.isfinite(values).all(), port
     assert (np.abs(history.axle_force) < 6 * np.array(car.axle_loads)).all()
     model = history.freeze(1e9)
-    assert model.cornering_stiffness.min() >= 0.0
+    assert model.stiffness.min() >= 0.0
     assert np.isfinite(model.predict(history.recording)).all()
 
 

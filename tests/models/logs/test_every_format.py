@@ -11,6 +11,7 @@ import sys
 import numpy as np
 import pytest
 
+from models.logs import can
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.logs.memory import open_arrays
