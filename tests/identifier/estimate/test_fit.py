@@ -136,7 +136,7 @@ def test_a_wrong_steering_ratio_does_not_reach_the_stiffness(ratio, car, drive):
     log = drive()
     right = fit([log], car).model
     found = fit([replace(log, delta_f=ratio * log.delta_f)], car).model
-    np.testing.assert_allclose(found.cornering_stiffness, right.cornering_stiffness, rtol=0.08)
+    np.testing.assert_allclose(found.stiffness, right.stiffness, rtol=0.08)
     assert found["steering_gain"] == pytest.approx(1.0 / ratio - 1.0, abs=0.06)
     assert abs(right["steering_gain"]) < 0.04
 
