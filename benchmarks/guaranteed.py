@@ -11,7 +11,7 @@ band is meant over the known slip, and set over the largest error of the frozen 
 Beside it stand the same with a bound that is told and true, the least that a curve keeps in the
 drive that taught and in those that are asked.
 Last, where the recordings of CarMaker are there, each run is asked of what the other taught.
-`RESERVE` was chosen on seeds below 1000.
+The reserve over the least bound was chosen on seeds below 1000.
 """
 
 import argparse

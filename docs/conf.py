@@ -76,6 +76,11 @@ def shorten(*event: Any) -> tuple[str | None, ...]:
     return tuple(text.replace(ARRAY, "Array") if text else None for text in event[-2:])
 
 
+def skips(_app: Any, _what: str, _name: str, it: Any, *_rest: Any) -> bool | None:
+    """Leave out the fields of tuples with names: their parameters say what they are."""
+    return True if type(it).__name__ == "_tuplegetter" else None
+
+
 def setup(app: Any) -> None:
     """Rewrite docstrings before napoleon reads them, and signatures; make pages of names anew."""
     import tireid
@@ -83,4 +88,5 @@ def setup(app: Any) -> None:
     sys.modules["tireid.paths"] = tireid.paths  # is `mpc.path`, found by the name of the interface
     shutil.rmtree(DOCS / "generated", ignore_errors=True)
     app.connect("autodoc-process-signature", shorten)
+    app.connect("autodoc-skip-member", skips)
     app.connect("autodoc-process-docstring", describe, priority=400)

@@ -78,6 +78,9 @@ Model = TypeVar("Model", bound=_Curves)
 @dataclass(frozen=True, slots=True)
 class Band(ABC, Generic[Model]):
     """What is not known of the forces of a model, as a band around its curves.
+
+    Parameters
+    ----------
     model : whose band it is.
     """
 
@@ -103,13 +106,23 @@ class Band(ABC, Generic[Model]):
 
     @abstractmethod
     def spread(self, slip: Array, v_x: Array, pressed: Array) -> BandSpread:
-        """Return the variances of the steady forces, (n, 2) each.
-        slip : of front and rear axle [rad], (n, 2).   v_x : speeds [m/s], positive, (n,).
+        """Return the variances of the steady forces, (n, 2) each [static axle loads²].
+
+        Parameters
+        ----------
+        slip : of front and rear axle [rad], (n, 2).
+        v_x : speeds [m/s], positive, (n,).
         pressed : loads of the axles over the static ones [-], (n, 2).
         """
 
     def factor(self, slip: Array, v_x: Array) -> Array | float:
-        """Return by how much errors are larger or smaller than declared [-], (n, 2) or one."""
+        """Return by how much errors are larger or smaller than declared [-], (n, 2) or one.
+
+        Parameters
+        ----------
+        slip : of front and rear axle [rad], (n, 2).
+        v_x : speeds [m/s], positive, (n,).
+        """
         del slip, v_x
         return 1.0
 
@@ -118,12 +131,18 @@ class Band(ABC, Generic[Model]):
         """Return how unsure the forces at slip angles still are, (k, 2): 1 as before learning.
 
         Standard deviation of the force over that of the prior.
+
+        Parameters
+        ----------
         alpha : slip angles [rad], (k,), not zero.
         """
 
     @abstractmethod
     def calibrated_by(self, calibration: Any, force_missed: Array | None = None) -> Model:
         """Return the model, its band calibrated.
+
+        Parameters
+        ----------
         calibration : None assumes the declared errors.
         force_missed : share of the force that the model misses of the identification drive, (2,);
             None where not computed.
@@ -131,6 +150,11 @@ class Band(ABC, Generic[Model]):
 
     def samples(self, n: int, rng: np.random.Generator) -> tuple[Model, ...]:
         """Return models drawn from what is not known of the tires.
+
+        Parameters
+        ----------
+        n : how many.
+        rng : numbers of the draw.
 
         Raises
         ------
@@ -148,6 +172,9 @@ class Band(ABC, Generic[Model]):
         """Return the model for a road whose friction is not that of the identification drive.
 
         Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
+
+        Parameters
+        ----------
         sd_friction : standard deviation of ln μ between the roads [-].
         """
         if not 0.0 <= sd_friction < np.inf:
@@ -180,7 +207,11 @@ class Band(ABC, Generic[Model]):
         v_x: float | None = None,
     ) -> tuple[float, float] | tuple[Array, Array]:
         """Return between which forces the true one lies [N]: (low, high), each as of `force`.
-        alpha, axle : as of `TireModel.force`.
+
+        Parameters
+        ----------
+        alpha : slip angles in the paper's sign [rad], a number or an array of any shape.
+        axle : "front" or "rear", for ends of the shape of `alpha`; None gives both, (..., 2).
         level : in which share of cases it shall, above 0 and below 1.
         v_x : speed [m/s], positive; None takes that of the identification drive.
 
@@ -198,7 +229,11 @@ class Band(ABC, Generic[Model]):
         self, alpha: Array, level: float = LEVEL, *, v_x: float | Array | None = None
     ) -> Array:
         """Return half its width around the steady forces, (k, 2) [N].
+
+        Parameters
+        ----------
         alpha : slip angles [rad], (k,).
+        level : in which share of cases it shall hold, above 0 and below 1.
         v_x : speed [m/s], a number or (k,), positive; None takes that of the identification drive,
             under static loads.
         """
@@ -210,7 +245,12 @@ class Band(ABC, Generic[Model]):
 
     def along(self, slip: Array, v_x: Array, level: float = LEVEL) -> Array:
         """Return half its width where each axle has its own slip, (n, 2) [N].
-        slip : of front and rear axle [rad], (n, 2).   v_x : speeds [m/s], positive, (n,).
+
+        Parameters
+        ----------
+        slip : of front and rear axle [rad], (n, 2).
+        v_x : speeds [m/s], positive, (n,).
+        level : in which share of cases it shall hold, above 0 and below 1.
         """
         return self._half(slip, v_x, self.model.vehicle.load_ratio(v_x), level)
 
@@ -231,6 +271,10 @@ class Band(ABC, Generic[Model]):
         """Return half its width around the predicted forces of a drive, (n, 2) [N].
 
         It is zero where the forces read zero.
+
+        Parameters
+        ----------
+        recording : the drive.
         level : share of samples that it shall hold, above 0 and below 1.
         """
         moving = recording.v_x[:, None] >= self.model.min_speed

@@ -112,9 +112,13 @@ class Reached(NamedTuple):
 class Drives(NamedTuple):
     """What the identification drives of a model were, and what they had beside its tires.
 
-    speeds : least and largest [m/s], (2,); None where unknown.   lengthwise : parameters (p,) with
-    load transfer and ellipse, and covariance (p, p); None where there are none.   elsewhere : from
-    and to [s] of what was driven on another road.   notes : findings, code and one line of each.
+    Parameters
+    ----------
+    speeds : least and largest [m/s], (2,); None where unknown.
+    lengthwise : parameters (p,) with load transfer and ellipse, and covariance (p, p); None where
+        there are none.
+    elsewhere : from and to [s] of what was driven on another road.
+    notes : findings, code and one line of each.
     at_bounds : estimates at active bounds.
     """
 

@@ -84,7 +84,7 @@ def lessons(design: _Learner, history: Run) -> Lessons:
     over = tuple(port for port in step.name_in() if port not in setup.constants)
     scan, parts, theta, begin = Scan(step, carry=(), over=over), [], [], []
     constants = {port: setup.constants[port] for port in scan.constants}
-    for block in history.blocks(np.arange(max(n - CHOSEN.along_most, 0), n)):
+    for block in history.blocks(np.arange(max(n - CHOSEN.most_samples, 0), n)):
         seen = setup.shown(history.recording, block.part)
         signals = {port: seen.of_recording(values) for port, values in seen.signals.items()}
         sampled = {port: _by_columns({**block.before, **signals}[port]) for port in over}

@@ -52,10 +52,10 @@ class BandCalibration:
 
     def __post_init__(self) -> None:
         for name, shape, low, high in (
-            ("factors", (2, len(CHOSEN.centers)), CHOSEN.least, CHOSEN.band_most),
-            ("speeds", (2, len(CHOSEN.at_speeds)), CHOSEN.least, CHOSEN.band_most),
+            ("factors", (2, len(CHOSEN.centers)), CHOSEN.least_factor, CHOSEN.most_factor),
+            ("speeds", (2, len(CHOSEN.at_speeds)), CHOSEN.least_factor, CHOSEN.most_factor),
             ("color", (2,), 1.0, CHOSEN.most_color),
-            ("noise", (3,), 0.0, CHOSEN.band_most),
+            ("noise", (3,), 0.0, CHOSEN.most_factor),
         ):
             value = getattr(self, name)
             if value.shape != shape:

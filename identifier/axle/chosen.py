@@ -10,7 +10,7 @@ class Chosen(NamedTuple):
     slips: int = 12  # over the range that is known, at which errors are bounded
     # standard deviations of the prior, within which the truth lies before the drive
     begin: float = 3.0
-    along_most: int = 360_000  # samples that are looked at, those at the end
+    most_samples: int = 360_000  # samples that are looked at, those at the end
     smallest: float = 1e-4  # rad: where nothing is known
     along_tiny: float = 1e-30  # keeps a quotient finite
     along_rounding: float = 1e-9  # of a bound
@@ -23,9 +23,10 @@ class Chosen(NamedTuple):
     speeds: tuple[float, float, float] = (2.0, 3.0, 4.0)
     # sqrt(g L): where the factor of a range of speed holds
     at_speeds: tuple[float, ...] = (1.5, 2.5, 3.5, 4.5)
-    stretch: tuple[float, float] = (0.5, 2.0)  # s at most and least
-    least: float = 0.1  # factors
-    band_most: float = 100.0
+    stretch: tuple[float, float] = (0.5, 2.0)  # least and most of s
+    least_factor: float = 0.1  # of the factors of a band, over errors as they are declared [-]
+    most_factor: float = 100.0  # of the same factors, and of the noise [-]
+    # of the factor for errors that last longer than they are declared to [-]
     most_color: float = 1000.0
     unknown: float = 0.25  # standard deviation over the prior's, from which on slip is not known
     # certificate
@@ -44,9 +45,10 @@ class Chosen(NamedTuple):
     covariance_rounding: float = 1e-5
     # guarantee
     memory: float = 0.3  # s: of the rate, and of slip that was beyond
-    unlikely: float = 1.5  # lateness, over error: chosen as `verdict.guaranteed.RESERVE` was
-    first: int = 150  # constraints that are tried first, and added at a time
-    more: int = 100
+    # lateness, over error: chosen as `reserve` of identifier/verdict/chosen.py was
+    unlikely: float = 1.5
+    first: int = 150  # constraints that are tried first
+    more: int = 100  # constraints that are added at a time
     slack: float = 1e-9  # static axle loads
     # static axle loads of a ball in the polytope: below it there is no inside
     least_radius: float = 1e-6
@@ -54,7 +56,7 @@ class Chosen(NamedTuple):
     guarantee_tiny: float = 1e-12
     largest_bound: float = 10.0  # static axle loads
     longest_lateness: float = 1.0  # s
-    most_vertices: int = 100_000
+    most_vertices: int = 100_000  # of a polytope: more take too much memory and time
     at_once: int = 256  # samples times all vertices: so many products stay in the cache
     # learning
     largest_q: float = 25.0  # of one outlier
@@ -77,7 +79,8 @@ class Chosen(NamedTuple):
     step: float = 1.2  # ratio over which log-derivatives are taken
     # slip
     slowest: float = 0.1  # rad/s, of a body that rolls on springs
-    fastest: float = 100.0
+    fastest: float = 100.0  # rad/s, of a body that rolls on springs
+    # per wheelbase: ∂x/∂s stays below it, also where its recursion does not settle
     most_sensitive: float = 1e4
     # g: ρ and ρ'/ω stay below it, at any sampling and however speed changes
     most_sway: float = 10.0

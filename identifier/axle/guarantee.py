@@ -51,8 +51,7 @@ class ForceBound:
             if not 0.0 < value <= CHOSEN.largest_bound:
                 raise ValueError(
                     f"the bound of an error must be above 0 and at most {CHOSEN.largest_bound:g} "
-                    f"static "
-                    f"axle loads, it is {value:g}"
+                    f"static axle loads, it is {value:g}"
                 )
         for value in self.lateness:
             if not 0.0 <= value <= CHOSEN.longest_lateness:
@@ -330,10 +329,14 @@ class PossibleWeights:
 class Guarantee(NamedTuple):
     """Between which forces the true ones lie, if the bound holds of which weights are possible.
 
-    possible : weights that the drive left.   ladder : slip scales of the units [rad].   driven :
-    largest slip of the drive [rad] (2,).   loads : of the axles, static [N] (2,).   min_speed :
-    below which forces read zero [m/s].   signals : over a drive units times load and cos δ (n, 2,
-    ladder), and what opens the band.
+    Parameters
+    ----------
+    possible : weights that the drive left.
+    ladder : slip scales of the units [rad].
+    driven : largest slip of the drive [rad], (2,).
+    loads : of the axles, static [N], (2,).
+    min_speed : below which forces read zero [m/s].
+    signals : over a drive units times load and cos δ (n, 2, ladder), and what opens the band.
     """
 
     possible: PossibleWeights
@@ -354,9 +357,13 @@ class Guarantee(NamedTuple):
         self, alpha: ArrayLike, axle: Axle | None = None, rate: ArrayLike = 0.0
     ) -> tuple[float, float] | tuple[Array, Array]:
         """Return least and largest steady force under static loads [N], each as of `force`.
-        alpha, axle : as of `TireModel.force`.
-        rate : how fast the force changes, static axle loads per second, of the shape of `alpha` or
-            one number: a force may be late. 0 is steady.
+
+        Parameters
+        ----------
+        alpha : slip angles in the paper's sign [rad], a number or an array of any shape.
+        axle : "front" or "rear", for ends of the shape of `alpha`; None gives both, (..., 2).
+        rate : how fast the force changes [static axle loads/s], of the shape of `alpha` or one
+            number: a force may be late. 0 is steady.
         """
         slip = np.asarray(alpha, dtype=np.float64)
         rates = np.tile(np.broadcast_to(np.abs(rate), slip.shape).ravel(), (2, 1)).T

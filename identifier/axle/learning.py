@@ -146,8 +146,9 @@ def update(
     θ⁺ = θ + P h e/(R + a), a = h'Ph;  P⁺ = P - κ P h h'P/((R + a) a), κ = a - R (1 - λ)/λ, which
     keeps P positive definite for every a, also where κ < 0 and P grows: 1/h'P⁻¹h stays positive.
     No D of its factors falls below `CHOSEN.least_variance`: what would do so is learnt from, but P
-    stays. theta : parameters, q entries.   P : factors of their covariance.   h : regressor, q
-    entries. innovation : e = y - h'θ, clipped.   R : its variance.   forgetting : (1 - λ)/λ.
+    stays.
+    theta : parameters, q entries.   P : factors of their covariance.   h : regressor, q entries.
+    innovation : e = y - h'θ, clipped.   R : its variance.   forgetting : (1 - λ)/λ.
     spread : of P, and of what is added to it otherwise in this step.
     limits : as in `width`; where P would grow beyond them it stays as it is.
     learns : whether to update at all.

@@ -19,9 +19,9 @@ class Chosen(NamedTuple):
     tiny: float = 1e-9  # rad: keeps Dugoff's λ finite at zero slip, where it does not matter
     longest: float = 10.0  # wheelbases, of a relaxation length
     # lagged_ekf
-    stiffness: float = 14.0  # at first, in static axle loads
-    friction: float = 0.85
-    states: int = 10
+    stiffness: float = 14.0  # at first, in static axle loads/rad
+    friction: float = 0.85  # at first, in static axle loads
+    states: int = 10  # of the filter
     no_gate: float = 1e6  # standard deviations
     # ports
     most_felt: float = 98.0  # m/s²: no car feels more

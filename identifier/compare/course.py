@@ -48,8 +48,7 @@ class Course:
             if self.by_motion and len(self._windows(recording)) < VERDICT_CHOSEN.fewest:
                 raise ValueError(
                     f"{recording.name}: fewer than {VERDICT_CHOSEN.fewest} windows are driven "
-                    f"briskly, and there "
-                    "are no true forces Fyf, Fyr to judge by"
+                    "briskly, and there are no true forces Fyf, Fyr to judge by"
                 )
             size = self.size(recording)
             if not min(size.front, size.rear) > 0.0:

@@ -99,7 +99,7 @@ class Accelerometer:
             theta = mean + np.linalg.solve(H, g)
             e = moved / size - of_size @ theta
             w = 5.0 / (4.0 + e**2 / S2)  # Student, 4 degrees
-            S2 = max(float(np.mean(w * e**2)), CHOSEN.accelerometer_least**2)
+            S2 = max(float(np.mean(w * e**2)), CHOSEN.least_scale**2)
         if not self.memory:
             found = autocorrelation_time([np.clip(e, -4.0, 4.0)], CHOSEN.stride, e.size)
             self.memory = max(found, CHOSEN.least_memory)

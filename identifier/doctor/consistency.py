@@ -23,12 +23,11 @@ from models.vehicle import GRAVITY, Vehicle
 
 STIFFNESS = CHOSEN.fineness ** np.arange(CHOSEN.stiffnesses)  # c [1/rad], 1 to 100
 FRICTION = 0.3 * CHOSEN.fineness ** np.arange(CHOSEN.frictions)[:, None]  # μ [-], 0.3 to 3.3
-RATIOS = (
-    CHOSEN.fineness ** np.arange(1 - CHOSEN.frictions, CHOSEN.stiffnesses)[:, None] / 0.3
-)  # c/μ [1/rad]
+# c/μ [1/rad], and which of them is that of μ and c.
+RATIOS = CHOSEN.fineness ** np.arange(1 - CHOSEN.frictions, CHOSEN.stiffnesses)[:, None] / 0.3
 _RATIO_OF = (
     np.arange(CHOSEN.stiffnesses) - np.arange(CHOSEN.frictions)[:, None] + CHOSEN.frictions - 1
-)  # of μ and c
+)
 
 
 class Reading(NamedTuple):
@@ -80,12 +79,12 @@ class Motion(NamedTuple):
             return None
         rows = np.concatenate([_rows(one, CHOSEN.slowest * speed) for one in pieces], axis=1)
         m = rows.shape[1]
-        if m < CHOSEN.fewest:
+        if m < CHOSEN.fewest_windows:
             return None
         *means, a_y = (
             rows
-            if m <= CHOSEN.consistency_most
-            else rows[:, np.linspace(0, m - 1, CHOSEN.consistency_most).astype(int)]
+            if m <= CHOSEN.most_windows
+            else rows[:, np.linspace(0, m - 1, CHOSEN.most_windows).astype(int)]
         )
         felt = None if recording.a_y is None else a_y
         return cls._make((*means, felt, speed, _hidden(pieces, CHOSEN.slowest * speed)))

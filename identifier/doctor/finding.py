@@ -63,7 +63,7 @@ class Finding:
     @property
     def percent(self) -> str:
         """The confidence as text; 99 % at most, as a log alone proves nothing."""
-        return f"{100.0 * min(self.confidence, CHOSEN.finding_most):.0f} %"
+        return f"{100.0 * min(self.confidence, CHOSEN.most_confidence):.0f} %"
 
     @property
     def subject(self) -> tuple[str, str]:

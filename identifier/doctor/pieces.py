@@ -19,7 +19,7 @@ from models.vehicle import Vehicle
 
 def looked_at(recording: Recording) -> tuple[Recording, ...]:
     """Return the pieces of a drive that the screen looks at: all of a short one, some of a long."""
-    n = max(round(CHOSEN.piece / recording.dt), CHOSEN.pieces_shortest)
+    n = max(round(CHOSEN.piece / recording.dt), CHOSEN.shortest_piece)
     places = list(recording.segments)
     if len(recording) > CHOSEN.pieces * n:
         cut = [
@@ -78,7 +78,7 @@ def _unbroken(recording: Recording, part: slice) -> list[slice]:
     """Return the segments of a part of a recording that no gap breaks, the longest at least."""
     edges = [part.start, *(k for k in recording.breaks if part.start < k < part.stop), part.stop]
     pieces = sorted((slice(a, b) for a, b in pairwise(edges)), key=lambda one: one.start - one.stop)
-    least = int(CHOSEN.pieces_least / recording.dt)
+    least = int(CHOSEN.shortest_segment / recording.dt)
     kept = [one for one in pieces if one.stop - one.start >= least] or pieces[:1]
     return sorted(kept, key=lambda one: one.start)
 

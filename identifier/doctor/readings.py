@@ -101,7 +101,7 @@ class Change:
         what = (self.code, self.channels, self.unit)
         pairs = zip(self.factors, other.factors, strict=False)
         near = all(
-            abs(math.log(abs(a / b))) < CHOSEN.readings_alike and a * b > 0.0
+            abs(math.log(abs(a / b))) < CHOSEN.alike_factors and a * b > 0.0
             for (_, a), (_, b) in pairs
         )
         return what == (other.code, other.channels, other.unit) and near
@@ -195,7 +195,7 @@ def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...
     tried, best = [as_told], as_told
     equations = 2 if motion.a_y is None else 3
     beam = [as_told]
-    for _ in range(CHOSEN.readings_most):
+    for _ in range(CHOSEN.most_changes):
         longer = [new for one in beam for new in _longer(one, changes, motion, vehicle)]
         tried += longer
         before, best = best, min(tried, key=lambda one: one.cost)

@@ -60,7 +60,7 @@ def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
     Noise of v_y alone may well grow with the slip, and that of a camera with the speed.
     """
     alike = [
-        one for one, size in late.items() if abs(math.log(size / late[name])) < CHOSEN.samples_alike
+        one for one, size in late.items() if abs(math.log(size / late[name])) < CHOSEN.alike_delays
     ]
     return "r" in alike and len(alike) > 1 and late[name] > 0.7 * dt
 
@@ -523,6 +523,6 @@ def _torn(moving: Mapping[str, Array], dt: float) -> tuple[int, float, float] | 
     scale = np.array([np.std(moving[name]) for name in names])
     a, b = rates / scale, jumps / scale
     size = float(a @ b / (a @ a + 1e-300))
-    if abs(size) < CHOSEN.samples_shortest * dt:
+    if abs(size) < CHOSEN.shortest_jump * dt:
         return None  # that is a late sample, not another time
     return at + CHOSEN.side, size, 0.5 * abs(size)

@@ -19,14 +19,15 @@ class Chosen(NamedTuple):
     late: tuple[int, int, int] = (1, 2, 3)  # columns of v_y, r and δ_f
     # of the fast motion that an accelerometer may miss, else it is none of this car
     explained: float = 0.15
-    across: tuple[float, float] = (0.8, 1.2)  # its slope on that motion; a body rolls and pitches
-    along: tuple[float, float] = (0.8, 1.25)
+    # slope of an accelerometer's a_y on that motion; a body rolls
+    across: tuple[float, float] = (0.8, 1.2)
+    along: tuple[float, float] = (0.8, 1.25)  # slope of its a_x on that motion; a body pitches
     # fit
     fit_block: float = 600.0  # [s] that are estimated at once
     blind: float = 300.0  # [s] of a log without v_y that teach: those of hardest cornering
     enough_more: float = 1.0  # [nats] of improvement by a later block, below which it ends
-    long: float = 3600.0  # [s] of logs from which samples are averaged to intervals so longer
-    coarse: float = 2.0
+    long: float = 3600.0  # [s]: samples of longer logs are averaged
+    coarse: float = 2.0  # times the usual interval, to which they are averaged
     reached: float = 0.25  # [s] for which a slip must have been exceeded to count as driven
     # [s] after which noise of a sedan's sensors is over, errors of its model are not
     lasts: float = 0.15
@@ -38,24 +39,23 @@ class Chosen(NamedTuple):
     ridge: float = 1e-6  # of the least squares, in prior variances of the curve's numbers
     # latent
     latent_roll: float = 0.06  # by which a_y is larger in a car whose body rolls
-    gyro: float = 0.002  # sd of the bias of r of a sedan [rad/s], and of ln I_z
-    inertia: float = 0.007
-    latent_block: float = 600.0  # [s] that are smoothed at once, and what is so beside them
-    beside: float = 5.0
+    gyro: float = 0.002  # sd of the bias of r of a sedan [rad/s]
+    inertia: float = 0.007  # sd of ln I_z
+    latent_block: float = 600.0  # [s] that are smoothed at once
+    beside: float = 5.0  # [s] beside them that are smoothed, too
     latent_asked: float = 60.0  # [s] that are asked for a late a_y
-    any_delay: float = 0.1  # [s] of a sedan: sd of a delay that is looked for,
-    most_late: float = 0.3
-    latent_small: float = 0.003
-    # largest, and one that does not matter
+    any_delay: float = 0.1  # [s] of a sedan, sd of a delay that is looked for
+    most_late: float = 0.3  # [s] of a sedan, the largest delay
+    small_delay: float = 0.003  # [s] of a sedan, a delay that does not matter
     looks: int = 4  # at a delay
     left_late: float = 0.01  # [s] of a sedan, sd of what is left of a delay that was taken out
     gained: float = 8.0  # nats that a delay gains, more where more is left (`Trust.usual`)
     alike: float = 1e-4  # probability from which another start's end counts
     starts: tuple[float, float] = (-0.4, 0.4)  # of ln C: soft and stiff
-    firm: float = 50.0  # times that beliefs count at first, and iterations of all but the last
-    few: int = 8
-    most_slip: float = 0.7  # |v_y/v_x|, and lagged slip [rad]
-    most_lagged: float = 0.8
+    firm: float = 50.0  # times that beliefs count at first
+    few: int = 8  # iterations of all descents but the last
+    most_slip: float = 0.7  # |v_y/v_x|, at most
+    most_lagged: float = 0.8  # lagged slip [rad], at most
     looked: float = 0.25  # [s] over which what is left of a sensor is alike
     shortest: int = 50  # nodes from which noise is learnt
     # model
@@ -65,47 +65,48 @@ class Chosen(NamedTuple):
     least_variance: float = 1e-10  # of weights, lag and zeros, so that no covariance is singular
     model_beyond: float = 0.3  # weight of a slip that no drive reached, in that fit
     decided: float = 0.5  # standard deviation over the prior's, up to which drives decided a number
-    elsewhere: float = 2.25
     # times what the drives that taught miss, on others; chosen on recordings of three real cars and
     # two simulated ones, since the errors of a plant that one draws are those that one thought of
-    sure_mass: float = 0.03  # sd of a given mass, of it; of a center, in wheelbases
-    sure_center: float = 0.01
+    elsewhere: float = 2.25
+    sure_mass: float = 0.03  # sd of a given mass, of it
+    sure_center: float = 0.01  # sd of a given center of gravity [wheelbases]
     typical: float = 0.5  # static loads, at which an error is given as a share of the force
-    model_small: float = 1e-4  # rad, over which a slope is taken
-    surely: float = 3.0  # standard deviations, and error of the steering that is noted
-    noted_gain: float = 0.08
+    slope_step: float = 1e-4  # rad, over which a slope is taken
+    surely: float = 3.0  # standard deviations of an error of the steering that is noted
+    noted_gain: float = 0.08  # least error of the steering that is noted [-]
     warm: int = 300  # samples before a part of a long drive, over which lag and sway settle
     least_doubt: float = 1e-6  # of a prior, in variances of the usual one
     largest: float = 1e6  # of the numbers in a file
     # nodes
-    between: float = 0.06  # sqrt(L/g) from a node to the next, and [s] that it is at least
-    nodes_least: float = 0.02
-    rolls: float = 5.0  # Hz of a sedan, below which a_y rolls the body and is differentiated
-    jerks: float = 3.0
-    nodes_fewest: int = 3  # nodes of a segment
+    between: float = 0.06  # sqrt(L/g) from a node to the next
+    least_between: float = 0.02  # [s] that it is at least
+    rolls: float = 5.0  # Hz of a sedan, below which a_y rolls the body
+    jerks: float = 3.0  # Hz of a sedan, below which a_y is differentiated
+    fewest_nodes: int = 3  # nodes of a segment
     # poor
     rare: float = 0.03  # [s] of a sedan between new values, more of which are too few
     # [m/s] of a sedan, white noise that is too much in the mean that the estimate takes
     noisy: float = 0.015
-    poor_fewest: int = 20  # new values
+    fewest_values: int = 20  # new values
     fine: float = 0.005  # [s] of a sedan, to which a delay is found
     sure: float = 20.0  # nats that a delay must gain
-    poor_asked: float = 60.0  # [s] and samples of hardest cornering that tell delay and noise
-    most: int = 12000
-    poor_roll: float = 0.05  # ρ
-    roll_sd: float = 0.04
+    poor_asked: float = 60.0  # [s] of hardest cornering that tell delay and noise
+    most: int = 12000  # samples of hardest cornering that tell them
+    # ρ, mean of its prior: by which a_y is larger in a car whose body rolls
+    poor_roll: float = 0.05
+    roll_sd: float = 0.04  # of ρ, standard deviation of its prior
     off: float = 0.15  # [m/s²], b at first
     wanders: float = 5e-3  # [(m/s²)²/s], variance of b' of a banked road
     equal: float = 1e-9  # of the largest change, below which two are one
-    clip: float = 3.0  # deviations from which a sample counts less, and how often it is asked
-    again: int = 3
-    poor_rounds: int = 5
+    clip: float = 3.0  # deviations from which a sample counts less
+    again: int = 3  # times that samples are weighted anew
+    delay_halvings: int = 5  # halvings of the step in which a delay is looked for
     # priors
     less_load: float = 0.6  # of the geometric load transfer: tires gain less force than load
     less_use: float = 0.65  # of the geometric use of the ellipse, measured on cars and the plant
     sure_height: float = 0.03  # sd of the load transfer of a car that tells its height
-    sure_share: float = 0.5  # sd of the use of the ellipse of a given share: of it; least
-    least_use: float = 0.1
+    sure_share: float = 0.5  # sd of the use of the ellipse of a given share, of that use
+    least_use: float = 0.1  # least sd of that use
     # At one speed a bias of v_y and a mounting angle are one: each takes half, unless speeds
     # differ.
     shared_error: float = 0.5
@@ -114,9 +115,9 @@ class Chosen(NamedTuple):
     # roads
     price: float = 12.0  # [nats] of a change of friction
     bin: int = 10  # residuals, half a second, on one road
-    roads_least: float = 0.1  # |ln m|, below which segments are one road
-    most_scale: float = 1.5  # S [-] and T [s] of residuals, in search of segments
-    most_memory: float = 4.0
+    least_change: float = 0.1  # |ln m|, below which segments are one road
+    most_scale: float = 1.5  # S [-] of residuals, in search of segments
+    most_memory: float = 4.0  # T [s] of residuals, in search of segments
     roads_rounds: int = 2  # of finding segments anew at the better estimate
     # solve
     stride: float = 0.05  # [s] between residuals
@@ -124,14 +125,14 @@ class Chosen(NamedTuple):
     error_size: tuple[float, float] = 0.02, 0.04
     nu: float = 4.0  # degrees of freedom of the loss: a tenth of the residuals may be far off
     least_scale: float = 0.25  # S: a model is never believed to be better than that
-    shortest_memory: float = 0.25  # T [s]
-    longest_memory: float = 8.0
-    least_stiff: float = 0.25  # of C: slope at zero, and how firmly it is believed
-    stiff_sd: float = 0.1
-    iterations: int = 25
+    shortest_memory: float = 0.25  # least T [s]
+    longest_memory: float = 8.0  # largest T [s]
+    least_stiff: float = 0.25  # of C: slope at zero
+    stiff_sd: float = 0.1  # of C: how firmly that slope is believed
+    iterations: int = 25  # of a descent, at most
     enough: float = 0.02  # [nats] of improvement, below which it ends
-    settling: int = 60  # iterations and improvement [nats] where no drive is looked at
-    settled: float = 1e-4
+    settling: int = 60  # iterations at most where no drive is looked at
+    settled: float = 1e-4  # [nats] of improvement, below which these end
 
 
 CHOSEN = Chosen()

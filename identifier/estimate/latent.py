@@ -518,9 +518,9 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
         z, p, _ = problem(late, open_).descend(z, p, on_time.R, CHOSEN.few)
         more, p[delay] = float(p[delay]), 0.0
         late = min(max(late + more, -CHOSEN.most_late * scale), CHOSEN.most_late * scale)
-        if abs(more) < CHOSEN.latent_small * scale:
+        if abs(more) < CHOSEN.small_delay * scale:
             break
-    if abs(late) < CHOSEN.latent_small * scale:
+    if abs(late) < CHOSEN.small_delay * scale:
         return 0.0
     found = problem(late, priors).descend(z, p, on_time.R, CHOSEN.few)[2]
     count = max(on_time.nodes.counts.sum(), 1)

@@ -85,9 +85,10 @@ class FittedModel(TireModel):
     driven : largest slip of each axle that the drives reached [rad], (2,).
     speeds : least and largest speed of them [m/s], (2,).
     a_x : least and largest longitudinal acceleration of them [m/s²], (2,).
-    unexplained : size of what the drives miss for longer than noise, over `CHOSEN.error_size`,
-    (2,). force_missed : share of the measured force that it misses of the drives that taught, (2,);
-    None where nobody looked.
+    unexplained : size of what the drives miss for longer than noise, over the errors that are
+        usual, 2 % of the static load and 4 % of the lateral acceleration in g, (2,).
+    force_missed : share of the measured force that it misses of the drives that taught, (2,); None
+        where nobody looked.
     parted : of drives without v_y, side slip by which soft and stiff tires that explain them alike
         part, rms [rad].
     a_y_late : of such drives, by which a_y was later than the yaw rate [s].
@@ -400,7 +401,7 @@ class FittedModel(TireModel):
         given = self.vehicle.bicycle[4:]
         band, loads, lag = self.band, self._loads, self.relaxation_length
         stiff = [
-            sd[0] / CHOSEN.model_small for sd in band.of_phi(np.full((1, 2), CHOSEN.model_small))
+            sd[0] / CHOSEN.slope_step for sd in band.of_phi(np.full((1, 2), CHOSEN.slope_step))
         ]
         stiffness = self.stiffness
         C = stiffness / loads
@@ -472,8 +473,8 @@ class FittedModel(TireModel):
         """Return the tires in the hidden units of the axle identifier.
 
         Curve, lag, sway and errors of the sensors; without load transfer and ellipse.
-        ladder : slip scales of the units [rad]; None takes `CHOSEN.units`, whose curves are within
-            0.3 % of the static load.
+        ladder : slip scales of the units [rad]; None takes six, each twice the one before, from
+            0.008 to 0.256 rad, whose curves are within 0.3 % of the static load.
         """
         ladder = CHOSEN.units if ladder is None else ladder
         fits = [_units_fit(ladder, float(reach)) for reach in self._reach]

@@ -57,7 +57,7 @@ class Nodes:
         RecordingError
             Where there is no a_y.
         """
-        between = max(CHOSEN.between * vehicle.froude_time, CHOSEN.nodes_least)
+        between = max(CHOSEN.between * vehicle.froude_time, CHOSEN.least_between)
         every = max(1, round(between / recording.dt))
         begin, end, _ = part.indices(len(recording))
         a_y = recording.needed("a_y")
@@ -65,7 +65,7 @@ class Nodes:
         for one in recording.segments:
             first, last = max(one.start, begin), min(one.stop, end)
             count = (last - first) // every
-            if count >= CHOSEN.nodes_fewest:
+            if count >= CHOSEN.fewest_nodes:
                 some = slice(first, first + count * every)
                 felt = _earlier(a_y[first:last], a_y_late / recording.dt)[: count * every]
                 pieces.append(_piece(recording, some, vehicle, every, felt))

@@ -53,7 +53,7 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
     rare = len(new) < len(v_y) and _interval(new) * recording.dt > CHOSEN.rare * scale
     new = new if rare else np.arange(len(v_y))
     shown = _Shown(_interval(new) * recording.dt, noise=float(NOISE[0]) * scale)
-    if len(new) < CHOSEN.poor_fewest or (recording.a_y is None and not rare):
+    if len(new) < CHOSEN.fewest_values or (recording.a_y is None and not rare):
         return recording
     if recording.a_y is None:
         shown = shown._replace(push=float(PUSHES[-1]))
@@ -61,7 +61,7 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
         part = hardest(recording, min(CHOSEN.poor_asked, CHOSEN.most * recording.dt))
         inside = new[(new >= part.start) & (new < part.stop)] - part.start
         problem = _Kinematics(recording.taken(part), inside)
-        white = white_noise(problem.shown) if problem.shown.size > CHOSEN.poor_fewest else 0.0
+        white = white_noise(problem.shown) if problem.shown.size > CHOSEN.fewest_values else 0.0
         if (
             not rare
             and not white * np.sqrt(shown.interval / CHOSEN.smoothed) > CHOSEN.noisy * scale
@@ -226,7 +226,7 @@ def _likeliest(problem: _Kinematics, best: _Shown, scale: float) -> _Shown:
     others = {"noise": NOISE * scale, "push": PUSHES, "wanders": BANKS}
     better(late=DELAYS, **others)
     step = float(DELAYS[1])
-    for _ in range(CHOSEN.poor_rounds):
+    for _ in range(CHOSEN.delay_halvings):
         step *= 0.5
         near = np.maximum(best.late + step * np.array([-1.0, 1.0]), 0.0)
         if not better(late=near, **others) and step < CHOSEN.fine * scale:

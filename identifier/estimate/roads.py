@@ -52,7 +52,7 @@ def with_roads(
         one_road = Problem(drives, vehicle, priors)
         before = one_road.cost(one_road.residuals(plain.p).e, plain.p, found.memory)
         gained = before - found.cost - CHOSEN.price * max(changes, 1)
-        if gained <= 0.0 or np.abs(ln_m).max() < CHOSEN.roads_least:
+        if gained <= 0.0 or np.abs(ln_m).max() < CHOSEN.least_change:
             break
         best, roads = found, Roads(labels, ln_m, found.road_sd)
     return best, roads
@@ -117,7 +117,7 @@ def _ranked(found: list[NDArray[np.intp]]) -> tuple[NDArray[np.intp], ...]:
     states, counts = np.unique(whole, return_counts=True)
     order: dict[int, int] = {}
     for state in states[np.argsort(-counts)]:
-        alike = [known for known in order if abs(GRID[known] - GRID[state]) < CHOSEN.roads_least]
+        alike = [known for known in order if abs(GRID[known] - GRID[state]) < CHOSEN.least_change]
         order[int(state)] = order[alike[0]] if alike else len(set(order.values()))
     table = np.zeros(len(GRID), dtype=np.intp)
     for state, label in order.items():

@@ -50,7 +50,7 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
     if known is None or not known.min() > 0.0:
         raise ValueError("the force of an axle is not known at any slip: drive harder")
     slow, fast = (brisk_speed(car, model.min_speed),) * 2 if speeds is None else speeds
-    v_x = np.unique(np.linspace(slow, fast, CHOSEN.understeer_count))
+    v_x = np.unique(np.linspace(slow, fast, CHOSEN.understeer_speeds))
     force = model.force(SLIPS)
     reached = np.array([np.interp(known[i], SLIPS, force[:, i]) for i in range(2)])
     most = reached * car.load_ratio(v_x) / np.array(car.axle_loads) * GRAVITY  # (n, 2)
@@ -59,7 +59,7 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
     spread = np.array([_gradients(one, one.force(SLIPS), v_x, a_y) for one in drawn])
     with np.errstate(invalid="ignore"):  # beyond what half of them can reach
         low, high = np.quantile(
-            spread, (CHOSEN.understeer_low, CHOSEN.understeer_high), axis=0, method="nearest"
+            spread, (CHOSEN.lower_share, CHOSEN.upper_share), axis=0, method="nearest"
         )
         sd = 0.5 * (high - low)
     past = (a_y > most.min(axis=1)[:, None]) | ~np.isfinite(found) | ~np.isfinite(sd)

@@ -215,11 +215,8 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     way, moving = ahead.by_way
     by_z = way.gradient(z, moving)
     F = ca.horzcat(by_z[:, : z.numel()] @ into, by_z[:, z.numel() :])
-    for i in (
-        -CHOSEN.moving - 4,
-        -CHOSEN.moving - 3,
-        *range(2 - CHOSEN.moving, 0),
-    ):  # v_y and r on the way, the others
+    # v_y and r on the way, the others
+    for i in (-CHOSEN.moving - 4, -CHOSEN.moving - 3, *range(2 - CHOSEN.moving, 0)):
         F[i, :] *= goes_on  # a filter that begins anew knows of no dependence
     factors = propagated(factors, F, _process_noise(trust, ahead))
     ahead_z = ca.vertcat(ahead.moving, z[CHOSEN.moving :])
@@ -233,9 +230,8 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     factors = _loosened(factors, learnt, alarm * trust.inflation)
     corrected = _bounded(s, corrected, learnt)
 
-    sane = (
-        ca.fabs(corrected[0]) < CHOSEN.most_sliding * now.v_x
-    )  # else it begins anew, a sample later
+    # Else it begins anew, a sample later.
+    sane = ca.fabs(corrected[0]) < CHOSEN.most_sliding * now.v_x
     begun, unsure = _afresh(s, gated, now, load)
     a_kept = smaller(dt * (1 / CHOSEN.lag_of_a_x), 1)
     kept = [

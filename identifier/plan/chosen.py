@@ -20,9 +20,9 @@ class Chosen(NamedTuple):
     # plan
     # share of the planned lateral force that a car may need to turn inside the area
     turns: float = 0.8
-    most_passes: int = 12
-    least_time: float = 0.5  # s
-    most_time: float = 60.0
+    most_passes: int = 12  # of a plan
+    least_time: float = 0.5  # s of a plan
+    most_time: float = 60.0  # s of a plan
     # 1/sqrt(L/g): frequency of the slalom it is compared with, 0.5 Hz for a sedan
     slalom: float = 0.27
     probed: float = 15.0  # sqrt(L/g), of a maneuver whose amplitude is looked for: 8 s in a sedan
@@ -31,10 +31,10 @@ class Chosen(NamedTuple):
     lead: float = 1.0  # s straight ahead before the pass
     period: float = 0.01  # s, of who steers
     # search
-    population: int = 32
-    generations: int = 100
-    stalled: int = 20  # generations after which a search ends that brought less than a share
-    gain: float = 0.01
+    population: int = 32  # candidates of a generation
+    generations: int = 100  # of a search, at most
+    stalled: int = 20  # generations after which a search ends that brought less than a share `gain`
+    gain: float = 0.01  # share of the least cost
     # sqrt(L/g): least mean duration of a change from angle to angle, 0.4 s in a sedan
     swing: float = 0.75
     # largest, of the last to the mean duration, and of the mean to the first
@@ -45,8 +45,8 @@ class Chosen(NamedTuple):
     half_width: float = 0.33  # wheelbases, of a car without a chassis
     wider: float = 1.12  # of the body over its track
     largest_heading: float = math.radians(60.0)  # at the entry
-    fewest: int = 3  # changes of the angle; where a pass has more, they are driven mirrored
-    most: int = 14
+    fewest: int = 3  # changes of the angle in a pass
+    most: int = 14  # changes of the angle in a pass; where there are more, they are driven mirrored
     # tires
     spread: float = 0.3  # of stiffness and of friction, either way
     drawn: int = 6  # curves of a learnt model

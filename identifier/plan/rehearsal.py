@@ -41,9 +41,8 @@ def rehearse(
     t = CHOSEN.period * np.arange(
         before + round(steering.duration / CHOSEN.period) + 1, dtype=np.float64
     )
-    middle = (
-        t + 0.5 * CHOSEN.period - CHOSEN.lead
-    )  # angles are held: at the middle of it they are not late
+    # Angles are held: at the middle of it they are not late.
+    middle = t + 0.5 * CHOSEN.period - CHOSEN.lead
     planned = np.where(middle < 0.0, 0.0, steering.steering(np.maximum(middle, 0.0))[:, 0])
     wanted = course(np.maximum(t - CHOSEN.lead, 0.0))
     rows: list[Any] = []

@@ -28,9 +28,6 @@ from identifier.verdict.verdict import Verdict
 from models.recordings import Recording
 from models.recordings.portion import portion
 
-# of an instant of another drive, over a window of a part left out, by range of slip: means hide
-# errors of quick passes through zero; chosen on 256 random cars, seeds 100 to 131 and 200 to 231
-
 
 def within_band(model: TireModel, recording: Recording, level: float = LEVEL) -> Array | None:
     """Return in which share of windows of a drive the band holds what the motion shows, (2,).
@@ -146,7 +143,7 @@ def calibration(
             continue
         squares = np.array([_shared(*pair, everywhere) for pair in zip(needed, share, strict=True)])
         factors[i] = CHOSEN.elsewhere * np.sqrt(squares)
-        needed = needed / np.maximum(squares[:, None], AXLE_CHOSEN.least**2)
+        needed = needed / np.maximum(squares[:, None], AXLE_CHOSEN.least_factor**2)
         for k in range(len(AXLE_CHOSEN.at_speeds)):
             mine = missed.within[asked] == k
             speeds[i, k] = np.sqrt(_shared(needed[:, mine].ravel(), share[:, mine].ravel(), 1.0))
@@ -155,8 +152,8 @@ def calibration(
     color = [color_of(missed.error[:, i], windows) for i in range(2)]
     return replace(
         given,
-        factors=np.clip(factors, AXLE_CHOSEN.least, AXLE_CHOSEN.band_most),
-        speeds=np.clip(speeds, AXLE_CHOSEN.least, AXLE_CHOSEN.band_most),
+        factors=np.clip(factors, AXLE_CHOSEN.least_factor, AXLE_CHOSEN.most_factor),
+        speeds=np.clip(speeds, AXLE_CHOSEN.least_factor, AXLE_CHOSEN.most_factor),
         color=np.array(color),
     )
 
@@ -178,9 +175,8 @@ def quantile(values: Array, share: Array) -> float:
     order = np.argsort(values)
     count = np.cumsum(share[order])
     total = float(count[-1]) if count.size else 0.0
-    needed = LEVEL * (
-        total + 1.0 / CHOSEN.independent
-    )  # as if one more window were farther out than all
+    # As if one more window were farther out than all.
+    needed = LEVEL * (total + 1.0 / CHOSEN.independent)
     at = int(np.searchsorted(count, needed))
     return float(values[order[at]]) if at < values.size else float("inf")
 

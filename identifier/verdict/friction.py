@@ -104,7 +104,7 @@ def road_friction(
     if band is None or not band.calibrated or found is None:
         return None
     windows = found.windows
-    grid = np.log(np.geomspace(CHOSEN.least, CHOSEN.most, CHOSEN.friction_count))
+    grid = np.log(np.geomspace(CHOSEN.least, CHOSEN.most, CHOSEN.frictions))
     grid = np.insert(grid, np.searchsorted(grid, 0.0), 0.0)
     if not all(one.identified for one in model.estimates() if one.title == GRIP):
         grid = grid[grid <= 0.0]  # a curve that goes on looks like more friction

@@ -294,7 +294,7 @@ def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int 
     """
     received: list[int] = []
     stamps: list[int] = []
-    for _, time, raw in islice(_messages(bag, [topic]), CHOSEN.bag_probed):
+    for _, time, raw in islice(_messages(bag, [topic]), CHOSEN.probed_messages):
         try:
             layout = layout_of(definitions, topic.kind, raw)
         except CdrError:
@@ -337,7 +337,7 @@ class _Reading:
         self.times.append(time)
         self.raws.append(raw)
         self.bytes += len(raw)
-        if len(self.raws) == CHOSEN.bag_together or self.bytes > CHOSEN.bytes:
+        if len(self.raws) == CHOSEN.messages_at_once or self.bytes > CHOSEN.most_bytes:
             self._read()
 
     def _read(self) -> None:

@@ -89,7 +89,7 @@ class _Gathered:
     def add(self, time: float, data: bytes) -> None:
         self._times.append(time)
         self._bytes += data[: self.width]
-        if len(self._times) == CHOSEN.can_together:
+        if len(self._times) == CHOSEN.frames_at_once:
             self._store()
 
     def extend(self, times: Array, data: NDArray[np.uint8]) -> None:
@@ -149,7 +149,7 @@ def _gather(path: Path, kind: str, known: _Known) -> _Log:
                 found[key] = _Gathered(width)
             found[key].add(message.timestamp, message.data)
             count += 1
-            if count % CHOSEN.can_together == 0:
+            if count % CHOSEN.frames_at_once == 0:
                 require_few(RecordingError, str(path), count, "samples", "frames")
     frames = {key: one.finished() for key, one in found.items()}
     first = min((float(kept.t.min()) for kept in frames.values()), default=0.0)
@@ -313,8 +313,8 @@ def _of_mdf(path: Path, known: _Known) -> _Log:
                 known_others = {name.partition(".")[0] for name in names} & set(_NO_DATA)
                 others["error and remote" if known_others else "other"] += samples
                 continue
-            for first in range(0, samples, CHOSEN.can_together):
-                part = _of_group(file, number, first, min(CHOSEN.can_together, samples - first))
+            for first in range(0, samples, CHOSEN.frames_at_once):
+                part = _of_group(file, number, first, min(CHOSEN.frames_at_once, samples - first))
                 _sort(part, known, found, others)
     return _Log("CAN MDF4", {key: _in_order(one.finished()) for key, one in found.items()}, others)
 

@@ -7,8 +7,8 @@ faster one is the mean since the instant before. So v_y at 50, 20 and 10 Hz besi
 costs 1.0, 1.04 and 1.2 times the error of models that were taught at full rate; values that are
 held cost 1.2, 1.8 and 2.2 times (`benchmarks/several_rates.py`: random cars, CarMaker).
 
-A gap is where a channel has no sample for longer than `CHOSEN.longest_gap`, or than 2.5 of its own
-intervals: a car can build up or lose all its lateral force meanwhile. It ends a segment.
+A gap is where a channel has no sample for longer than 0.1 s, or than 2.5 of its own intervals: a
+car can build up or lose all its lateral force meanwhile. It ends a segment.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

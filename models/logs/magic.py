@@ -59,7 +59,7 @@ def frames_in(head: bytes) -> str:
 
 
 def format_of(path: Path, head: bytes) -> str:
-    """Return the reader of a file or folder, as `door.OPENERS` has it, or "folder".
+    """Return the reader of a file or folder, as `door._OPENERS` has it, or "folder".
     head : its first bytes, unpacked; none of a folder.
     """
     if path.is_dir():

@@ -59,7 +59,7 @@ def _samples(path: Path, asked: Sequence[_Asked]) -> list[Samples]:
 
 def _of_group(path: Path, file: Any, mine: Sequence[_Asked]) -> Samples:
     """Read channels of one group, as many at a time as the memory takes."""
-    several = max(1, CHOSEN.mdf_together // max(mine[0][0].samples, 1))
+    several = max(1, CHOSEN.numbers_at_once // max(mine[0][0].samples, 1))
     t: Array | None = None
     values: dict[str, Array] = {}
     for k in range(0, len(mine), several):
@@ -122,7 +122,7 @@ class _Found:
         )
         rate = float("nan")
         if clock and samples:
-            probed = min(samples, CHOSEN.mdf_probed)
+            probed = min(samples, CHOSEN.probed_samples)
             t = file.get_master(number, record_offset=0, record_count=probed)
             rate = typical_rate(np.asarray(t, dtype=np.float64))
         for index, channel in enumerate(group.channels):

@@ -206,7 +206,7 @@ def _is_beside(
         times.append(np.array(numbers) / PER_SECOND[advice.unit])
     if (
         any((np.diff(t) <= 0.0).any() for t in times)
-        or abs(times[0][0] - times[1][0]) > CHOSEN.stamps_near
+        or abs(times[0][0] - times[1][0]) > CHOSEN.same_drive
     ):
         return False
     if _plain(clock.name) == _plain(first.name):
@@ -296,7 +296,7 @@ def _unit(t: Array, advice: str) -> tuple[str, bool]:
         return advice, False
     if not _step(finite, "s") < CHOSEN.coarsest:
         for unit in ("ms", "us", "ns"):
-            if CHOSEN.fastest <= _step(finite, unit) <= CHOSEN.stamps_slowest:
+            if CHOSEN.fastest <= _step(finite, unit) <= CHOSEN.slowest:
                 return unit, False
     return "s", False
 
@@ -597,10 +597,10 @@ def _unjittered(t: Array) -> _Even | None:
     """
     usual = float(np.median(np.diff(t)))
     dt = _even_step(t, CHOSEN.jitter * usual) if usual > 0.0 else None
-    if dt is None or t.size < 2 * CHOSEN.stamps_window:
+    if dt is None or t.size < 2 * CHOSEN.averaged:
         return None
     off = t - dt * np.arange(t.size)
-    smooth = np.convolve(off, np.full(CHOSEN.stamps_window, 1.0 / CHOSEN.stamps_window), "valid")
+    smooth = np.convolve(off, np.full(CHOSEN.averaged, 1.0 / CHOSEN.averaged), "valid")
     rough = float(np.median(np.abs(np.diff(off))))
     if np.ptp(off) > CHOSEN.jitter * dt or np.ptp(smooth) > 0.5 * dt or rough < 0.1 * dt:
         return None

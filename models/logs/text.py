@@ -123,8 +123,7 @@ def _blocks(path: Path, layout: Layout, size: int) -> Iterator[tuple[int, bytes]
             elif reach >= CHOSEN.largest_line:
                 raise RecordingError(
                     f"{path}: line {line} is longer than {CHOSEN.largest_line} bytes, or opens a "
-                    f"quote "
-                    "that is never closed"
+                    "quote that is never closed"
                 )
             else:
                 reach *= 2

@@ -242,8 +242,7 @@ def _segments(
         t = longest.t
         raise RecordingError(
             f"{label}: the run lasts {t[-1] - t[0]:.4g} s, at least {CHOSEN.minimum_samples} "
-            f"steps of "
-            f"{dt:g} s are needed"
+            f"steps of {dt:g} s are needed"
         )
     return _Segments(kept, len(found) - len(kept))
 
@@ -261,7 +260,7 @@ def _judge_time(label: str, raw: Raw) -> None:
         )
     require_rising(label, raw)
     typical = typical_step(raw.t)
-    if typical > LOGS_CHOSEN.clock_slowest:
+    if typical > LOGS_CHOSEN.slowest_channel:
         raise RecordingError(
             f"{label}: t must be in s with at least 10 samples per second, its typical step is "
             f"{typical:.6g}{_other_unit(typical)}"
@@ -271,7 +270,7 @@ def _judge_time(label: str, raw: Raw) -> None:
 def _other_unit(step: float) -> str:
     """Return what the time may be in where samples are so far apart."""
     for power, unit in ((3, "milliseconds"), (6, "microseconds"), (9, "nanoseconds")):
-        if CHOSEN.fastest <= step / 10.0**power <= LOGS_CHOSEN.clock_slowest:
+        if CHOSEN.fastest <= step / 10.0**power <= LOGS_CHOSEN.slowest_channel:
             return f"; {unit}? divide by 1{power * '0'}"
     return ""
 
@@ -400,8 +399,7 @@ def _low_pass(name: str, signal: Array, cut_off: float, dt: float) -> Array:
     if not CHOSEN.least_low_pass <= cut_off < 0.5 / dt:
         raise RecordingError(
             f"{name}: low_pass of the map must be at least {CHOSEN.least_low_pass:g} Hz and below "
-            f"half "
-            f"the sampling rate, {0.5 / dt:g} Hz, it is {cut_off:g}"
+            f"half the sampling rate, {0.5 / dt:g} Hz, it is {cut_off:g}"
         )
     from scipy.signal import butter, lfilter, lfilter_zi  # takes longer than to read a short log
 

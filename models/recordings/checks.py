@@ -74,8 +74,7 @@ def _check_peaks(recording: Recording) -> str | None:
             return (
                 f"{column} must be the road-wheel angle in rad, below "
                 f"{CHOSEN.largest_steering}, its peak is {largest:.4g}; degrees or a hand-wheel "
-                f"angle? "
-                "convert it (degrees: multiply by pi/180)"
+                "angle? convert it (degrees: multiply by pi/180)"
             )
     fastest = peak(recording.v_x)
     if fastest > CHOSEN.largest_speed:

@@ -17,8 +17,8 @@ class Chosen(NamedTuple):
     largest_steering: float = 1.2
     largest_speed: float = 110.0  # [m/s], 396 km/h; a sedan's 110 km/h reads 110
     largest_v_x_r: float = 60.0  # [m/s^2], 6 g: beyond downforce cars; 1 m/s^2 in degrees reads 57
-    sure_pair: float = 0.9  # correlations of two channels that are of one bend, or of none
-    no_pair: float = 0.3
+    sure_pair: float = 0.9  # correlation from which two channels are of one bend
+    no_pair: float = 0.3  # correlation up to which they are of none
     copy: float = 1e-4  # of a channel, rms, that is left of it beside another one which it copies
     # slope of a_y on v_x r, below zero, up to which it is not turned but lacks v_x r
     lacks: float = 0.35
@@ -33,12 +33,12 @@ class Chosen(NamedTuple):
     # evidence
     # [s]: keeps maneuvers up to 2 Hz, averages 20 samples of noise at 100 Hz
     evidence_window: float = 0.2
-    # [s], longer where a recording is: evenly over it, as many as of `LONG` samples
+    # [s], longer where a recording is: evenly over it, as many as of `codegen.arrays.LONG` samples
     stride: float = 0.05
     slowest: float = 0.5  # [m/s]: below it slip and curvature are noise, for scale cars too
     turns: float = 0.2  # of what a channel reaches, beyond which the car turns
-    evidence_alike: float = 0.7  # least correlation, and least square of its t, of a sign
-    beyond_chance: float = 16.0
+    evidence_alike: float = 0.7  # least correlation of a sign
+    beyond_chance: float = 16.0  # least square of its t, of a sign
     least: float = 0.1  # [m/s^2], rms, below which nothing turns
     longest: float = 8.0  # [m], wheelbase by which steering says how much it turns at least
     # [rad]: sideslip against the turn beyond which a driver may countersteer
@@ -46,13 +46,13 @@ class Chosen(NamedTuple):
     # portion
     segment: float = 20.0  # s of one, where a quarter of the samples are enough for that
     steps: int = 4  # beginnings that a segment may have in the time of one
-    portion_fewest: int = 4  # segments, so that there are some on both sides of a middle
+    fewest_segments: int = 4  # segments, so that there are some on both sides of a middle
     # s that the car stands at the end of a segment: a delay of that leaves the next alone
     rest: float = 0.6
     # pose
     no_slip: float = 2e-3  # v_y over v_x of a pose that is integrated along its heading
     pose_slow: float = 0.025  # [s] between poses from which a gyro tells the yaw rate
-    pose_fewest: int = 30  # samples of a piece that is differentiated
+    fewest_samples: int = 30  # samples of a piece that is differentiated
     stands: float = 0.05  # [m/s], a pose that never goes faster does not move
     # share of the largest speed below which the direction of travel is not asked
     moves: float = 0.2
@@ -60,11 +60,11 @@ class Chosen(NamedTuple):
     along: float = 0.35
     # length of the mean direction of travel against the heading, 1 where all agree
     along_all: float = 0.9
-    latest: float = 0.3  # [s] that a gyro may be late against a pose, that is taken out of it
-    late: float = 0.01
+    latest: float = 0.3  # [s] that a gyro may be late against a pose
+    late: float = 0.01  # [s] that it is late, more of which is taken out of it
     pose_alike: float = 0.9  # correlation of the two yaw rates from which that is known
     # record
-    minimum_samples: int = 10
+    minimum_samples: int = 10  # of a segment: fewer are no recording
     pause: float = 1.0  # [s] between logs that are joined and whose clocks overlap
     # largest departure of a sample from the uniform grid, as a share of one step
     jitter: float = 0.02
@@ -72,14 +72,15 @@ class Chosen(NamedTuple):
     on_grid: float = 0.01
     same: float = 1e-6  # share of a step within which they already are the grid, but for rounding
     # rolled
-    slip: float = 0.03  # more than this share of the speed, and [m/s], is no usual slip
-    noise: float = 0.05
-    # wheels that differ by this share, and NOISE, have no slip that tells them apart
+    slip: float = 0.03  # share of the speed; more, and `noise`, is no usual slip
+    noise: float = 0.05  # [m/s]
+    # share of the speed: wheels that differ by less, and `noise`, have no slip that tells them
+    # apart
     rolled_alike: float = 0.01
     rolled_window: float = 0.05  # [s], over which the acceleration of a wheel is taken
     memory: float = 0.15  # [s], over which that of the car is
-    braked: float = -1.0  # [m/s²]: wheels are braked below, driven above the second
-    rolls_out: float = -0.3
+    braked: float = -1.0  # [m/s²]: wheels are braked below
+    rolls_out: float = -0.3  # [m/s²]: wheels are driven above
     # of the largest acceleration: how far it may have changed while nothing is trusted
     unsure: float = 0.25
     patience: float = 2.0  # [s]: after it wheels that all agree again are believed the sooner

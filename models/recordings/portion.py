@@ -41,7 +41,7 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
     n = len(recording)
     if n <= LONG:
         return Portion(recording, np.arange(n))
-    step = min(round(CHOSEN.segment / recording.dt), LONG // CHOSEN.portion_fewest) // CHOSEN.steps
+    step = min(round(CHOSEN.segment / recording.dt), LONG // CHOSEN.fewest_segments) // CHOSEN.steps
     power = _power(recording, step)
     count = LONG // (CHOSEN.steps * step)
     if middle is None or not 0 < middle < n:
@@ -75,8 +75,7 @@ def _hardest(power: Array, step: int, first: int, last: int, count: int) -> list
         return list(range(first, last, length))
     begins = []
     for low, high in pairwise(np.linspace(first, last, count + 1).astype(int) // step):
-        turned = np.convolve(
-            power[low:high], np.ones(CHOSEN.steps), mode="valid"
-        )  # each beginning's
+        # Each beginning's.
+        turned = np.convolve(power[low:high], np.ones(CHOSEN.steps), mode="valid")
         begins.append(step * (int(low) + int(np.argmax(turned))))
     return begins

@@ -116,12 +116,12 @@ def _motion_of(label: str, parts: Mapping[str, Raw]) -> _Motion:
     cuts = [0, *gaps(t, LOGS_CHOSEN.longest_gap).tolist(), t.size]
     pieces = []
     for first, end in itertools.pairwise(cuts):
-        if end - first >= CHOSEN.pose_fewest:
+        if end - first >= CHOSEN.fewest_samples:
             pieces.append(_piece(t[first:end], z[first:end], x.rows[first:end]))
     if not pieces:
         raise RecordingError(
-            f"{label}: the pose must have at least {CHOSEN.pose_fewest} samples without a gap, it "
-            f"has {t.size}"
+            f"{label}: the pose must have at least {CHOSEN.fewest_samples} samples without a gap, "
+            f"it has {t.size}"
         )
     psi, turned = _heading(label, pieces)
     columns: list[list[Array]] = [[], [], []]

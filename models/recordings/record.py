@@ -353,7 +353,7 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
     """Return several recordings as one drive in segments, in their order.
 
     Each keeps its own time where it begins after the one before; else its time is moved to begin
-    `CHOSEN.pause` after it. Signals that one lacks are left out of all.
+    1 s after that one ends. Signals that one lacks are left out of all.
     recordings : sampled alike; at least one.   name : of the drive; None takes all their names.
     """
     first = recordings[0]

@@ -17,7 +17,7 @@ class Chosen(NamedTuple):
     some: int = 10  # lines in a message
     # MF-Tyre up to 5.2 under its several numbers; 60 and above is 6.x
     fittyps: tuple[int, ...] = (5, 6, 21, 51, 52)
-    pky4_of_52: float = 2.0
+    pky4_of_52: float = 2.0  # PKY4, as MF-Tyre 5.2 has it fixed
 
 
 CHOSEN = Chosen()

@@ -16,7 +16,7 @@ class Chosen(NamedTuple):
     wrong_way: float = 0.03
     # road
     least: float = 0.15  # of the friction that a tire was learnt on: ice, after a dry road
-    grid: int = 13
+    grid: int = 13  # frictions that are tried at once
     prior_sd: float = 0.7  # standard deviation of ln μ where nothing is seen
     # supervisor
     learns: float = 0.005  # rad: below, a tire is a straight line in noise

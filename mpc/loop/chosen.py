@@ -14,8 +14,8 @@ class Chosen(NamedTuple):
     unknown: float = 1.0  # m/s: standard deviation of v_y where nothing is known
     finest: float = 1e-3  # m/s: least deviation that is believed
     # sensing
-    bias_a_y: float = 0.05  # m/s², rad/s: standard deviations from one unit to the next
-    bias_r: float = 0.001
+    bias_a_y: float = 0.05  # m/s²: standard deviation from one unit to the next
+    bias_r: float = 0.001  # rad/s: standard deviation from one unit to the next
     ramp_time: float = 20.0  # s
     largest_angle: float = 0.3  # rad at friction 1: beyond the peak of any tire for the road
 

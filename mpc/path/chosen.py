@@ -13,7 +13,7 @@ class Chosen(NamedTuple):
     cone_spacing: float = 3.0  # m
     car_width: float = 1.8  # m
     narrowest: float = 1.0  # m, of a car
-    widest: float = 2.6
+    widest: float = 2.6  # m, of a car
     easing: float = 6.0  # m
     # line
     # rad in one step; coarser samples would not carry the cubics between them
@@ -25,9 +25,9 @@ class Chosen(NamedTuple):
     # of 1 - κ e_y: near the center of a turn every s is as close as the next
     smallest_slope: float = 0.3
     tolerance: float = 1e-9  # m
-    steps: int = 200
+    steps: int = 200  # in search of the nearest point, at most
     # waypoints
-    fits: int = 4
+    fits: int = 4  # of a line, each over the arc length of the one before
     farthest: float = 1e8  # of a way-point from the origin [m]: every map of the earth fits
     same: float = 1e-6  # of the median gap: way-points as near as this are one
     pieces: int = 8  # of every interval between knots, for its length

@@ -7,21 +7,22 @@ class Chosen(NamedTuple):
     """Numbers of this package, by the file that reads them."""
 
     # ladder
-    n_common: int = 3
-    n_axle: int = 2  # beside the w_j
-    units: int = 6
+    n_common: int = 3  # weights of both axles, before 1/α_j
+    n_axle: int = 2  # weights of an axle, beside the w_j
+    units: int = 6  # of the ladder
     # α_1 over the slip F_max/C at which the linear tire would reach the peak force
     narrowest: float = 0.25
     worst: float = 0.02  # largest error of a fit over the largest force
-    samples: int = 400
+    samples: int = 400  # of a curve that is fitted
     small: float = 1e-3  # rad; the slope at zero is read here, well above rounding
     largest_slip: float = 0.5  # rad, where the table ends; less where friction is low
-    halvings: int = 50
+    halvings: int = 50  # of an interval: 1e-15 of it is left
     # tire
-    n_doubts: int = 26
-    doubt_step: float = 0.02  # rad
-    relative: float = 0.066  # half a band of 90 % of what a learnt tire misses at best
-    floor: float = 0.016
+    n_doubts: int = 26  # slips at which the uncertainty of the forces is given
+    doubt_step: float = 0.02  # rad, between these slips
+    # of the force: half a band of 90 % of what a learnt tire misses at best
+    relative: float = 0.066
+    floor: float = 0.016  # of a static axle load, likewise
     # of the slope at zero: the peak is reached within a per cent or two of its force
     flat: float = 0.05
     # of the slope at zero; a little less than where slip ends to be of use

@@ -271,9 +271,8 @@ def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: f
     camber = (c.roll_camber_front, c.roll_camber_rear)[axle] * roll
     made = ca.Function("axle", [x, F], [_both_sides(tire, x, camber, ca.vertsplit(loads), mu)])
     low, high = np.zeros_like(alpha), np.full_like(alpha, 3.0 * max(mu, 1.0) * vehicle.weight)
-    for _ in range(
-        CHOSEN.halvings
-    ):  # more side force shifts more load, and less is made: one solution
+    # More side force shifts more load, and less is made: one solution.
+    for _ in range(CHOSEN.halvings):
         middle = 0.5 * (low + high)
         more = np.array(made(alpha[None], middle[None])).ravel() > middle
         low, high = np.where(more, middle, low), np.where(more, high, middle)

@@ -439,7 +439,7 @@ def test_a_store_is_sorted_in_rounds_and_emptied_row_by_row(store, tmp_path, mon
         for row in rows:
             out.keep([row])
         monkeypatch.setattr(
-            storing, "CHOSEN", storing.CHOSEN._replace(at_once=2 if out is parts else 1000)
+            storing, "CHOSEN", storing.CHOSEN._replace(files_at_once=2 if out is parts else 1000)
         )
         out.settle()
     assert digest(tmp_path / "a") == digest(tmp_path / "b") == digest(store)

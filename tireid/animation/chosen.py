@@ -13,14 +13,14 @@ class Chosen(NamedTuple):
     dots: int = 150  # an inch
     quality: int = 45  # of a WebP, to 100
     # ground
-    look_back: float = 8.0  # stretch whose mean heading is the direction of view [m]
-    look_ahead: float = 22.0
+    # m behind the car, of the path whose mean heading is the direction of view
+    look_back: float = 8.0
+    look_ahead: float = 22.0  # m ahead of the car, likewise
     level: float = 9.0  # a straight path whose sides are this close [m] is not followed sidewards
-    # What covers what: the ground below, then ghosts, the car, its plan and its forces.
-    below: float = 0.5
-    ghost: float = 2.0
-    car: float = 3.0
-    above: float = 4.0
+    below: float = 0.5  # what covers what, the ground below all
+    ghost: float = 2.0  # above the ground, ghosts
+    car: float = 3.0  # above them, the car
+    above: float = 4.0  # above it, its plan and its forces
     half_road: float = 4.0  # [m]
     grid: float = 5.0  # [m]
     shown: float = 60.0  # of the path, to both sides of the car [m]
@@ -31,8 +31,8 @@ class Chosen(NamedTuple):
     small: float = 7.0  # points of the text
     many: int = 9  # entries of a legend that one row does not hold
     size: tuple[float, float] = (6.4, 4.0)  # [in]
-    behind: float = 12.0  # what is shown along the path [m]
-    ahead: float = 36.0
+    behind: float = 12.0  # m of the path that are shown behind the car
+    ahead: float = 36.0  # m of the path that are shown ahead of it
 
 
 CHOSEN = Chosen()

@@ -92,9 +92,8 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
                 text="The car is a double-track model of a mid-size sedan: roll, load transfer, "
                 "tire relaxation and combined slip on Magic Formula tires, integrated at 1 ms. It "
                 f"drives a slalom at {CHOSEN.speed:g} m/s. The identifier gets what any log has, "
-                f"speed, "
-                "lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it gets no "
-                "force."
+                "speed, lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it "
+                "gets no force."
             ),
             page.Paragraph(
                 text="Each axle has a force curve of slip, a sum of tanh units that is odd and "

@@ -19,10 +19,9 @@ _NOT_COMPLETED = 1
 _EPILOG = (
     "Without --weights or --network, frozen tires are identified first: the same car drives on "
     f"an open field for {DRIVING_CHOSEN.duration:g} s, steered at random and ever harder until it "
-    f"slides, and "
-    "the tires at the end are used. linear is the tire of the vehicle file, oracle the true tire "
-    "of the plant, learning begins with the frozen tires and updates them while driving. Exit "
-    "code 0 where the first of the cars reached the end of the path, else 1."
+    "slides, and the tires at the end are used. linear is the tire of the vehicle file, oracle the "
+    "true tire of the plant, learning begins with the frozen tires and updates them while driving. "
+    "Exit code 0 where the first of the cars reached the end of the path, else 1."
 )
 
 

@@ -10,8 +10,8 @@ class Chosen(NamedTuple):
     duration: float = 40.0  # s
     speed: float = 20.0  # m/s
     frequency: float = 0.6  # Hz, of the fastest swings
-    gentle: float = 0.3  # share of the angles at the start, and time to all of them [s]
-    grows: float = 30.0
+    gentle: float = 0.3  # share of the angles at the start
+    grows: float = 30.0  # s, in which angles grow by their whole size
     tips: float = 1.2  # times the grip: a car that is said to have more is falling over
     forgotten: float = 0.5  # s before a car spins or tips that are not learnt from
     rate_limit: float = 1.0  # rad/s at the road wheels
@@ -22,7 +22,7 @@ class Chosen(NamedTuple):
     # setup
     fastest: float = 30.0  # on a closed course [m/s]
     acceleration: float = 2.0  # on a closed course at friction 1 [m/s²]
-    braking: float = 3.0
+    braking: float = 3.0  # on a closed course at friction 1 [m/s²]
     period: float = 0.01  # control period [s]
     # least and most over that of the tire's measurement [-]
     frictions: tuple[float, float] = (0.05, 1.5)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 @style.styled
 def drive_solve_figure(drive: "Drive") -> Figure:
     """Draw the solve times of a drive as a histogram and over time."""
-    times = CHOSEN.drive_milli * drive.solve_time
+    times = CHOSEN.ms_per_s * drive.solve_time
     median, p99, largest = np.quantile(times, [0.5, 0.99, 1.0])
     figure = style.new_figure(CHOSEN.page, 2.7)
     left, right = figure.subplots(1, 2)
@@ -47,7 +47,7 @@ def drive_solve_figure(drive: "Drive") -> Figure:
         right.set_yscale("log")
         for axis in (left.xaxis, right.yaxis):
             style.few_ticks(axis)
-    period = f"largest {largest:.3g} ms of a period of {CHOSEN.drive_milli * drive.period:g} ms"
+    period = f"largest {largest:.3g} ms of a period of {CHOSEN.ms_per_s * drive.period:g} ms"
     right.set_title(period, loc="right")
     left.set_title(f"{times.size} steps")
     style.legend_above(figure)

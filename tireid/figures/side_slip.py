@@ -117,12 +117,10 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     above.plot(drive.s, drive.v_y, **style.TRUTH)
     above.plot(drive.s, v_y, **look)
     above.set_ylabel("$v_y$\n[m/s]")
-    below.fill_between(
-        drive.s, -CHOSEN.side_slip_milli * band, CHOSEN.side_slip_milli * band, **shade
-    )
-    below.plot(drive.s, CHOSEN.side_slip_milli * (inertial - drive.v_y), **alone)
-    below.plot(drive.s, CHOSEN.side_slip_milli * (v_y - drive.v_y), **look)
-    reach = 1.2 * CHOSEN.side_slip_milli * float(np.max(np.maximum(band, np.abs(v_y - drive.v_y))))
+    below.fill_between(drive.s, -CHOSEN.mm_per_m * band, CHOSEN.mm_per_m * band, **shade)
+    below.plot(drive.s, CHOSEN.mm_per_m * (inertial - drive.v_y), **alone)
+    below.plot(drive.s, CHOSEN.mm_per_m * (v_y - drive.v_y), **look)
+    reach = 1.2 * CHOSEN.mm_per_m * float(np.max(np.maximum(band, np.abs(v_y - drive.v_y))))
     below.set(ylabel="error of it\n[mm/s]", xlabel=ARC, ylim=(-reach, reach))
     below.set_xlim(0.0, float(drive.s[-1]))
     figure.align_ylabels([above, below])

@@ -209,7 +209,10 @@ class _Sum:
             self.ln_m.append(ln_m)
             return one
         away = ln_m - self.road
-        if abs(away) < ESTIMATE_CHOSEN.roads_least or 0.5 * known * away**2 < ESTIMATE_CHOSEN.price:
+        if (
+            abs(away) < ESTIMATE_CHOSEN.least_change
+            or 0.5 * known * away**2 < ESTIMATE_CHOSEN.price
+        ):
             return one
         return one.loosened(along[:, None], np.array([ESTIMATE_CHOSEN.another_road]))
 

@@ -402,8 +402,8 @@ class Store:
             paths.append(path)
             tables.append(self._table(path, size))
             if (
-                len(paths) == CHOSEN.at_once
-                or sum(table.nbytes for table in tables) > CHOSEN.store_held
+                len(paths) == CHOSEN.files_at_once
+                or sum(table.nbytes for table in tables) > CHOSEN.bytes_at_once
             ):
                 self._settle(paths, tables)
                 paths, tables = [], []

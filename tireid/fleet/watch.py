@@ -278,7 +278,7 @@ def _summed(one: _Compared, fleet: Array, watching: Watching) -> Seen:
     count = len(one.baseline)
     floor = np.array([CHOSEN.floor, CHOSEN.floor, CHOSEN.floor_friction]) ** 2
     T = np.maximum(
-        (CHOSEN.watch_held * fleet + count * one.scatter) / (CHOSEN.watch_held + count), floor
+        (CHOSEN.scatter_parts * fleet + count * one.scatter) / (CHOSEN.scatter_parts + count), floor
     )
     usual = np.median(one.z[one.baseline], axis=0)
     z, variance = one.z[count:] - usual, one.S[count:] + T
