@@ -122,7 +122,7 @@ def test_a_model_of_half_the_force_explains_less(model, logs, tmp_path):
 
 def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys):
     log = read_recording(logs / "slalom.csv")
-    tire = ti.identify(log, ti.sedan()).freeze(t=2.0)  # the slalom has just begun
+    tire = ti.identify(log, ti.sedan()).freeze(t=1.6)  # the slalom has just begun
     tire.save(tmp_path / "young.json")
     summary, columns = predicted(tmp_path / "out", tmp_path / "young.json", logs / "quick.csv")
     beyond = np.mean(np.abs(columns["alpha_f_rad"]) > tire.known_slip[0])
