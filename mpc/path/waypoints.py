@@ -40,10 +40,16 @@ def _smoothed(points: Array, *, closed: bool, distance: float, name: str) -> Arr
             f"to a point, it is {distance}"
         )
     one = sparse.identity(len(q), format="csc")
-    unit = float(np.mean(np.hypot(*np.diff(points, axis=0).T))) ** 6
+    gap = float(np.mean(np.hypot(*np.diff(points, axis=0).T)))
 
     def moved(exponent: float) -> Array:
-        return np.asarray(splu(one + 10.0**exponent * unit * roughness).solve(q))
+        far = np.full_like(q, np.inf)
+        try:
+            p = np.asarray(splu(one + 10.0**exponent * gap**6 * roughness).solve(q))
+        except RuntimeError:  # singular
+            return far
+        # The mean stays where it is, but for rounding where λ is too large to be solved for.
+        return p if np.abs(np.mean(p - q, axis=0)).max() < 1e-3 * min(gap, distance) else far
 
     low, high = CHOSEN.least, CHOSEN.most
     for _ in range(CHOSEN.halvings):  # the distance grows with λ

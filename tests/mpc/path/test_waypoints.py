@@ -103,6 +103,14 @@ def test_a_closed_line_that_smoothing_would_shrink_to_a_point_is_refused():
         Path.from_waypoints(X, Y, closed=True, smoothing=31.0)
 
 
+@pytest.mark.parametrize("points", [4, 6, 40])
+def test_an_open_line_that_may_move_far_becomes_one_of_constant_bending(points):
+    x = np.linspace(0.0, 90.0, points)
+    path = Path.from_waypoints(x, 5.0 * np.sin(x / 20.0), smoothing=1e3, minimum_radius=1.0)
+    apart = [path.project(a, 5.0 * np.sin(a / 20.0)).e_y for a in x]
+    assert np.abs(apart).max() < 5.0
+
+
 def test_smoothing_ten_thousand_noisy_way_points_takes_a_second(rng):
     points = np.column_stack(circle(10_000, radius=800.0)) + rng.normal(0, 0.02, (10_000, 2))
     ring, start = np.vstack((points, points[:1])), process_time()
