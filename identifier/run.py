@@ -19,11 +19,11 @@ from identifier.tire_model import TireModel
 from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
-_IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the law has diverged
+_IMPOSSIBLE_FORCE = 100.0  # times the car's weight: no tire reaches it, so the method has diverged
 
 
 class DivergedError(TireidError, ArithmeticError):
-    """The law diverged before the instant that was asked for."""
+    """The method diverged before the instant that was asked for."""
 
 
 def state_index(recording: Recording, t: float) -> int:
@@ -137,7 +137,7 @@ class History:
         state = self.state_at(t)
         diverged_at = self.diverged_at
         if diverged_at is not None and diverged_at <= t:
-            raise DivergedError(f"the law diverged at {diverged_at:g} s, before {t:g} s")
+            raise DivergedError(f"the method diverged at {diverged_at:g} s, before {t:g} s")
         return self.design.frozen(self.vehicle, state)
 
     def asked(self, recording: Recording, t: float | None = None) -> "History":
@@ -310,7 +310,7 @@ def learn(
         return design.whole.fitted(recording.taken(slice(0, max(n, 1))), vehicle, start, None)
     state = design.setup(vehicle, start).last(recording, n)
     if not all(np.isfinite(value).all() for value in state.values()):
-        raise DivergedError(f"the law diverged within {n} samples")
+        raise DivergedError(f"the method diverged within {n} samples")
     return design.frozen(vehicle, state)
 
 
@@ -470,7 +470,7 @@ class OnlineIdentifier:
 
     def model(self) -> TireModel:
         if self._diverged:
-            raise DivergedError(f"the law diverged within {self.counts.samples} samples")
+            raise DivergedError(f"the method diverged within {self.counts.samples} samples")
         if self._stepper is None and self._start is not None:
             return self._start
         return self.method.frozen(self.vehicle, self.state())

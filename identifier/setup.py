@@ -79,7 +79,7 @@ class Setup(NamedTuple):
         if not judges_samples(self.carry):
             return 1
         if self.ends_run is None:
-            raise ValueError("a step that judges samples must tell how many end a run: ends_run")
+            raise ValueError("a step that judges samples must state how many end a run: ends_run")
         return self.ends_run
 
     def begin(self, x: Array) -> "Setup":

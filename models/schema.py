@@ -265,11 +265,17 @@ class Table:
         return known
 
     def record(
-        self, cls: type, *, skip: tuple[str, ...] = (), alone: tuple[str, ...] = ()
+        self,
+        cls: type,
+        *,
+        skip: tuple[str, ...] = (),
+        alone: tuple[str, ...] = (),
+        rules: Mapping[str, str] = types.MappingProxyType({}),
     ) -> dict[str, Any]:
         """Return the arguments of a dataclass, each of the type that its field declares.
         cls : the dataclass; its fields are the keys that may be there.
         alone : tuples of which a single value may stand without a list.
+        rules : by key what a value of a wrong type breaks, where its types alone do not say it.
         """
         known = self.only_fields(cls, skip=skip)
         for key, field in known.items():
@@ -277,7 +283,15 @@ class Table:
                 self.value(key)
         given = {key: self.data[key] for key in known if key in self.data}
         given |= {key: [given[key]] for key in alone if not isinstance(given.get(key, []), list)}
-        return {key: self.typed(cls, key, value) for key, value in given.items()}
+        values = {}
+        for key, value in given.items():
+            try:
+                values[key] = self.typed(cls, key, value)
+            except self._refusal:
+                if key in rules:
+                    self.refuse(key, f"{rules[key]}, it is {shown(self.data[key])}")
+                raise
+        return values
 
     def typed(self, cls: type, name: str, value: Any, key: str = "") -> Any:
         """Return a value as the type that a field of a dataclass declares.

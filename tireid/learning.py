@@ -89,8 +89,8 @@ def identify(
         log.warning("%s: %s", recording.name, note)
     if history.diverged_at is not None:
         at = freeze_key(history.diverged_at)
-        law = getattr(design, "law", type(design).__name__)
-        raise DivergedError(f"{recording.name}: the {law} law diverged at {at} s")
+        method = getattr(design, "law", type(design).__name__)
+        raise DivergedError(f"{recording.name}: the method {method} diverged at {at} s")
     return Run(history=history)
 
 

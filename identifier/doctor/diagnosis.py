@@ -27,8 +27,8 @@ ELSEWHERE = ("velocity_sensor_x", "v_y")  # what may be in place of a gross faul
 WITHOUT_V_Y = "all but what contradicts physics or the car: the log has no lateral velocity"
 NEVER = (
     "mass: scales all forces alike and leaves the motion as it is; weigh the car",
-    "the lateral axis mirrored throughout (y to the right, as in SAE or NED): all laws stay as "
-    "they are; look at one left turn",
+    "the lateral axis mirrored throughout (y to the right, as in SAE or NED): the equations "
+    "of motion hold either way; look at one left turn",
 )
 
 

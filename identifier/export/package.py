@@ -103,7 +103,7 @@ def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[st
 def _certificate_text(method: Method, proven: Mapping[str, Any]) -> str:
     if method.judged_by:
         return (
-            "Stability and error bounds of this law depend on its gains: "
+            "Stability and error bounds of this method depend on its gains: "
             f"`{method.judged_by}` on its\n"
             "design file gives the certificate. None is part of this package."
         )

@@ -258,7 +258,7 @@ def _clock(
     advice = time_unit(unit)
     found, epoch = _unit(t, advice)
     since = " since 1970" if epoch else ""
-    guessed = "" if advice else ", a unit that its steps tell (likely)"
+    guessed = "" if advice else ", a unit that fits its steps (likely)"
     return Clock(column, name, found, f"{name!r} in {found}{since}, {words}{guessed}")
 
 

@@ -217,9 +217,17 @@ def _named_from(file: Path, folder: Path) -> str:
     return whole.relative_to(folder.resolve()).as_posix() if below else str(whole)
 
 
+_RULES = {
+    "channel": "must be a text or a list of texts",
+    "table": "must be pairs [hand wheel, road wheel] in rad",
+}
+
+
 def _signal(table: Table, name: str) -> Signal:
     """Return how a document says that a signal is read."""
-    given = table.record(Signal, alone=("channel",))
+    given = table.record(Signal, alone=("channel",), rules=_RULES)
+    if given.get("table") == ():
+        table.refuse("table", f"{_RULES['table']}, it is empty")
     try:
         return Signal(**given)
     except RecordingError as error:

@@ -98,7 +98,9 @@ class Wheels:
     @classmethod
     def of_table(cls, table: Table) -> "Wheels":
         """Return it as a document says it.   table : as `table` returns it."""
-        return cls(**table.record(cls, alone=("radius", "track")))
+        several = ("radius", "track")
+        rules = dict.fromkeys(several, "must be a number or a list of numbers")
+        return cls(**table.record(cls, alone=several, rules=rules))
 
 
 # How they roll, by the speed over ground.

@@ -92,7 +92,7 @@ class LateralVelocity:
         method = identifier.method
         sensor = method.accelerometer
         if sensor is None or sensor.body is None:
-            raise ValueError(f"{type(method).__name__} tells no v_y")
+            raise ValueError(f"{type(method).__name__} estimates no v_y")
         self.identifier, self.trust = identifier, localization or Localization()
         self._dt = method.dt
         self._body = body or sensor.body(identifier.vehicle)

@@ -27,6 +27,9 @@ class Chosen(NamedTuple):
     tolerance: float = 1e-9  # m
     steps: int = 200  # in search of the nearest point, at most
     # waypoints
+    least: float = -12.0  # exponent of λ over the sixth power of the mean gap
+    most: float = 18.0
+    halvings: int = 40
     fits: int = 4  # of a line, each over the arc length of the one before
     farthest: float = 1e8  # of a way-point from the origin [m]: every map of the earth fits
     same: float = 1e-6  # of the median gap: way-points as near as this are one

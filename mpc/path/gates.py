@@ -72,7 +72,7 @@ def line_through_gates(
     easing : length over which the curvature may rise from zero to its peak [m].
     spacing : longest step of the samples [m].
     """
-    require_positive(PathError, clearance=clearance, spacing=spacing)
+    require_positive(PathError, **{"gates: clearance": clearance, "gates: spacing": spacing})
     for gate in gates:
         if gate.left - gate.right < 2.0 * clearance:
             raise PathError(f"gates: {gate} is too narrow for a clearance of {clearance} m")

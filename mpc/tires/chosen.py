@@ -15,6 +15,7 @@ class Chosen(NamedTuple):
     worst: float = 0.02  # largest error of a fit over the largest force
     samples: int = 400  # of a curve that is fitted
     small: float = 1e-3  # rad; the slope at zero is read here, well above rounding
+    straight: float = 0.1  # of that slip F_max/C; a slope that is read beyond it is no longer C
     largest_slip: float = 0.5  # rad, where the table ends; less where friction is low
     halvings: int = 50  # of an interval: 1e-15 of it is left
     # tire

@@ -199,13 +199,22 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
     force : of the axles at these slips [N], (2, k).
     """
     first = min(int(np.searchsorted(alpha, CHOSEN.small)), alpha.size - 1)
-    stiffness, peak = force[:, first] / alpha[first], np.abs(force).max(axis=1)
-    if not (stiffness > 0.0).all():
-        raise CurveFitError(f"force must rise with slip at zero, its slope is {stiffness} N/rad")
-    narrowest = CHOSEN.narrowest * float((peak / stiffness).min())
-    ladder = np.array([narrowest * 2.0**j for j in range(CHOSEN.units)])
+    peak = np.abs(force).max(axis=1)
+    while True:
+        stiffness = force[:, first] / alpha[first]
+        if not (stiffness > 0.0).all():
+            raise CurveFitError(
+                f"force must rise with slip at zero, its slope is {stiffness} N/rad"
+            )
+        bends = peak / stiffness
+        if first == 0 or alpha[first] <= CHOSEN.straight * bends.min():
+            break
+        first //= 2
+    narrowest = CHOSEN.narrowest * float(bends.min())
+    units = CHOSEN.units + int(np.log2(bends.max() / bends.min()))  # both axles share the scales
+    ladder = np.array([narrowest * 2.0**j for j in range(units)])
     T = np.tanh(alpha[:, None] / ladder)
-    W = np.empty((2, CHOSEN.units))
+    W = np.empty((2, units))
     for i, name in enumerate(("front", "rear")):
         W[i] = np.linalg.lstsq(T, force[i], rcond=None)[0]
         error = np.abs(T @ W[i] - force[i]).max() / peak[i]

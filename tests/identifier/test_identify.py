@@ -144,7 +144,7 @@ def test_gains_that_diverge_are_reported_not_hidden(car, drive):
     wild = replace(GAINS, eta_W=1e7, eta_V=1e7, rho_W=0.0, rho_V=0.0)
     history = identify(drive(), car, PaperIdentifier(gains=wild))
     assert history.diverged_at is not None
-    with pytest.raises(DivergedError, match="diverged at"):
+    with pytest.raises(DivergedError, match="the method diverged at"):
         history.freeze(14.0)
 
 

@@ -114,7 +114,8 @@ def test_an_empty_map_is_an_empty_file(tmp_path):
         ("[file]\naxes = 'NED'\n", "axes must be one of ISO, SAE, not 'NED'"),
         ("[signals.vy]\nchannel = 'a'\n", "signals.vy is unknown, known are v_x, v_y, beta"),
         ("[signals.v_y]\nunit = 'm/s'\n", "signals.v_y.channel is missing"),
-        ("[signals.v_y]\nchannel = 3\n", "signals.v_y.channel must be a text, it is 3"),
+        ("[signals.v_y]\nchannel = 3\n", "channel must be a text or a list of texts, it is 3"),
+        ("[signals.v_y]\nchannel = [3]\n", "a text or a list of texts, it is a list of 1"),
         ("[signals.v_y]\nchannel = []\n", "signals.v_y: channel must name at least one"),
         ("[signals.v_y]\nchannel = ['a', 'a']\n", "signals.v_y: channel must name each once"),
         ("[signals.v_y]\nchannel = 'a'\nscale = 2\n", "signals.v_y.scale is unknown"),
@@ -126,7 +127,22 @@ def test_an_empty_map_is_an_empty_file(tmp_path):
         ("[signals.delta_f]\nchannel = 'a'\nratio = -14\n", "ratio must be hand wheel over road"),
         ("[signals.delta_f]\nchannel = 'a'\nratio = 2\ntable = [[0, 0], [1, 1]]\n", "give one of"),
         ("[signals.delta_f]\nchannel = 'a'\ntable = [[0, 0], [1, -1]]\n", "that rise"),
-        ("[signals.delta_f]\nchannel = 'a'\ntable = [1, 2]\n", "table must be a list, it is 1"),
+        *(
+            (
+                f"[signals.delta_f]\nchannel = 'a'\ntable = {pairs}\n",
+                f"table must be pairs [hand wheel, road wheel] in rad, it is {shown}",
+            )
+            for pairs, shown in (
+                ("[1.0, 2.0]", "a list of 2"),
+                ("[[0, 0, 0], [1, 1, 1]]", "a list of 2"),
+                ("[['a', 0], [1, 1]]", "a list of 2"),
+                ("3", "3"),
+                ("{}", "a table of 0"),
+                ("[]", "empty"),
+            )
+        ),
+        ("[wheels]\nradius = [[0.3]]\n", "radius must be a number or a list of numbers, it is a"),
+        ("[wheels]\ntrack = 'a'\n", "wheels.track must be a number or a list of numbers, it is"),
         ("[signals.v_y]\nchannel='a'\n[signals.beta]\nchannel='b'\n", "beta replaces v_y"),
         ("[signals.Fyf]\nchannel='a'\n", "Fyf needs its partner"),
         ("[clock]\nlongest_gap = -1\n", "longest_gap must be positive and finite, it is -1"),

@@ -404,7 +404,7 @@ def test_a_law_that_diverges_on_a_replayed_log_is_refused_by_its_name(
     words = ["identify", calm, "--vehicle", logs / "car.toml", "--design", design, "--no-check"]
     assert main([str(word) for word in [*words, "--out", tmp_path / "alone", "--accept"]]) == 0
     line = refusal(capsys, [*words, "--replay", logs / "quick.csv", "--out", tmp_path / "out"])
-    assert "quick: the instantaneous law diverged at" in line
+    assert "quick: the method instantaneous diverged at" in line
     assert not (tmp_path / "out").exists()
 
 

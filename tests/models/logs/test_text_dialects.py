@@ -65,7 +65,7 @@ def test_what_was_detected_is_said(tmp_path):
     assert {"cells apart by tabs (sure)", "decimal comma", "2D export"} <= set(said)
     said = open_log(written(tmp_path, DIALECTS["milliseconds by their steps"])).dialect
     assert said[-1].endswith(
-        "'Time' in ms, by its name (sure), a unit that its steps tell (likely)"
+        "'Time' in ms, by its name (sure), a unit that fits its steps (likely)"
     )
 
 
@@ -161,7 +161,7 @@ def test_the_clock_is_found_by_what_it_does_where_no_name_tells(tmp_path):
     log = open_log(written(tmp_path, "\n".join(["a,b,c", *rows])))
     assert [one.name for one in log.listed()] == ["a", "c"]
     assert log.dialect[-1] == (
-        "time is 'b' in s, as it rises evenly (likely), a unit that its steps tell (likely)"
+        "time is 'b' in s, as it rises evenly (likely), a unit that fits its steps (likely)"
     )
 
 

@@ -140,7 +140,7 @@ def test_a_lost_channel_widens_the_band_and_is_driven_through(swings, channel, t
 
 
 def test_a_method_that_asks_for_v_y_tells_none():
-    with pytest.raises(ValueError, match="AxleIdentifier tells no v_y"):
+    with pytest.raises(ValueError, match="AxleIdentifier estimates no v_y"):
         LateralVelocity(OnlineIdentifier(AxleIdentifier.for_vehicle(CAR), CAR, DT))
 
 

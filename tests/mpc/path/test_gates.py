@@ -127,7 +127,8 @@ def test_a_slalom_passes_the_cones_left_and_right_in_turn():
         (lambda: slalom(run_out=-1.0), "run_out must be"),
         (lambda: slalom(gap=1.0), "5 m between"),
         (lambda: slalom(margin=-1.0), "car_width and margin"),
-        (lambda: iso_3888_2(spacing=-1.0), "spacing must be positive"),
+        (lambda: iso_3888_2(spacing=-1.0), "^gates: spacing must be positive"),
+        (lambda: iso_3888_2(margin=-9.0), "^gates: clearance must be positive"),
     ],
 )
 def test_impossible_courses_are_refused(build, message):

@@ -1,7 +1,10 @@
+from time import process_time
+
 import numpy as np
 import pytest
 
 from mpc.path import Path, PathError
+from mpc.path.waypoints import _smoothed
 
 
 def circle(n, radius=30.0, gaps=None):
@@ -80,6 +83,41 @@ def test_smoothing_leaves_an_open_path_without_noise_as_it_is(rng):
     assert noisy.kappa[inside] == pytest.approx(
         np.interp(noisy.X, plain.X, plain.kappa)[inside], abs=3e-3
     )
+
+
+@pytest.mark.parametrize("points", [5, 6, 8, 12])
+@pytest.mark.parametrize("distance", [0.05, 0.5, 5.0])
+def test_a_closed_line_of_few_points_keeps_the_distance_that_smoothing_allows(points, distance):
+    X, Y = circle(points)
+    path = Path.from_waypoints(X, Y, closed=True, smoothing=distance)
+    radius = np.hypot(path.X, path.Y)
+    assert radius.min() == pytest.approx(30.0 - distance, rel=0.03)
+    apart = [path.project(x, y).e_y for x, y in zip(X, Y, strict=True)]
+    assert np.sqrt(np.mean(np.square(apart))) == pytest.approx(distance, rel=1e-3)
+
+
+def test_a_closed_line_that_smoothing_would_shrink_to_a_point_is_refused():
+    X, Y = circle(40)
+    rule = r"^way-points: smoothing must be less than 30 m, at which .* a point, it is 31.0$"
+    with pytest.raises(PathError, match=rule):
+        Path.from_waypoints(X, Y, closed=True, smoothing=31.0)
+
+
+@pytest.mark.parametrize("points", [4, 6, 40])
+def test_an_open_line_that_may_move_far_becomes_one_of_constant_bending(points):
+    x = np.linspace(0.0, 90.0, points)
+    path = Path.from_waypoints(x, 5.0 * np.sin(x / 20.0), smoothing=1e3, minimum_radius=1.0)
+    apart = [path.project(a, 5.0 * np.sin(a / 20.0)).e_y for a in x]
+    assert np.abs(apart).max() < 5.0
+
+
+def test_smoothing_ten_thousand_noisy_way_points_takes_a_second(rng):
+    points = np.column_stack(circle(10_000, radius=800.0)) + rng.normal(0, 0.02, (10_000, 2))
+    ring, start = np.vstack((points, points[:1])), process_time()
+    moved = _smoothed(ring, closed=True, distance=0.005, name="way-points")
+    assert process_time() - start < 5.0
+    apart = np.sum((moved - ring)[:-1] ** 2, axis=1)
+    assert np.sqrt(apart.mean()) == pytest.approx(0.005, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pytest
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from mpc.prediction import build_stage
 from mpc.tires import prediction_tire
+from mpc.tires.ladder import mounted_tire
 from mpc.tires.tire import ALL
 
 
@@ -54,6 +55,23 @@ def test_a_mounted_tire_is_that_of_the_static_load(car, forces, kind):
     for i, load in enumerate(car.axle_loads):
         expected = [2.0 * float(tire.forces(a, 0.0, 0.0, 0.5 * load).F_y) for a in alpha]
         np.testing.assert_allclose(force[:, i], expected, atol=worst * max(expected))
+
+
+@pytest.mark.parametrize("kind", [DugoffTire, FialaTire])
+@pytest.mark.parametrize("stiffness", [1e4, 4e5, 2e6])
+@pytest.mark.parametrize("friction", [0.05, 0.2, 1.0])
+@pytest.mark.parametrize("rear_share", [0.1, 1.0])
+def test_tires_of_any_friction_and_stiffness_are_mounted(
+    car, forces, kind, stiffness, friction, rear_share
+):
+    given = {"C_alpha": 0.5 * stiffness, "C_kappa": 0.5 * stiffness}
+    tires = [kind(**given, friction=share * friction) for share in (1.0, rear_share)]
+    none, alpha = np.zeros(40), np.geomspace(1e-5, 0.5, 40)
+    model, both = mounted_tire(car, *tires), np.column_stack([alpha, alpha])
+    force = forces(model, 20.0, none, none, none, lagged=both)[0]
+    for i, load in enumerate(car.axle_loads):
+        expected = [2.0 * float(tires[i].forces(a, 0.0, 0.0, 0.5 * load).F_y) for a in alpha]
+        np.testing.assert_allclose(force[:, i], expected, atol=0.02 * max(expected))
 
 
 def test_the_door_says_what_it_cannot_use(car):
