@@ -57,7 +57,7 @@ def emit(
         Where a file is there and not to be replaced, two have one name, or one cannot be written.
     """
     if understeer is False and tir is slipx is ggv is None:
-        raise ValueError(f"nothing is asked for: add one or more of {WANTED}")
+        raise ValueError("nothing is asked for: give one or more of tir, slipx, ggv, understeer")
     model = source.tire if isinstance(source, Run) else source
     if tir is not None and not Path(tir).name:
         raise OutputError(f"tir must name a file, it is {str(tir)!r}")

@@ -547,3 +547,8 @@ def test_fonts_of_matplotlib_are_found_where_the_list_of_the_machine_lacks_them(
     listed = len(fonts.ttflist)
     _with_own_fonts()
     assert len(fonts.ttflist) == listed
+
+
+def test_a_tire_is_no_recording_to_plot():
+    with pytest.raises(TypeError, match=r"recording must be a Recording, as of read_recording"):
+        inputs_figure("tire")

@@ -102,7 +102,8 @@ def pair_tables(comparison: Comparison) -> str:
                     error = frozen.get(learnt, {}).get(replayed)
                     cell = "diverged" if error is None else _mean(comparison, [(replayed, error)])
                     lines.append([name, cell])
-            blocks.append(_text(f"identified on {learnt}, frozen, replayed on {replayed}", lines))
+            title = f"identified on {learnt}, frozen, replayed on {replayed}"
+            blocks += [_text(title, lines)] if lines else []
     return "\n".join(blocks)
 
 

@@ -18,6 +18,7 @@ from identifier.prediction import Prediction
 from identifier.reproducibility import Replay, freeze_key, online_error
 from identifier.run import History
 from models.recordings import Recording
+from models.rules import require_kind
 from models.vehicle import Vehicle
 from tireid.figures import style
 from tireid.figures.chosen import CHOSEN
@@ -202,6 +203,7 @@ def inputs_figure(recording: Recording, *, window: style.Window = None) -> Figur
 
     window : first and last time to show [s]; None shows all.
     """
+    require_kind(Recording, "as of read_recording, or run.recording", recording=recording)
     ends = style.time_window(recording.t, window)
     estimated = ", estimated" if recording.estimated else ""
     logged = {
