@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Real
 from os import PathLike
 from pathlib import Path
 
@@ -77,7 +78,7 @@ class Run:
             Where the recording begins after that time, or ends before it.
         """
         end = float(self.recording.t[-1])
-        if t is not None and t > end + self.recording.dt:
+        if isinstance(t, Real) and t > end + self.recording.dt:
             raise ValueError(f"the recording ends at {end:g} s, before {t:g} s")
         return self.history.freeze(t)
 

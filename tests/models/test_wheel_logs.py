@@ -190,7 +190,7 @@ def test_what_wheels_cannot_be_is_refused_in_one_line(run, wheels, change, told,
     [
         ("radius = 5.0", "wheels: radius must lie between 0.01 and 2, it is 5"),
         ('driven = "left"', "wheels: driven must be one of"),
-        ("radius = [[0.3]]", "radius must be a number, it is a list of 1"),
+        ("radius = [[0.3]]", "radius must be a number or a list of numbers, it is a list of 1"),
         ("radii = 0.3", "wheels.radii is unknown, known are radius, track, wheelbase"),
     ],
 )
