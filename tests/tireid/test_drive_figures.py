@@ -177,9 +177,9 @@ def test_the_film_is_crisp_and_small_and_moves(drives, kind, frame_bytes, tmp_pa
         assert film.size == (960, 600)
     assert file.stat().st_size < frame_bytes * len(pictures)
     assert (
-        len(pictures) >= ANIMATION_CHOSEN.most
+        len(pictures) >= frames.CHOSEN.most
     )  # what stays at the end may be one picture that is held
-    for before, after in pairwise(pictures[: ANIMATION_CHOSEN.most]):
+    for before, after in pairwise(pictures[: frames.CHOSEN.most]):
         assert (before != after).any()
 
 
