@@ -45,6 +45,8 @@ ROWS = {
     "lines": "lines of Python",
     "imported_once": "Python files that one other imports",
     "circles": "circles of files that import one another",
+    "constants": "numbers that are constants of a module",
+    "public_names": "public names at the top of modules",
     "type_switches": "type switches on methods and models",
     "arrays": "definitions of `Array`",
     "pairs": "pairs of places that share six or more lines",
@@ -81,6 +83,8 @@ def counts(root: Path) -> Counts:
         "lines": sum(text.count("\n") for text in python.values()),
         "imported_once": imported_once(parsed),
         "circles": len(circles(parsed)),
+        "constants": sum(len(constants(module)) for module in parsed.values()),
+        "public_names": sum(len(public_names(module)) for module in parsed.values()),
         "type_switches": type_switches(parsed),
         "arrays": sum(defines(module, "Array") for module in parsed.values()),
         "pairs": len(pairs(tree)),
@@ -104,6 +108,45 @@ def imported_once(parsed: Mapping[str, ast.Module]) -> int:
     for name, module in parsed.items():
         importers.update(_imported(module, homes) - {name})
     return sum(count == 1 for count in importers.values())
+
+
+def _assigned(statement: ast.stmt) -> tuple[list[str], ast.expr | None]:
+    """Return the names that a statement gives a value, and the value."""
+    if isinstance(statement, ast.AnnAssign):
+        targets: list[ast.expr] = [statement.target]
+        value = statement.value
+    elif isinstance(statement, ast.Assign):
+        targets, value = statement.targets, statement.value
+    else:
+        return [], None
+    inner = [e for one in targets for e in (one.elts if isinstance(one, ast.Tuple) else [one])]
+    return [one.id for one in inner if isinstance(one, ast.Name)], value
+
+
+def _is_number(value: ast.expr | None) -> bool:
+    match value:
+        case ast.Constant():
+            return isinstance(value.value, int | float) and not isinstance(value.value, bool)
+        case ast.UnaryOp():
+            return _is_number(value.operand)
+        case ast.BinOp():
+            return _is_number(value.left) and _is_number(value.right)
+        case ast.Tuple() | ast.List():
+            return bool(value.elts) and all(map(_is_number, value.elts))
+    return False
+
+
+def constants(module: ast.Module) -> list[str]:
+    """Return the names at the top of a module that stand for numbers, or tuples of numbers."""
+    assigned = map(_assigned, module.body)
+    return [name for names, value in assigned if _is_number(value) for name in names]
+
+
+def public_names(module: ast.Module) -> list[str]:
+    """Return the names of functions, classes and values of a module without an underscore."""
+    defined = [one.name for one in module.body if isinstance(one, ast.FunctionDef | ast.ClassDef)]
+    given = [name for one in module.body for name in _assigned(one)[0]]
+    return [name for name in (*defined, *given) if not name.startswith("_")]
 
 
 def circles(parsed: Mapping[str, ast.Module]) -> list[list[str]]:

@@ -60,6 +60,13 @@ def test_a_definition_is_no_import_and_no_argument():
     assert not house.defines(ast.parse(USER), "Array")
 
 
+def test_constants_are_numbers_and_public_names_have_no_underscore():
+    text = "A, B = 1.0, -2\n_C: tuple[float, ...] = (0.1, 3)\nD = 'x'\nE = True\nF = f(1)\n"
+    module = ast.parse(text + "def g(): ...\nclass _H:\n    i = 3\n")
+    assert house.constants(module) == ["A", "B", "_C"]
+    assert house.public_names(module) == ["g", "A", "B", "D", "E", "F"]
+
+
 @pytest.mark.parametrize(
     ("lines", "other", "found"),
     [
@@ -97,6 +104,8 @@ def test_a_tree_is_counted(tmp_path):
         "lines": 19,
         "imported_once": 1,
         "circles": 0,
+        "constants": 0,
+        "public_names": 4,
         "type_switches": 3,
         "arrays": 1,
         "pairs": 0,
