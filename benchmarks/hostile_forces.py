@@ -13,7 +13,7 @@ from benchmarks.random_cars import FIRST_SEED
 from benchmarks.targets import Targets, show
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier
-from identifier.axle.along import Adjoint, Lessons, adjoint, begin_error, lessons
+from identifier.axle.along import Adjoint, Taught, adjoint, begin_error, taught_by
 from identifier.axle.certificate import FrictionDrop
 from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
 from identifier.axle.covariance import unpacked
@@ -24,7 +24,7 @@ IDENTITY = 1e-6  # of the error, that sums of thousands of terms may differ
 SLIPS = np.array([0.01, 0.05, 0.15])  # rad, at which forces are looked at
 
 
-def forward(taught: Lessons, error: Array, noise: Array) -> Array:
+def forward(taught: Taught, error: Array, noise: Array) -> Array:
     """Return the errors of the parameters after a drive, sample by sample (2, q).
 
     Parameters
@@ -51,7 +51,7 @@ def judge_errors(drives: int, t: Targets) -> None:
     for number, case in enumerate(cases(8, drives)):
         rng = np.random.default_rng([35, number])
         history = identify(recording_of(case.drive), case.vehicle, case.design)
-        taught = lessons(case.design, history)
+        taught = taught_by(case.design, history)
         reach = adjoint(taught, np.tile(SLIPS, (2, 1)), case.design.ladder)
         found = identity(case, taught, reach, rng)
         wrong += not found[0]
@@ -70,7 +70,7 @@ def judge_errors(drives: int, t: Targets) -> None:
 
 
 def identity(
-    case: Case, taught: Lessons, reach: Adjoint, rng: np.random.Generator
+    case: Case, taught: Taught, reach: Adjoint, rng: np.random.Generator
 ) -> tuple[bool, bool]:
     """Return whether the learnt forces err as the recursion says, for a random truth.
 
@@ -100,7 +100,7 @@ def identity(
 
 
 def worst(
-    case: Case, taught: Lessons, reach: Adjoint, at: tuple[int, int]
+    case: Case, taught: Taught, reach: Adjoint, at: tuple[int, int]
 ) -> tuple[float, float, float, bool]:
     """Return the bound of a force error, what the worst errors of y reach, and a twentieth more.
 

@@ -67,7 +67,9 @@ class _Curves(Protocol):
     def vehicle(self) -> Vehicle: ...
     @property
     def min_speed(self) -> float: ...
-    def force(self, alpha: ArrayLike, axle: Axle | None = None) -> Any: ...
+    def force(
+        self, alpha: ArrayLike, axle: Axle | None = None, *, v_x: float | None = None
+    ) -> Any: ...
     def lagged_slip(self, recording: Recording) -> Array: ...
     def slope_at(self, slip: Array) -> Array: ...
 
@@ -221,7 +223,7 @@ class Band(ABC, Generic[Model]):
             Where the axle has another name, or level or speed are impossible.
         """
         slip = np.asarray(alpha, dtype=np.float64)
-        center = np.asarray(self.model.force(slip, axle))
+        center = np.asarray(self.model.force(slip, axle, v_x=v_x))
         half = self.half(slip.ravel(), level, v_x=v_x).reshape(*slip.shape, 2)
         return ends(center - of_axle(half, axle), center + of_axle(half, axle))
 

@@ -68,7 +68,7 @@ LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
 
 
 GROUP = "tireid.methods"
-# What benchmarks/rivals has, a distribution of its own: who asks for one is told where it is.
+# What benchmarks/rivals has, a distribution of its own: who asks for one learns where it is.
 _RIVALS = ("linear_kf", "joint_ekf", "washout", "mhe")
 
 

@@ -157,7 +157,7 @@ class Progress:
         self._what, self._parts, self._long = what, dict(parts or {"": 1.0}), long
         self._whole = sum(self._parts.values())
         self._begun = time.perf_counter()
-        self._told = self._begun + _QUIET - (_LIVE if _on_terminal() else _PLAIN)
+        self._said = self._begun + _QUIET - (_LIVE if _on_terminal() else _PLAIN)
         self._before, self._weight, self._name = 0.0, 0.0, ""
         self._done = 0
         self.begin(next(iter(self._parts)))
@@ -176,7 +176,7 @@ class Progress:
         self._weight, self._name = self._parts[part] / self._whole, part
         self._done = 0
         if self._long:
-            self._told = -math.inf
+            self._said = -math.inf
         self(0.0)
         return self
 
@@ -199,9 +199,9 @@ class Progress:
         """
         now = time.perf_counter()
         live = _on_terminal()
-        if not _listening or now - self._told < (_LIVE if live else _PLAIN):
+        if not _listening or now - self._said < (_LIVE if live else _PLAIN):
             return
-        self._told = now
+        self._said = now
         done = min(self._before + self._weight * share, 1.0)
         parts = [text or self._name, f"{100.0 * done:.0f} %"]
         if done > _TELLING:

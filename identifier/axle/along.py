@@ -25,7 +25,7 @@ from identifier.axle.chosen import CHOSEN
 from identifier.axle.covariance import unpacked
 from identifier.axle.curve import doublings
 from identifier.axle.model import AxleModel
-from identifier.axle.step import LESSON, build_lesson
+from identifier.axle.step import TAUGHT, build_taught
 from identifier.certificate import Property, at_most, statement
 from identifier.method import Run
 from identifier.setup import Setup
@@ -43,8 +43,8 @@ class _Learner(Design, Protocol):
         """Return the model of carried values."""
 
 
-class Lessons(NamedTuple):
-    """What N samples taught, rows front and rear, as of `identifier.axle.step.build_lesson`.
+class Taught(NamedTuple):
+    """What N samples taught, rows front and rear, as of `identifier.axle.step.build_taught`.
     theta : parameters before each sample and after the last (N + 1, 2, q).
     moved : m, what learning does not explain (N, 2, q).
     begin : covariance of the parameters before the first sample (2, q, q).
@@ -76,11 +76,11 @@ class Adjoint(NamedTuple):
     g: Array
 
 
-def lessons(design: _Learner, history: Run) -> Lessons:
+def taught_by(design: _Learner, history: Run) -> Taught:
     """Return what the samples of a run taught; of a long one those at its end."""
     setup = design.setup(history.vehicle, history.start)
     pressed, n = history.vehicle.has_downforce, len(history.recording)
-    step = build_lesson(doublings(design.ladder), pressed=pressed)
+    step = build_taught(doublings(design.ladder), pressed=pressed)
     over = tuple(port for port in step.name_in() if port not in setup.constants)
     scan, parts, theta, begin = Scan(step, carry=(), over=over), [], [], []
     constants = {port: setup.constants[port] for port in scan.constants}
@@ -92,12 +92,12 @@ def lessons(design: _Learner, history: Run) -> Lessons:
         theta.append(np.concatenate([block.state["W"], block.state["own"]], axis=2))
         begin.append(block.state["UD"][0])
     h, e, counts, gains, declared = (
-        np.concatenate([part[name] for part in parts]) for name in LESSON
+        np.concatenate([part[name] for part in parts]) for name in TAUGHT
     )
     path = np.concatenate([*(one[:-1] for one in theta), theta[-1][-1:]])
     learnt = path[:-1] + gains * (counts * e)[:, :, None]
     P = unpacked(begin[0], len(design.ladder) + 3)
-    return Lessons(h, e, counts, gains, declared, path, path[1:] - learnt, P)
+    return Taught(h, e, counts, gains, declared, path, path[1:] - learnt, P)
 
 
 def _by_columns(values: Array) -> Array:
@@ -106,7 +106,7 @@ def _by_columns(values: Array) -> Array:
     return apart.reshape(len(values), -1)
 
 
-def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint:
+def adjoint(taught: Taught, slips: Array, ladder: tuple[float, ...]) -> Adjoint:
     """Return what reaches the force of each axle after a drive, from its end to its beginning.
     slips : at which the force is looked at, of each axle (2, m) [rad].
     ladder : slip scales of the units [rad].
@@ -127,7 +127,7 @@ def adjoint(taught: Lessons, slips: Array, ladder: tuple[float, ...]) -> Adjoint
 def certified_along(design: _Learner, history: Run) -> tuple[Property, ...]:
     """Return what is proven of the curves that a drive taught."""
     model = design.frozen(history.vehicle, history.state_at(float(history.recording.t[-1])))
-    taught = lessons(design, history)
+    taught = taught_by(design, history)
     known = np.asarray(model.known_slip)
     slips = (
         np.linspace(1.0 / CHOSEN.slips, 1.0, CHOSEN.slips)
@@ -160,7 +160,7 @@ def certified_along(design: _Learner, history: Run) -> tuple[Property, ...]:
 
 
 def _of_axle(
-    i: int, model: AxleModel, taught: Lessons, reach: Adjoint, slips: Array, box: Array
+    i: int, model: AxleModel, taught: Taught, reach: Adjoint, slips: Array, box: Array
 ) -> tuple[Property, ...]:
     """Return what is proven of the curve of axle i.
     reach : of errors, at the slips of both axles (2, m).
@@ -172,13 +172,13 @@ def _of_axle(
     possible = np.abs((box - model.W[i]) @ at_slips.T).max(axis=0)
     g, sizes = reach.g[:, i], np.abs(reach.g[:, i])
     by_begin, by_bounds = begin_error(taught, reach)[i], np.abs(reach.moved[i])
-    by_told, by_left = taught.declared[:, i] @ sizes, np.abs(taught.left[:, i]) @ sizes
-    error = by_begin + by_told + by_bounds
+    by_declared, by_left = taught.declared[:, i] @ sizes, np.abs(taught.left[:, i]) @ sizes
+    error = by_begin + by_declared + by_bounds
     k = int(np.argmax(error / possible))
     span = f"{axle} axle, slip up to {known:.3g} rad"
     noise = np.sqrt((g**2).sum(axis=0))
     part = [
-        ("declared", "of that by the declared errors", by_told, "static loads"),
+        ("declared", "of that by the declared errors", by_declared, "static loads"),
         ("begin", "of that by the beginning", by_begin, "static loads"),
         ("moved", "of that by bounds", by_bounds, "static loads"),
         ("error_gain", "force error per largest error of y", sizes.sum(axis=0), "-"),
@@ -218,9 +218,9 @@ def _of_axle(
             name=f"along/{axle}/left",
             title=f"{span}: largest force error, with the residuals of y",
             value=float(by_left[k]),
-            limit=float(by_told[k]),
-            margin=float(by_told[k] / max(float(by_left[k]), CHOSEN.along_tiny)),
-            status=at_most(float(by_left[k]), good=float(by_told[k]), bad=None),
+            limit=float(by_declared[k]),
+            margin=float(by_declared[k] / max(float(by_left[k]), CHOSEN.along_tiny)),
+            status=at_most(float(by_left[k]), good=float(by_declared[k]), bad=None),
             unit="static loads",
             advice="y errs by more than declared, and so may the force: check sensors, car and "
             "signs",
@@ -228,7 +228,7 @@ def _of_axle(
     )
 
 
-def begin_error(taught: Lessons, reach: Adjoint) -> Array:
+def begin_error(taught: Taught, reach: Adjoint) -> Array:
     """Return the force error that the beginning leaves, within `CHOSEN.begin` deviations (2, m).
     reach : of errors, at m slips.
     """

@@ -347,10 +347,10 @@ def _half_band(f: _Forward, s: SimpleNamespace) -> Any:
     return ca.if_else(f.gated.on, ca.vertcat(of_axle(0), of_axle(1)) * s.car.load, 0)
 
 
-LESSON = ("h", "e", "counts", "gains", "declared")
+TAUGHT = ("h", "e", "counts", "gains", "declared")
 
 
-def build_lesson(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
+def build_taught(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
     """Return what a sample teaches, of the ports of the step: the recursion that errors obey.
 
     Its outputs are the regressors h (2, q); e = y - h'w (2,), w before a change of the road;
@@ -365,8 +365,8 @@ def build_lesson(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Functio
     gains = ca.vertcat(*(ca.horzcat(*_learn(s, sample, i).gains) for i in (0, 1)))
     e = sample.e + ca.sum2(sample.h[:, : s.W.shape[1]] * (sample.W - s.W))
     counts = ca.if_else(e == 0, 1, sample.innovation / e)
-    outputs = dict(zip(LESSON, (sample.h, e, counts, gains, sample.sigma), strict=True))
-    return step_function(_name("axle_lesson", steps, pressed=pressed), ports, {}, outputs)
+    outputs = dict(zip(TAUGHT, (sample.h, e, counts, gains, sample.sigma), strict=True))
+    return step_function(_name("axle_taught", steps, pressed=pressed), ports, {}, outputs)
 
 
 def _regression(f: _Forward, s: SimpleNamespace) -> tuple[Any, Any, dict[str, Any]]:

@@ -112,7 +112,7 @@ def _build_step(textbook: bool) -> ca.Function:
     found, P_found = correct(ahead, F @ P @ F.T + Q, R, s.x, noise[4], follow=textbook)
 
     going = ca.logic_and(learning, running > 0.5)
-    told_slip = alpha_now = slip_of(s.speed, s.x, s.u)
+    lagged = alpha_now = slip_of(s.speed, s.x, s.u)
     afresh = ca.vertcat(s.x, alpha_now[:lags], theta)
     at_once = ca.jacobian(afresh, ca.vertcat(s.x, theta))  # a start is taken for a steady slide
     unsteady = ca.vertcat(ca.SX(2, 1), ca.repmat(noise[0] / s.speed, lags, 1), ca.SX(unknowns, 1))
@@ -123,8 +123,8 @@ def _build_step(textbook: bool) -> ca.Function:
     last, carry = lag_symbols(), _carry(textbook)
     lag_next: tuple[Any, ...] = ()
     if not textbook:
-        told_slip = lagged_slip(last, alpha_now, s.speed * dt, sigma)
-        lag_next = (told_slip, alpha_now, ca.if_else(s.moving, 1, 0))
+        lagged = lagged_slip(last, alpha_now, s.speed * dt, sigma)
+        lag_next = (lagged, alpha_now, ca.if_else(s.moving, 1, 0))
     return ca.Function(
         "magic_formula_ekf",
         [
@@ -138,7 +138,7 @@ def _build_step(textbook: bool) -> ca.Function:
             ca.vertcat(s.u, s.v_x),
             ca.if_else(learning, 1, 0),
             *lag_next,
-            ca.if_else(s.moving, force_of(told_slip, s.u), 0),
+            ca.if_else(s.moving, force_of(lagged, s.u), 0),
         ],
         [*carry, *OVER, *_CONSTANTS, "vehicle", "sampling"],
         [*(f"{port}_next" for port in carry), "axle_force"],

@@ -112,8 +112,8 @@ def build_step(name: str) -> ca.Function:
     afresh = ca.vertcat(s.x, alpha_now, estimate[4:])
     unsure = ca.vertcat(given.v_y_noise, given.r_noise, *[given.v_y_noise / s.speed] * 2)
     P_next = ca.if_else(going, found.P, ca.diagcat(ca.diag(unsure**2), P[4:, 4:]))
-    told_slip = lagged_slip(last, alpha_now, s.speed * dt, sigma)
-    axle_force = force(estimate, told_slip, s.u)
+    lagged = lagged_slip(last, alpha_now, s.speed * dt, sigma)
+    axle_force = force(estimate, lagged, s.u)
     return ca.Function(
         name,
         [estimate, P, before, running, *last, *ports.ports, numbers],
@@ -122,7 +122,7 @@ def build_step(name: str) -> ca.Function:
             ca.densify(P_next),
             ca.vertcat(s.u, s.v_x),
             ca.if_else(learning, 1, 0),
-            *(told_slip, alpha_now, ca.if_else(s.moving, 1, 0)),
+            *(lagged, alpha_now, ca.if_else(s.moving, 1, 0)),
             ca.if_else(s.moving, axle_force, 0),
         ],
         [*CARRY, *LAG_PORTS, *WITH_A_Y, "vehicle", "sampling", "numbers"],

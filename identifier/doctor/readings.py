@@ -189,12 +189,12 @@ def read(motion: Motion, vehicle: Vehicle, possible: Callable[[tuple[Change, ...
     """
     changes = CHANGES + (_ON_ACCELEROMETER if motion.a_y is not None else ())
     changes = tuple(one for one in changes if one.shows_in(motion))
-    as_told = _Explanation(
+    as_declared = _Explanation(
         changes=(), reading=Reading(), left=unexplained(motion, vehicle, Reading())
     )
-    tried, best = [as_told], as_told
+    tried, best = [as_declared], as_declared
     equations = 2 if motion.a_y is None else 3
-    beam = [as_told]
+    beam = [as_declared]
     for _ in range(CHOSEN.most_changes):
         longer = [new for one in beam for new in _longer(one, changes, motion, vehicle)]
         tried += longer

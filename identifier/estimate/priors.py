@@ -70,9 +70,6 @@ ALIKE = {  # standard deviation of front less rear
     "compliance": (0.003, "L"),
     "sway_share": (0.1, ""),
 }
-# sd of ln of a yaw inertia that nobody measured, of a car and of a model car: m l_f l_r is within a
-# tenth of those of cars; chosen on 16 random cars whose inertia was left out
-OF_ESTIMATED_INERTIA = (0.1, 0.3)
 SENSORS = tuple(name for name in OF_CAR if name.startswith(("v_y", "steering")))
 TYPED = ("steering_gain",)
 
@@ -127,7 +124,8 @@ class Priors:
             k = INDEX[name]
             mean[k], sd[k] = min(max(value, low[k]), high[k]), doubt
         if vehicle.inertia_is_estimate:
-            sd[INDEX["ln_inertia"]] = OF_ESTIMATED_INERTIA[vehicle.wheelbase < FULL_SIZE]
+            small = vehicle.wheelbase < FULL_SIZE
+            sd[INDEX["ln_inertia"]] = CHOSEN.left_out_small if small else CHOSEN.left_out
         for name, value in wide.items():
             sd[INDEX[name]] = value
         information = np.zeros((p, p))

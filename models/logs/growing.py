@@ -19,7 +19,7 @@ LONGEST_IN_MEMORY = 1 << 20  # numbers: 8 MB of a column of float64
 
 
 @contextmanager
-def _told(file: IO[bytes] | None) -> Iterator[None]:
+def _named_errors(file: IO[bytes] | None) -> Iterator[None]:
     """Say of a disk that is full that it is, whatever log is being read; the file goes."""
     try:
         yield
@@ -54,9 +54,9 @@ class Growing:
         if self._file is None and self._size <= LONGEST_IN_MEMORY:
             return
         if self._file is None:
-            with _told(None):
+            with _named_errors(None):
                 self._file = tempfile.TemporaryFile()  # noqa: SIM115 (the map of it outlives us)
-        with _told(self._file):
+        with _named_errors(self._file):
             for one in self._parts:
                 self._file.write(one.data)
         self._parts.clear()
@@ -68,7 +68,7 @@ class Growing:
             self._parts.clear()
             whole.setflags(write=False)
             return whole
-        with _told(self._file), self._file as file:
+        with _named_errors(self._file), self._file as file:
             file.flush()
             # A plain array on the map, which keeps the file until the last view of it is gone.
             return on_disk(file, self._dtype, (self._size,), "r")

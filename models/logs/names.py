@@ -42,7 +42,7 @@ from models.logs.units import (
 
 _HAND = "steering wheel"  # an angle that wants a ratio
 # Units that are met where none is given, "" SI.
-_UNTOLD = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
+_ASSUMED = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
 _OBLIQUE = "its box is mounted obliquely: no axis of it is one of the car"
 
 
@@ -632,7 +632,7 @@ def _beside_turning(
         if (likely := [one for one in candidates[name] if one.confidence > CHOSEN.still])
     }
     mended = dict(candidates)
-    for name in _UNTOLD:
+    for name in _ASSUMED:
         mended[name] = [
             guess
             if _is_given(guess) or guess.confidence == 0.0
@@ -670,7 +670,7 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
         }
         return abs(math.log(in_si["a_y"] / (in_si["v_x"] * in_si["r"])))
 
-    choices = [(one.unit,) if _is_given(one) else _UNTOLD[key] for key, one in there.items()]
+    choices = [(one.unit,) if _is_given(one) else _ASSUMED[key] for key, one in there.items()]
     nearest = min(itertools.product(*choices), key=far)
     unit = nearest[list(there).index(name)]
     return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess

@@ -125,7 +125,7 @@ class Recorder:
         self._plan_every = plan_every
         self._cars: list[CarState] = []
         self._measured: list[Measured] = []
-        self._told: list[LateralEstimate] = []
+        self._estimates: list[LateralEstimate] = []
         self._others: list[tuple[float, ...]] = []
         self._plans: list[Plan] = []
         self._notes: list[tuple[float, str]] = []
@@ -165,7 +165,7 @@ class Recorder:
         v_ref : wanted speed [m/s].
         """
         if given is not None:
-            self._told.append(given)
+            self._estimates.append(given)
         self._cars.append(state)
         self._measured.append(measured)
         e_psi = here.heading_error(state.psi)
@@ -190,8 +190,8 @@ class Recorder:
         others = dict(zip(_OTHERS, np.array(self._others).T, strict=True))
         measured = dict(zip(Measured._fields, np.array(self._measured).T, strict=True))
         given: dict[str, Array] = {}
-        if self._told:
-            given = dict(zip(LateralEstimate._fields, np.array(self._told).T, strict=True))
+        if self._estimates:
+            given = dict(zip(LateralEstimate._fields, np.array(self._estimates).T, strict=True))
             del measured["v_y"]
         return Drive(
             name=name,

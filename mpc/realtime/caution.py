@@ -32,7 +32,7 @@ def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> N
     params["caution"] = caution
     params["grips"] = GRIPS if can else 1.0
     params["surprise"] = CHOSEN.surprise
-    params["doubt"], params["doubt_step"] = tire.doubt_or_told(), TIRES_CHOSEN.doubt_step
+    params["doubt"], params["doubt_step"] = tire.doubt_or_declared(), TIRES_CHOSEN.doubt_step
     params["force_error"] = CHOSEN.force_error * np.array(tire.vehicle.axle_loads)
     params["stiffness"] = np.maximum(curve_slopes(tire)[0, 0], 0.1 * params["force_error"][0])
     params["prior"] = np.where(GRIPS < 1.0, CHOSEN.surprise, 0.0) if can else 0.0

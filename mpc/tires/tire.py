@@ -127,7 +127,7 @@ class PredictionTire(NamedTuple):
         """The numbers of `Car`, (4,)."""
         return np.array(self.vehicle.bicycle[:4])
 
-    def doubt_or_told(self) -> Array:
+    def doubt_or_declared(self) -> Array:
         """Return the doubt (2, 26) [N]; where none is given, that of a tire learnt well."""
         if self.doubt is not None:
             return self.doubt

@@ -206,7 +206,7 @@ class _Used:
     """The rows of a store that --where takes and that can be used, counted as they are read."""
 
     def __init__(self, options: argparse.Namespace) -> None:
-        self.options, self.store, self.told = options, Store(options.store), False
+        self.options, self.store, self.warned = options, Store(options.store), False
         self.by = [one for one in options.by.split(",") if one]
         self.store.require()
 
@@ -222,9 +222,9 @@ class _Used:
                 f"{self.options.store}: none of {of} logs can be used"
                 + ("" if self.options.all else "; --all includes rejected ones")
             )
-        if not self.told:
+        if not self.warned:
             say(f"{used} of {of} logs")
-        self.told = True
+        self.warned = True
 
     @property
     def groups(self) -> list[Merged]:

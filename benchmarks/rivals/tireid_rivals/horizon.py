@@ -117,7 +117,7 @@ def build_stage() -> ca.Function:
         [z, P, at_before, at, before, now, s.vehicle, s.sampling, numbers],
         [ca.densify(one) for one in stage],
         ["z", "P", "at_before", "at", "before", "now", "vehicle", "sampling", "numbers"],
-        [f"{name}_told" for name in Stage._fields],
+        [f"{name}_declared" for name in Stage._fields],
         {"cse": True},
     )
 
@@ -182,14 +182,14 @@ def _build_beginning() -> ca.Function:
     )
 
 
-def _build_told() -> ca.Function:
+def _build_declared() -> ca.Function:
     """Return axle_force and v_y of the next estimate, of the θ carried into the sample."""
     s, numbers = given_ports().sample, ca.SX.sym("numbers", len(Numbers._fields))
     following, estimate = ca.SX.sym("following", Z), ca.SX.sym("estimate", Z)
     known, at = Numbers(*ca.vertsplit(numbers)).friction, ca.vertcat(following[:2], estimate[2:])
     force = axle_force(TIRE, s.parameters, known, at, s.speed, s.u)
     return ca.Function(
-        "horizon_told",
+        "horizon_declared",
         [following, estimate, s.u, s.v_x, s.vehicle, s.sampling, numbers],
         [ca.if_else(s.moving, force, 0), ca.if_else(s.moving, following[0], 0)],
     )
@@ -247,7 +247,7 @@ def build_step(samples: int, iterations: int) -> ca.Function:
         "window": ca.horzcat(*columns),
         "running": ca.logic_and(begun.fast, sane),
     }
-    output = _build_told()(estimate, port["estimate"], port["u"], port["v_x"], *known)
+    output = _build_declared()(estimate, port["estimate"], port["u"], port["v_x"], *known)
     return ca.Function(
         f"horizon_{samples}_{iterations}",
         list(port.values()),

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 
 from identifier.axle import AxleIdentifier
 from identifier.axle import learning as steps
-from identifier.axle.along import adjoint, begin_error, certified_along, lessons
+from identifier.axle.along import adjoint, begin_error, certified_along, taught_by
 from identifier.axle.certificate import (
     FrictionDrop,
     _widest_range,
@@ -114,7 +114,7 @@ def test_a_covariance_at_its_floor_is_learnt_with_but_does_not_shrink(design, ca
 def test_the_recursion_of_errors_is_that_of_the_step(run, car, rng):
     """For any truth, the learnt force errs by what the adjoints say: to rounding."""
     design = run.design
-    taught = lessons(design, run)
+    taught = taught_by(design, run)
     slips = np.tile([0.01, 0.04, 0.12], (2, 1))
     reach = adjoint(taught, slips, design.ladder)
     assert np.abs(taught.moved[:, :, :4]).max() < 1e-12  # the compliance alone rests at a bound
@@ -130,7 +130,7 @@ def test_the_recursion_of_errors_is_that_of_the_step(run, car, rng):
 
 def test_the_worst_errors_of_y_reach_the_bound_and_larger_ones_pass_it(run):
     design, (i, m) = run.design, (1, 2)
-    taught = lessons(design, run)
+    taught = taught_by(design, run)
     reach = adjoint(taught, np.tile([0.01, 0.04, 0.12], (2, 1)), design.ladder)
     g, begin = reach.g[:, i, m], reach.begin[i, m]
     by_begin = begin_error(taught, reach)[i, m]
@@ -160,7 +160,7 @@ def test_a_drive_without_slip_proves_nothing_of_the_force(design, run, car, driv
 
 def test_the_beginning_is_the_prior_s_where_nothing_was_taught(design, car, drive):
     standing = identify(drive(n=300, speed=2.0), car, design)  # below the speed of learning
-    taught = lessons(design, standing)
+    taught = taught_by(design, standing)
     reach = adjoint(taught, np.full((2, 1), 0.05), design.ladder)
     P = unpacked(design.setup(car).carry["UD"], 7)[:, :4, :4]
     t = np.tanh(0.05 / A)
