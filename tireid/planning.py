@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from identifier.axle import AxleModel
+from identifier.axle.model import begun
 from identifier.plan import Plan, PlanError, PlausibleTires, Rehearsal, Space, make_plan
 from identifier.tire_model import TireModel
 from models.plant import Plant, PlantError
@@ -115,7 +116,7 @@ def rehearsals(found: Plan) -> tuple[Rehearsal, ...]:
 def _of_car(model: TireModel, vehicle: Vehicle) -> AxleModel:
     """Return the model in hidden units, judged."""
     kind = model.kind
-    model = model.in_units()
+    model = begun(model)
     if not isinstance(model, AxleModel):
         raise ValueError(
             "a plan needs a model with a covariance, of a fit or the axle identifier: this one "
