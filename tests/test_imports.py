@@ -73,14 +73,13 @@ def c_files_in_a_circle(texts):
     """C files that call one another's functions in a circle, if there is one."""
     code = {name: re.sub(r"/\*.*?\*/", "", text, flags=re.S) for name, text in texts.items()}
     opened = re.compile(r"^(?!static)[\w *]+?(\w+)\([^;{]*\)\s*\{", re.M)
-    homes = {called: name for name, text in code.items() for called in opened.findall(text)}
-    homes.pop("main", None)  # whatever starts a program calls it
-    calls = {
-        name: {homes[one] for one in re.findall(r"(\w+)\(", text) if one in homes} - {name}
-        for name, text in code.items()
+    own = {name: {*opened.findall(text)} - {"main"} for name, text in code.items()}
+    calls = {name: {*re.findall(r"(\w+)\(", text)} - own[name] for name, text in code.items()}
+    homes = {
+        name: [other for other in code if called & own[other]] for name, called in calls.items()
     }
     try:
-        TopologicalSorter(calls).prepare()
+        TopologicalSorter(homes).prepare()
     except CycleError as error:
         return set(error.args[1])
     return set()
