@@ -58,7 +58,9 @@ class CurveAxles(TireStructure):
     def slip(self, at: Point) -> Pair:
         """Return the slip angles, errors of the sensors taken off [rad]."""
         v_y = at.v_y - at.w[2] - at.w[3] * at.v_x
-        return TireStructure.slip(self, at._replace(v_y=v_y, delta=_steered(at)))
+        delta = (1 + at.w[1]) * at.delta
+        front, rear = TireStructure.slip(self, at._replace(v_y=v_y, delta=delta))
+        return front + at.w[0], rear
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body."""
@@ -66,9 +68,13 @@ class CurveAxles(TireStructure):
             F_z * load_ratio(down, at.v_x) * self.curve(numbers, x)[0]
             for (F_z, down, _, _, numbers), x in zip(self._axles(at.w), slip, strict=True)
         )
-        delta = _steered(at)
+        delta = self.turned(at)
         cos_delta = 1 - delta**2 / 2 + delta**4 / 24  # as the frozen models have it
         return front * cos_delta, rear
+
+    def turned(self, at: Point) -> Any:
+        """Return the angle of the front wheels, across which they push [rad]."""
+        return (1 + at.w[1]) * at.delta + at.w[0]
 
     def lag_length(self, slip: Pair, at: Point) -> Pair:
         """Return the relaxation lengths [m], which shorten with the slope of the curve."""
@@ -96,11 +102,6 @@ class CurveAxles(TireStructure):
         return [(axle[0], axle[1], axle[2], axle[3], axle[_BESIDE:]) for axle in axles]
 
 
-def _steered(at: Point) -> Any:
-    """Return δ of the front wheels without the sensor's errors [rad]."""
-    return (1 + at.w[1]) * at.delta + at.w[0]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LadderAxles(CurveAxles):
     """φ = Σ_j w_j tanh(x/α_j); numbers: 1/α_j (n,), then w_j (n,)."""
@@ -116,6 +117,9 @@ class LadderAxles(CurveAxles):
         T, slopes = ca.tanh(per_scale * slip), W * per_scale
         least = 0.02 * ca.fmax(ca.sum1(slopes), 0.1)  # as when it was learnt
         return ca.dot(W, T), ca.fmax(ca.dot(slopes, 1 - T * T), least)
+
+    def turned(self, at: Point) -> Any:
+        return (1 + at.w[1]) * at.delta  # as the frozen model: its zero is one of slip alone
 
     def on_friction(self, curves: Array, ratio: float) -> None:
         curves[:, : self.units] /= ratio
