@@ -18,7 +18,7 @@ from mpc.tires.tire import TireStructure
 def edited(tire, axle, change):
     """The tire with other w_j of one axle."""
     weights, n = tire.weights.copy(), tire.structure.units
-    force = weights[3 + n :].reshape(2, -1)[axle, 2:]
+    force = weights[4:].reshape(2, -1)[axle, -n:]
     force[:] = change(force)
     return tire._replace(weights=weights)
 

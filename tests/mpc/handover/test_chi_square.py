@@ -11,8 +11,8 @@ from tests.mpc.handover.conftest import samples_of
 def forces_by_hand(tire, samples, dt):
     """Ladders with lag, in plain numpy."""
     car, n = tire.vehicle, tire.structure.units
-    (delta_0, bias, sigma_0), per_scale = tire.weights[:3], tire.weights[3 : 3 + n]
-    axles = tire.weights[3 + n :].reshape(2, -1)
+    delta_0, _, bias, _ = tire.weights[:4]
+    axles = tire.weights[4:].reshape(2, -1)
     lagged, told = None, []
     for v_x, v_y, r, delta in samples:
         alpha = np.array(
@@ -24,14 +24,15 @@ def forces_by_hand(tire, samples, dt):
         if lagged is None:
             lagged = alpha
         else:
-            slope = [
-                np.sum(axle[2:] * per_scale / np.cosh(per_scale * x) ** 2)
-                for axle, x in zip(axles, lagged, strict=True)
-            ]
-            sigma = np.maximum(axles[:, 0] * slope + sigma_0, axles[:, 1])
-            lagged = alpha + np.exp(-v_x * dt / sigma) * (lagged - alpha)
+            sigma = []
+            for axle, x in zip(axles, lagged, strict=True):
+                per_scale, W = axle[4 : 4 + n], axle[-n:]
+                slope = np.sum(W * per_scale / np.cosh(per_scale * x) ** 2)
+                sigma.append(axle[2] * max(slope, 0.02 * np.sum(W * per_scale)) + axle[3])
+            lagged = alpha + np.exp(-v_x * dt / np.array(sigma)) * (lagged - alpha)
         force = [
-            np.sum(axle[2:] * np.tanh(per_scale * x)) for axle, x in zip(axles, lagged, strict=True)
+            axle[0] * np.sum(axle[-n:] * np.tanh(axle[4 : 4 + n] * x))
+            for axle, x in zip(axles, lagged, strict=True)
         ]
         told.append([force[0] * np.cos(delta), force[1]])
     return np.array(told)
@@ -67,7 +68,7 @@ def test_errors_are_those_of_the_forces(car, tire):
     """The slope over 13 samples is the mean over 12 steps, weighted by a parabola."""
     samples, forces = bicycle_drive(car)
     weights = tire.weights.copy()
-    weights[3 + 4 :].reshape(2, -1)[1, 2:] *= 0.8  # a fifth of the rear force is missing
+    weights[4:].reshape(2, -1)[1, 0] *= 0.8  # a fifth of the rear force is missing
     found = Judge(0.01).chi_square(tire._replace(weights=weights), samples)
     told = axle_forces(tire, weights[None], samples, 0.01)[0]
     missing = (forces - told) / np.array(car.axle_loads)

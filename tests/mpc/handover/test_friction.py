@@ -23,7 +23,7 @@ def steady_force(tire, alpha, v_x=20.0):
 
 def without_offsets(tire):
     weights = tire.weights.copy()
-    weights[:2] = 0.0
+    weights[:4] = 0.0
     return tire._replace(weights=weights)
 
 

@@ -35,8 +35,8 @@ class Formula:
 
 def grip(weights, tire):
     """Saturated force of both axles of a ladder [static axle loads]."""
-    n = tire.structure.units
-    return weights[3 + n :].reshape(2, -1)[:, 2:].sum()
+    axles = weights[4:].reshape(2, -1)
+    return axles[:, 0] @ axles[:, -tire.structure.units :].sum(axis=1)
 
 
 def seen(seconds=4.0):

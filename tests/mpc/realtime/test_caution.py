@@ -77,7 +77,7 @@ def test_wheels_that_are_off_what_is_commanded_are_found_and_not_taken_for_ice(l
 )
 def test_what_v_y_and_yaw_rate_are_off_is_found_and_the_car_comes_back(lagging, bias, found):
     weights = lagging.weights.copy()
-    weights[1] += bias[0]  # learnt by the same sensors
+    weights[2] += bias[0]  # learnt by the same sensors
     deviations = []
     for caution in (0.0, 1.0):
         tracker, off = make(lagging._replace(weights=weights), caution), []
