@@ -39,8 +39,6 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "bands": [],
     "plan": [],
     "fleet": [],
-    "guaranteed": [],
-    "guaranteed_faster": [],
     "road_friction": [],
     "live": [],
     "braking": [],

@@ -22,7 +22,6 @@ from models.recordings import Recording
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from identifier.axle.guarantee import HalfSpaces
     from identifier.inertial.beliefs import Body
 
 
@@ -96,12 +95,11 @@ class Accelerometer(NamedTuple):
 class Limits(NamedTuple):
     """Where the estimates of a method stay, whatever is measured.
 
-    boxes : least and largest of each number, by name and unit.   curves : weights that the curve of
-    a tire can have.   active : of carried values the estimates at active bounds.
+    boxes : least and largest of each number, by name and unit.   active : of carried values the
+    estimates at active bounds.
     """
 
     boxes: Mapping[str, Any]
-    curves: "HalfSpaces"
     active: Callable[[Mapping[str, Array]], tuple[Reached, ...]] = lambda _: ()
 
 

@@ -31,7 +31,6 @@ from models.schema import Table, read_json
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
-    from identifier.axle.guarantee import Guarantee
     from identifier.estimate.latent import LateralVelocity
 
 # As summaries and verdicts name what is learnt of an axle.
@@ -349,11 +348,6 @@ class TireModel(ABC):
     @property
     def band(self) -> Band[Any] | None:
         """How unsure the forces are; None where the model does not know."""
-        return None
-
-    @property
-    def guarantee(self) -> "Guarantee | None":
-        """Between which forces the true ones lie under a bound; None where nobody asked for it."""
         return None
 
     def estimates(self) -> tuple[Estimate, ...]:

@@ -176,7 +176,7 @@ def test_the_interface_is_what_tireid_names_with_its_bases():
     named = {name for names in interface().values() for name in names}
     assert named > {"Vehicle", "AxleIdentifier", "Method", "TireModel", "read_recording"}
     assert "Path" in named  # of `tireid.paths`
-    assert named > {"Band", "Guarantee", "Drives"}  # of `tire.band` and so on
+    assert named > {"Band", "Drives"}  # of `tire.band` and so on
     assert not named & {"Tracker", "Scan", "gate"}
 
 

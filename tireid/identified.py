@@ -372,9 +372,7 @@ def _curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[st
     if known is not None:
         inside = (np.abs(slip)[:, None] <= known).astype(np.float64)
         columns |= {"front_known": inside[:, 0], "rear_known": inside[:, 1]}
-    band = None if model.band is None else model.band.at(slip)
-    sure = None if model.guarantee is None else model.guarantee.at(slip)
-    for sides, found in (("low", "high"), band), (("least", "most"), sure):
-        for side, bound in zip(sides, found or (), strict=found is not None):
+    if model.band is not None:
+        for side, bound in zip(("low", "high"), model.band.at(slip), strict=True):
             columns |= axle_columns(f"Fy{{}}_{side}_N", bound)
     return columns

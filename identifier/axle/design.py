@@ -21,7 +21,6 @@ from identifier.axle.chosen import CHOSEN
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.gate import Plausibility
-from identifier.axle.guarantee import prior_box
 from identifier.axle.learning import (
     BoundNumbers,
     Bounds,
@@ -153,7 +152,7 @@ class AxleIdentifier(Method):
             "v_y_offset_m_s": [-b.v_y, b.v_y],
             "covariance_over_prior": [0.0, self.regression.widest],
         }
-        return Limits(boxes, prior_box(b, self.ladder), self._at_bounds)
+        return Limits(boxes, self._at_bounds)
 
     @property
     def ports(self) -> tuple[Port, ...]:

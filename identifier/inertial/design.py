@@ -16,7 +16,6 @@ from identifier.axle.covariance import packed, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.design import AxleIdentifier, curve_boxes, curve_tracks, resumed_units
 from identifier.axle.gate import Plausibility
-from identifier.axle.guarantee import prior_box
 from identifier.axle.learning import Bounds, inward, rising_shares
 from identifier.axle.model import EXACT, AxleModel
 from identifier.axle.prior import Prior
@@ -175,7 +174,7 @@ class InertialIdentifier(Method):
             "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
             "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
         }
-        return Limits(boxes, prior_box(self.bounds, self.ladder))
+        return Limits(boxes)
 
     @property
     def ports(self) -> tuple[Port, ...]:

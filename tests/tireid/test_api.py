@@ -131,10 +131,6 @@ def test_the_tire_of_a_run_is_what_it_freezes_to_with_a_calibrated_band(log, car
     assert not frozen.band.calibrated and "run.tire calibrates it" in frozen.summary()
     checked = {name: tire.to_dict()[name] for name in ("band", "force_missed")}
     assert tire.to_dict() == frozen.to_dict() | checked
-    surely = run.guarantee(0.3)
-    slip = np.array([0.02])
-    assert surely.guarantee is not None
-    assert np.array_equal(surely.band.half(slip), tire.band.half(slip))
 
 
 def test_a_run_says_once_whether_it_is_good(log, car, monkeypatch):

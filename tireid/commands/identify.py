@@ -1,13 +1,11 @@
 """`tireid identify LOG --vehicle FILE --out DIR`: learn the tires of a recording, freeze them."""
 
 import argparse
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from identifier.axle.guarantee import ForceBound
 from identifier.doctor import diagnose
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
@@ -15,7 +13,7 @@ from identifier.paper.network import Weights
 from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import History, check_recording
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, calibrated, guaranteed, judge, judge_prediction
+from identifier.verdict import Verdict, calibrated, judge, judge_prediction
 from models.recordings import Recording, Repair, check_against_vehicle, check_physics, joined
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
@@ -27,7 +25,7 @@ from tireid.identified import Results, file_name
 from tireid.learning import identify, with_v_y
 from tireid.output import output_folder, require_curves, require_free, write_json
 from tireid.progress import Progress, say, tell
-from tireid.reports.identify import guaranteed_text, side_slip_text, write_identify_report
+from tireid.reports.identify import side_slip_text, write_identify_report
 from tireid.verdicts import verdict_text, verdicts_text
 
 _LEARNING, _JUDGING, _DRAWING = "learning", "replays and verdict", "curves and figures"
@@ -56,11 +54,6 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--freeze", type=float, metavar="T", help=text, **several)
     text = "validation drives to predict, each with a verdict"
     parser.add_argument("--replay", default=[], metavar="LOG[:RUN]", help=text, **several)
-    text = (
-        "guaranteed forces, if no force differs from the best curve by more than E static axle "
-        "loads; a second number: lateness [s] (estimated)"
-    )
-    parser.add_argument("--bound", nargs="*", type=float, metavar="E", help=text)
     shared.add_log_reading(parser)
     add_repair(parser, "identify the repaired log, and write the repair to")
     shared.add_weights(parser, "begin with this model")
@@ -80,11 +73,6 @@ def run(options: argparse.Namespace) -> int:
     beside = options.network is not None  # of which something learns online
     if beside and options.freeze is not None:
         raise ValueError("--freeze is for identified models: the network of --network is frozen")
-    if beside and options.bound is not None:
-        raise ValueError(
-            "--bound is for identified models: a network has no set of possible weights"
-        )
-    bound = _force_bound(options.bound or ())
     law, design = shared.chosen_method(options, vehicle, seed, online=beside)
     start = shared.stored_model(options.weights)
     if options.run_name is not None and len(options.logs) > 1:
@@ -151,8 +139,6 @@ def run(options: argparse.Namespace) -> int:
             verdict = with_doctor(judge(learnt, last), diagnosis, repair)
             asked = _asked(learnt.freeze(last), others)
             tire = calibrated(learnt, last, verdict)
-            if options.bound is not None:
-                tire = guaranteed(learnt, bound, last, tire)
             found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
             closing = _closing_line(learnt, last, vehicle, resumed=start is not None)
         figures = found.write(folder, curves=options.curves, progress=progress.begin(_DRAWING))
@@ -161,7 +147,6 @@ def run(options: argparse.Namespace) -> int:
         given = (
             found.table(),
             closing,
-            "" if options.bound is None else guaranteed_text(found.model),
             doctor_text(diagnosis, repair, options.repair),
             verdicts_text(asked, "replayed on"),
             verdict_text(verdict),
@@ -172,21 +157,6 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join(part for part in given if part))
     say(f"wrote {options.out}/")
     return max(shared.exit_code(one, options) for one in (verdict, *asked.values()))
-
-
-def _force_bound(numbers: Sequence[float]) -> ForceBound | None:
-    """Return the bound of --bound: error [static axle loads] and lateness [s]; None estimates it.
-
-    numbers : the two, or the first of them, or none.
-    """
-    if len(numbers) > 2:
-        raise ValueError(
-            f"--bound takes an error and a lateness, it was given {len(numbers)} numbers"
-        )
-    if not numbers:
-        return None
-    error, late = (*numbers, 0.0)[:2]
-    return ForceBound(error=(error, error), lateness=(late, late))
 
 
 def _asked(model: TireModel, others: list[Recording]) -> dict[str, Verdict]:

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks
 from codegen.escape import visible
@@ -17,7 +16,7 @@ from identifier.frozen import vehicle_numbers
 from identifier.prediction import Prediction
 from identifier.reproducibility import beyond_known
 from identifier.tire_model import TireModel
-from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
+from identifier.verdict import RoadFriction, Verdict, within_band
 from identifier.verdict.verdict import PERCENT
 from models.files import digest
 from tireid import __version__, output
@@ -36,7 +35,6 @@ from tireid.reports.identify import (
     asked_warnings,
     band_sentence,
     curve_drawing,
-    guaranteed_sentence,
 )
 from tireid.verdicts import (
     known_headline,
@@ -140,14 +138,12 @@ class _Facts(NamedTuple):
     half : width of the band of its forces (n, 2) [N].
     beyond : share of samples whose slip is beyond the known.   inside : of windows whose force that
         the motion shows lies in the band.   held : of samples whose true force does, (2,) each.
-    against : times [s] of windows, and whether they contradict what is guaranteed (n, 2).
     """
 
     half: Array | None
     beyond: tuple[float, float] | None
     inside: Array | None
     held: Array | None
-    against: tuple[Array, NDArray[np.bool_]] | None
 
     @classmethod
     def of(cls, prediction: Prediction) -> "_Facts":
@@ -163,7 +159,6 @@ class _Facts(NamedTuple):
             beyond_known(model, recording),
             within_band(model, recording),
             held,
-            contradictions(model, recording),
         )
 
 
@@ -186,7 +181,7 @@ def summary(prediction: Prediction, verdict: Verdict, facts: _Facts) -> dict[str
     """Return what summary.json holds; null stands for what cannot be known."""
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     friction, model = verdict.friction, prediction.model
-    inside, held, against, known = facts.inside, facts.held, facts.against, model.known_slip
+    inside, held, known = facts.inside, facts.held, model.known_slip
     shares = (None, None) if motion is None else motion.explained
     return {
         "verdict": verdict.to_dict(),
@@ -208,7 +203,6 @@ def summary(prediction: Prediction, verdict: Verdict, facts: _Facts) -> dict[str
         "beyond_known_slip": facts.beyond,
         "windows_within_band": None if inside is None else inside.tolist(),
         "truth_within_band": None if held is None else held.tolist(),
-        "moments_against_guarantee": None if against is None else against[1].mean(axis=0).tolist(),
         "friction": None
         if friction is None
         else {"unchanged": friction.unchanged, "roads": [one._asdict() for one in friction.roads]},
@@ -249,8 +243,6 @@ def _prediction_text(prediction: Prediction, friction: RoadFriction | None, fact
             f"{100.0 * held[0]:.0f} / {100.0 * held[1]:.0f} % of the true forces lie in it, the "
             "noise of the sensors in the band (front / rear)"
         )
-    if facts.against is not None:
-        lines.append(_contradiction_line(*facts.against))
     if model.band is not None and not model.band.calibrated:
         lines.append(f"friction: not observable, the band is {UNCALIBRATED}")
     if friction is not None and not friction.roads:
@@ -260,16 +252,6 @@ def _prediction_text(prediction: Prediction, friction: RoadFriction | None, fact
             else "friction: not observable, slip is too small"
         )
     return "\n".join(lines)
-
-
-def _contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
-    if not broken.any():
-        return "no moment of the drive contradicts the guaranteed forces"
-    front, rear = 100.0 * broken.mean(axis=0)
-    return (
-        f"the bound of the guaranteed forces is violated: {front:.2g} / {rear:.2g} % of the "
-        f"moments of 0.3 s contradict it (front / rear), first at {t[broken.any(axis=1)][0]:g} s"
-    )
 
 
 def write_predict_report(
@@ -299,9 +281,8 @@ def write_predict_report(
         for name, caption in captions.items()
         if name in figures
     ]
-    tires = [
-        page.Paragraph(text=text) for text in (band_sentence(model), guaranteed_sentence(model))
-    ]
+    if band := band_sentence(model):
+        found.append(page.Paragraph(text=band))
     report = page.Report(
         title=f"Tires of {source.name} on {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, not used for "
@@ -314,9 +295,7 @@ def write_predict_report(
         warnings=[*verdict_warnings(verdict), *notes],
         sections=[
             verdict_section(verdict),
-            page.Section(
-                heading="What it predicts", blocks=[*found, *(one for one in tires if one.text)]
-            ),
+            page.Section(heading="What it predicts", blocks=found),
             origin(
                 command,
                 model.vehicle,

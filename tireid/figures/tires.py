@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 _UNKNOWN = "slip not known"
 _BAND = "band of 90 %"
-_GUARANTEED = "guaranteed, steady"
 _CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
     "linestyle": "",
     "marker": ".",
@@ -106,11 +105,8 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
         edge: Mapping[str, Any] = {"edgecolor": style.BLUE, "linewidth": 0.4, "zorder": 1.5}
         low, high = (force[:, axle] / newtons for force in model.band.at(slip))
         axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=_BAND, **edge)
-    look: Mapping[str, Any] = {"color": style.PURPLE, "linewidth": 0.9, "linestyle": "--"}
-    for side in () if model.guarantee is None else model.guarantee.at(slip):
-        axes.plot(degrees, side[:, axle] / newtons, label=_GUARANTEED, **look)
     label = f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}"
-    look = {"color": style.BLUE, "linewidth": 1.2, "zorder": 4, "label": label}
+    look: Mapping[str, Any] = {"color": style.BLUE, "linewidth": 1.2, "zorder": 4, "label": label}
     axes.plot(degrees, model.force(slip)[:, axle] / newtons, **look)
 
 

@@ -200,9 +200,8 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
         blocks.append(
             page.Table(caption=f"Parameters of the tires, {law}.", header=["", *AXLES], rows=facts)
         )
-    for declared in (band_sentence(model), guaranteed_sentence(model)):
-        if declared:
-            blocks.append(page.Paragraph(text=declared))
+    if band := band_sentence(model):
+        blocks.append(page.Paragraph(text=band))
     captions = {
         "side_slip": "Side slip as it was estimated.",
         "learnt": "Estimates over time.",
@@ -223,35 +222,6 @@ def band_sentence(model: TireModel) -> str:
         "The band is where nine of ten forces of other drives are to be expected: at the end of "
         f"the known slip ± {shares[0]:.1f} / {shares[1]:.1f} % of the force (front / rear). Its "
         f"width: {band.origin}. Where slip is not known it widens to the prior."
-    )
-
-
-def guaranteed_sentence(model: TireModel) -> str:
-    """Return which forces are guaranteed where slip is known, in words; empty where none are."""
-    known, guarantee = model.known_slip, model.guarantee
-    if known is None or guarantee is None:
-        return ""
-    low, high = (np.diag(side) / model.vehicle.axle_loads for side in guarantee.at(known))
-    ends = [f"{least:.2f} to {most:.2f}" for least, most in zip(low, high, strict=True)]
-    given = guarantee.possible
-    front, rear = given.bound.error
-    late_front, late_rear = (1e3 * tau for tau in given.bound.lateness)
-    fast_front, fast_rear = given.fastest
-    return (
-        f"Guaranteed at the end of the known slip: a force of {ends[0]} / {ends[1]} static axle "
-        "loads (front / rear), if no force of the drive or of another differs from the best curve "
-        f"by more than {front:.3f} / {rear:.3f} static axle loads, and {late_front:.0f} / "
-        f"{late_rear:.0f} ms times how fast it changes. Where slip is beyond that of the drive, "
-        f"or a force changes faster than there, by more than {fast_front:.1f} / {fast_rear:.1f} "
-        "static axle loads a second, the difference may be as much larger. That bound was "
-        f"{'given' if given.given else 'estimated from the drive'}."
-    )
-
-
-def guaranteed_text(model: TireModel) -> str:
-    return guaranteed_sentence(model) or (
-        "no guaranteed band: it takes --method axle, a lateral velocity that was measured, and "
-        "enough driving"
     )
 
 
