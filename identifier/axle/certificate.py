@@ -98,15 +98,13 @@ def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | Non
 
 
 class _CurveFacts(NamedTuple):
-    """What holds of force curves on slips from 0 to `until`, proven cell by cell.
+    """What holds of force curves from zero slip on, proven cell by cell.
     opposes_until, rises_until : slip up to which φ/x and φ' are positive for certain [rad].
-    flattest, steepest : secants φ/x lie between them [static axle loads/rad].
+    steepest : secants φ/x lie below it [static axle loads/rad].
     """
 
-    until: float
     opposes_until: float
     rises_until: float
-    flattest: float
     steepest: float
 
 
@@ -137,10 +135,8 @@ def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> _CurveFact
 
     rising, opposing = least(slopes) > 0.0, least(secants)
     return _CurveFacts(
-        until=until,
         opposes_until=_first(edges, opposing > 0.0),
         rises_until=_first(edges, rising),
-        flattest=float(opposing.min()),
         steepest=float((secants[:-1] @ up + secants[1:] @ down).max()),
     )
 
@@ -257,14 +253,12 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
             "slip up to which every possible curve pushes against its slip",
             facts.opposes_until,
             "rad",
-            "for the identified curve on its range: --along LOG",
         ),
         statement(
             "rises_until",
             "slip up to which every possible curve rises",
             facts.rises_until,
             "rad",
-            "for the identified curve on its range: --along LOG",
         ),
         statement("steepest", "steepest secant of any curve", facts.steepest, "static loads/rad"),
         Property(

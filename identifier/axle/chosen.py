@@ -6,14 +6,6 @@ from typing import NamedTuple
 class Chosen(NamedTuple):
     """Numbers of this package, by the file that reads them."""
 
-    # along
-    slips: int = 12  # over the range that is known, at which errors are bounded
-    # standard deviations of the prior, within which the truth lies before the drive
-    begin: float = 3.0
-    most_samples: int = 360_000  # samples that are looked at, those at the end
-    smallest: float = 1e-4  # rad: where nothing is known
-    along_tiny: float = 1e-30  # keeps a quotient finite
-    along_rounding: float = 1e-9  # of a bound
     # band
     # rad: ends of the ranges of slip, the last is open
     ranges: tuple[float, ...] = (0.01, 0.02, 0.04, 0.08, 0.16)

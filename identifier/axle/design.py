@@ -11,7 +11,6 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.axle.along import certified_along
 from identifier.axle.band import BandCalibration
 from identifier.axle.band_step import band_numbers, hinges
 from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeState, road_push
@@ -40,7 +39,6 @@ from identifier.method import (
     Accelerometer,
     Limits,
     Method,
-    Run,
     Track,
     resumed,
 )
@@ -130,10 +128,6 @@ class AxleIdentifier(Method):
             properties=certified(self, vehicle, driving or natural_driving(vehicle)),
             limits=self.limits.boxes,
         )
-
-    def certify_along(self, history: Run) -> Certificate:
-        """Return what is proven of the curves that a run of it taught."""
-        return Certificate(properties=certified_along(self, history))
 
     @property
     def accelerometer(self) -> Accelerometer:

@@ -119,14 +119,12 @@ def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[An
 class Learnt(NamedTuple):
     """Parameters (q entries) and factors of the covariance after an update.
     uncertainty : h'Ph before it.   weights : block of the weights of P before it, by place.
-    gains : Ph/(R + h'Ph), by which the innovation moves the parameters; 0 where nothing is learnt.
     """
 
     theta: list[Any]
     P: Factors
     uncertainty: Any
     weights: Symmetric
-    gains: list[Any]
 
 
 def update(
@@ -172,8 +170,7 @@ def update(
     gain = learns * innovation * a * share
     theta = [one + along * gain for one, along in zip(theta, v, strict=True)]
     after = scaled(updated(P, direction, c), moves * wide)
-    gains = [along * (learns * a * share) for along in v]
-    return Learnt(theta, after, a, spread.weights, gains)
+    return Learnt(theta, after, a, spread.weights)
 
 
 # Another road, and errors that nothing explains.

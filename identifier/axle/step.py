@@ -347,28 +347,6 @@ def _half_band(f: _Forward, s: SimpleNamespace) -> Any:
     return ca.if_else(f.gated.on, ca.vertcat(of_axle(0), of_axle(1)) * s.car.load, 0)
 
 
-TAUGHT = ("h", "e", "counts", "gains", "declared")
-
-
-def build_taught(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
-    """Return what a sample teaches, of the ports of the step: the recursion that errors obey.
-
-    Its outputs are the regressors h (2, q); e = y - h'w (2,), w before a change of the road;
-    which share of e counts, after clipping; the gains K (2, q), 0 where nothing is learnt; and the
-    declared standard deviation of y (2,), without what the means of squared errors add.
-    """
-    ports, s = symbols(**_learning_ports(len(steps) + 1, pressed=pressed))
-    f = _forward(s, steps)
-    h, y, _ = _regression(f, s)
-    y, _ = _without_bank(f, s, y)
-    sample, _ = _sample_of(f, s, h, y)
-    gains = ca.vertcat(*(ca.horzcat(*_learn(s, sample, i).gains) for i in (0, 1)))
-    e = sample.e + ca.sum2(sample.h[:, : s.W.shape[1]] * (sample.W - s.W))
-    counts = ca.if_else(e == 0, 1, sample.innovation / e)
-    outputs = dict(zip(TAUGHT, (sample.h, e, counts, gains, sample.sigma), strict=True))
-    return step_function(_name("axle_taught", steps, pressed=pressed), ports, {}, outputs)
-
-
 def _regression(f: _Forward, s: SimpleNamespace) -> tuple[Any, Any, dict[str, Any]]:
     """Return h (2, q) and y (2,), and the states behind them."""
     gated, numbers = f.gated, s.regression

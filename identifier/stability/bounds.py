@@ -14,14 +14,12 @@ That is continuous time from rest. `sampled_bound.py` carries it to the identifi
 the steering inside a sample makes that large.
 """
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
-from identifier.stability.lyapunov import lyapunov, peak_gain, require_hurwitz, sampled_peak_gain
+from identifier.stability.lyapunov import require_hurwitz, sampled_peak_gain
 from models.rules import require_positive
 
 
@@ -32,18 +30,20 @@ def small_gain(
     forgetting: float,
     eta_W: float,
     n_h: int,
-    dt: float | None = None,
+    dt: float,
     direction: Array | None = None,
 ) -> float:
     """θ = c_z γ η_W |A_d⁻¹| n_h/λ² [-]; below 1 the law is bounded.
     A_d : (2, 2) Hurwitz error dynamics [1/s].   forgetting : λ [1/s].
     eta_W : learning rate of (11).   n_h : hidden units; |s|² <= n_h.
-    dt : step of explicit Euler [s]; None for continuous time.
+    dt : step of explicit Euler [s].
     direction : (2, 2) D [s], None for -A_d⁻ᵀ.
     """
     require_positive(ValueError, forgetting=forgetting)
     c_z, _ = law
-    gain: float = c_z * _peak(A_d, dt) * eta_W * _size(A_d, direction) * n_h / forgetting**2
+    gain: float = (
+        c_z * sampled_peak_gain(A_d, dt) * eta_W * _size(A_d, direction) * n_h / forgetting**2
+    )
     return gain
 
 
@@ -69,21 +69,6 @@ def steady_capacity(
     c_z, c_xi = law
     weight: float = n_h * eta_W * _size(A_d, direction) * (c_z / forgetting + c_xi) / rho_W
     return weight
-
-
-def transient_peak(A_d: ArrayLike) -> float:
-    """A bound on max over t of |exp(A_d t)| [-]: 1, or sqrt(cond P), A_dᵀ P + P A_d = -I.
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    """
-    matrix = require_hurwitz(A_d)
-    if np.linalg.eigvalsh(matrix + matrix.T)[-1] <= 0.0:
-        return 1.0  # |exp(A_d t)| never grows
-    return math.sqrt(float(np.linalg.cond(lyapunov(matrix, np.eye(2)).P)))
-
-
-def _peak(A_d: ArrayLike, dt: float | None) -> float:
-    """γ of continuous time or of the Euler step [s]."""
-    return peak_gain(A_d) if dt is None else sampled_peak_gain(A_d, dt)
 
 
 def _size(A_d: ArrayLike, direction: Array | None) -> float:

@@ -5,8 +5,7 @@ Phase margin: the phase lag in the learning path that does the same, in degrees.
 For A_d = -a I both are those of the scalar loop (g/a) (c_ξ + c_z/(s + λ)) / ((s + a)(s + l)).
 
 In functions:
-integrator : `exact` for continuous time, or the integrator of the step.
-dt : step [s]; irrelevant for `exact`.   A_d : (2, 2) Hurwitz error dynamics [1/s].
+dt : step of Euler [s]; None for continuous time.   A_d : (2, 2) Hurwitz error dynamics [1/s].
 forgetting : λ [1/s].   direction : (2, 2) D, None for -A_d⁻ᵀ.
 """
 
@@ -21,10 +20,8 @@ from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
 from identifier.stability.chosen import CHOSEN
 from identifier.stability.loop import (
-    Integrator,
     Loop,
     eigenvalues,
-    exact,
     growth_rate,
     root,
     scaled_matrices,
@@ -43,7 +40,7 @@ class _GainMargin:
     frequency: float
 
 
-def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> _GainMargin:
+def gain_margin(loop: Loop, dt: float | None = None) -> _GainMargin:
     """Find the smallest factor on the gain at which the loop is unstable, with its frequency.
 
     Any A_d, any law, any input source: factors from 1e-6 to 1e6 are searched (150 a decade) for
@@ -51,7 +48,7 @@ def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> 
     """
 
     def growth_at(log_factors: Array) -> Array:
-        return growth_rate(scaled_matrices(loop, np.exp(log_factors)), integrator, dt)
+        return growth_rate(scaled_matrices(loop, np.exp(log_factors)), dt)
 
     span = np.log(CHOSEN.largest_factor)
     crossing = _first_crossing(growth_at, np.linspace(-span, span, 1801), 1e-11 * _rate(loop))
@@ -60,10 +57,10 @@ def gain_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> 
     if crossing == -span:
         return _GainMargin(factor=0.0, frequency=np.nan)
     factor = float(np.exp(crossing))
-    return _GainMargin(factor=factor, frequency=_frequency(loop.scaled(factor), integrator, dt))
+    return _GainMargin(factor=factor, frequency=_frequency(loop.scaled(factor), dt))
 
 
-def phase_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) -> float:
+def phase_margin(loop: Loop, dt: float | None = None) -> float:
     """Return the smallest phase lag of the learning path that destabilizes the loop [deg].
 
     0 if the loop is already unstable, 180 if no lag below half a turn does it. Defined for any
@@ -71,7 +68,7 @@ def phase_margin(loop: Loop, integrator: Integrator = exact, dt: float = 1.0) ->
     """
 
     def growth_at(angles: Array) -> Array:
-        return growth_rate(scaled_matrices(loop, np.exp(-1j * angles)), integrator, dt)
+        return growth_rate(scaled_matrices(loop, np.exp(-1j * angles)), dt)
 
     grid = np.linspace(0.0, np.pi, 721)
     crossing = _first_crossing(growth_at, grid, 1e-11 * _rate(loop))
@@ -106,12 +103,12 @@ def _first_crossing(
     return root(excess, low, grid[first], xtol=1e-14, rtol=1e-14)
 
 
-def _frequency(loop: Loop, integrator: Integrator, dt: float) -> float:
+def _frequency(loop: Loop, dt: float | None) -> float:
     """|Im| of the eigenvalue on the boundary; for a sampled loop the angle of its image by dt."""
     mu = eigenvalues(loop.matrix())
-    if integrator is exact:
+    if dt is None:
         return float(abs(mu[np.argmax(mu.real)].imag))
-    image = integrator(mu * dt)
+    image = 1.0 + mu * dt
     return float(abs(np.angle(image[np.argmax(np.abs(image))])) / dt)
 
 

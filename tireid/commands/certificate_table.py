@@ -13,7 +13,7 @@ from identifier.stability import Certificate, Property
 from models.vehicle import Vehicle
 from tireid.output import text_table
 
-_ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radius
+_ROUNDING = 1e-9  # of weights that lie on their bound
 HEADER = ("property", "value", "limit", "margin", "")
 
 
@@ -103,7 +103,7 @@ def resumed_line(certificate: Certificate, design: PaperIdentifier, first: Weigh
     known = {entry.name: entry.value for entry in certificate.properties}
     W, V = known.get("weight_bound", math.inf), known.get("V_bound", math.inf)
     layers = (
-        ("|W|", first.W, min(W, design.gains.W_max), unit_text("U", design.force_unit)),
+        ("|W|", first.W, W, unit_text("U", design.force_unit)),
         ("|V|", first.V, V, ""),
     )
     beyond = [

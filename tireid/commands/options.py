@@ -277,8 +277,7 @@ def _map_path(options: argparse.Namespace) -> Path | None:
     path: Path | None = getattr(options, "log_map", None)
     if path is not None and path.suffix.lower() != ".toml":
         raise ValueError(
-            f"--log {path}: must be a log.toml, by its ending; give a log after the command "
-            "(check: after --along)"
+            f"--log {path}: must be a log.toml, by its ending; give a log after the command"
         )
     return path
 

@@ -13,7 +13,7 @@ from codegen.arrays import Array
 from identifier.paper.design import VARIANTS
 from identifier.run import History
 from identifier.setup import force_unit_name
-from identifier.stability.loop import INTEGRATORS, Loop, eigenvalues, root_locus
+from identifier.stability.loop import Loop, eigenvalues, root_locus
 from identifier.stability.margins import gain_margin, phase_margin
 from tireid.figures import style
 from tireid.figures.chosen import CHOSEN
@@ -185,17 +185,16 @@ _FACTORS = np.geomspace(1e-3, 1e3, 1500)  # on the loop gain, along the locus
 
 
 @style.styled
-def locus_figure(loop: Loop, *, integrator: str, dt: float) -> Figure:
+def locus_figure(loop: Loop, dt: float) -> Figure:
     """Draw the root locus of the sampled loop, with the design on it and the gain at its limit.
 
     Left all of the unit circle, right the part near z = 1, where slow poles are.
 
-    integrator : "euler" or "rk4".   dt : sampling interval [s].
+    dt : sampling interval [s].
     """
-    step = INTEGRATORS[integrator]
-    locus = step(root_locus(loop, _FACTORS) * dt).ravel()
-    design = step(eigenvalues(loop.matrix()) * dt)
-    margin = gain_margin(loop, step, dt)
+    locus = 1.0 + root_locus(loop, _FACTORS).ravel() * dt
+    design = 1.0 + eigenvalues(loop.matrix()) * dt
+    margin = gain_margin(loop, dt)
     circle = np.exp(1j * np.linspace(-np.pi, np.pi, 2881))
     figure = style.new_figure(CHOSEN.page, 3.5)
     panels = figure.subplots(1, 2)
@@ -207,14 +206,14 @@ def locus_figure(loop: Loop, *, integrator: str, dt: float) -> Figure:
         axes.plot(locus.real, locus.imag, ".", color=style.GREY, markersize=1.0, label="any gain")
         axes.plot(design.real, design.imag, "o", color=style.BLUE, markersize=4.5, label="design")
         if 0.0 < margin.factor < np.inf:
-            edge = step(eigenvalues(loop.scaled(margin.factor).matrix()) * dt)
+            edge = 1.0 + eigenvalues(loop.scaled(margin.factor).matrix()) * dt
             name = f"{margin.factor:.3g} times its gain"
             axes.plot(edge.real, edge.imag, "x", color=style.ORANGE, markersize=5.5, label=name)
         axes.set(xlim=(left, right), ylim=(-height, height), aspect="equal")
         axes.set_xlabel("real part of z [-]")
     panels[0].set_ylabel("imaginary part of z [-]")
     panels[0].set_title("Poles of the sampled loop")
-    phase = phase_margin(loop, step, dt)
+    phase = phase_margin(loop, dt)
     panels[1].set_title(f"Near z = 1; phase margin {phase:.0f}°")
     style.legend_above(figure)
     return figure
