@@ -7,10 +7,6 @@ that fail in any way, several at once, with NaN, infinity, 1e300 and jumps just 
 (`benchmarks.hostile_drives`). No property may be violated.
   boxes, covariance, state, curve, jump   after every sample of the compiled step, in double
   float       boxes and factors of the covariance of the exported C in float, every tenth sample
-  identity    the error of the learnt force is what the recursion of `identifier.axle.along` says,
-              for a random truth
-  worst       errors of y as told, with the worst signs, run forward through that recursion: the
-              force error reaches its bound, and does not pass it
   drop        friction falls to half in a steady corner: both axles are half wrong no longer than
               is certified; drives that miss a condition of that are drawn again
 Beside each, violations are planted: numbers changed in what was recorded, or a design that has
@@ -24,7 +20,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from benchmarks.hostile_drives import Case, cases, faster, hostile, ran, told
-from benchmarks.hostile_forces import judge_drops, judge_errors
+from benchmarks.hostile_forces import judge_drops
 from benchmarks.random_cars import FIRST_SEED
 from benchmarks.targets import Targets, keeps
 from codegen.arrays import Array
@@ -247,7 +243,6 @@ def main(drives: int = DRIVES) -> int:
     judge_states(drives, t)
     judge_designs(drives, t)
     judge_float(drives, t)
-    judge_errors(drives, t)
     judge_drops(drives, t)
     values = list(t.values.items())
     for key in ("drives", "violated", "planted", "missed"):

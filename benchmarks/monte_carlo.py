@@ -403,7 +403,6 @@ def with_peaks(step: ca.Function) -> ca.Function:
 TOLERANCE = 1e-9  # of rounding, in parts of a bound
 BOUNDS = (  # name in the certificate, what it bounds, and how a table calls it
     ("error_bound", "xi_tilde", "|xi - xi_hat|, by the leakage"),
-    ("projection_bound", "xi_tilde", "|xi - xi_hat|, by the projection"),
     ("weight_bound", "W", "|W|, by the leakage"),
     ("V_bound", "V", "|V|"),
 )

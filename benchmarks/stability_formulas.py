@@ -20,7 +20,7 @@ from benchmarks.limits import (
 )
 from benchmarks.targets import Targets, keeps
 from identifier.paper.laws import DrivingError
-from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, growth_rate
+from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, growth_rate
 from identifier.stability.margins import gain_margin
 
 DT, CASES = 0.01, 200
@@ -72,8 +72,8 @@ def differences(cases: int, seed: int) -> dict[str, float]:
         a, lam = np.exp(rng.uniform(np.log(0.5), np.log(30.0), 2))
         leakage = rng.choice([0.0, rng.uniform(0.0, 5.0)])
         loop = scalar_loop(a, lam, leakage, INTEGRAL)
-        continuous, sampled = gain_margin(loop), gain_margin(loop, euler, DT)
-        quick = gain_margin(scalar_loop(a, lam, leakage, INSTANTANEOUS), euler, DT)
+        continuous, sampled = gain_margin(loop), gain_margin(loop, DT)
+        quick = gain_margin(scalar_loop(a, lam, leakage, INSTANTANEOUS), DT)
         A_d = random_error_dynamics(rng)
         G = np.diag(rng.uniform(1.0, 300.0, 2))
         skewed = Loop(A_d=A_d, forgetting=lam, law=INTEGRAL, G=G, leakage=leakage)

@@ -61,10 +61,10 @@ DOORS = (
     _door("identify replay", 3, f"{IDENTIFY} --replay other.csv", "other.csv"),
     _door("compare csv", 4, f"{COMPARE} axle linear", "log.csv"),
     _door(
-        "check log",
+        "check design, car",
         3,
-        "check --design integral.toml --vehicle car.toml --along log.csv",
-        "log.csv car.toml",
+        "check --design integral.toml --vehicle car.toml",
+        "car.toml",
     ),
     # logs as loggers write them, and their map
     _door("channels csv", 6, "channels logger.csv", "logger.csv"),
@@ -78,7 +78,6 @@ DOORS = (
     _door("identify car", 8, IDENTIFY.replace("car.toml", "sedan.toml"), "sedan.toml"),
     _door("check car", 6, "check --paper --vehicle sedan.toml", "sedan.toml"),
     _door("check default", 2, "check --vehicle sedan.toml --out out", "sedan.toml"),
-    _door("check car, tuned", 3, "check --vehicle car.toml --tune out.toml", "car.toml"),
     _door("export car", 5, "export --out out --vehicle sedan.toml", "sedan.toml"),
     _door("export car, FMU", 0.5, "export --out out --vehicle car.toml --fmu --onnx", "car.toml"),
     _door("export tracker", 0.2, "export --out out --mpc --vehicle car.toml", "car.toml"),
@@ -128,11 +127,6 @@ DOORS = (
         6,
         "check --vehicle car.toml --method integral --bandwidth 0.7 --speed 20 --slip 0.1 "
         "--friction 1 --noise-r 0.01",
-    ),
-    _door(
-        "words of check, tuned",
-        3,
-        "check --vehicle car.toml --phase-margin 60 --noise-v-x 0.1 --tune out.toml",
     ),
     _door("words of export", 3, "export --out out --name mine --method integral --single"),
     _door("words of compare", 3, f"{COMPARE} axle linear --seed 0"),

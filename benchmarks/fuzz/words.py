@@ -17,7 +17,7 @@ FEW = (
     "2e0",
     "٢",
 )  # more of them is more work, as asked
-PLACES = ("--out", "--tune", "init", "sample")  # what follows is written
+PLACES = ("--out", "init", "sample")  # what follows is written
 OUTS = (
     *(
         "out",

@@ -11,7 +11,6 @@ from codegen import find_compiler
 from identifier.export.compiled import CompiledPackage, PackageFileError, Status, samples_of
 from identifier.export.package import build_package
 from identifier.methods import make_method
-from identifier.paper.design import with_keeping
 from identifier.run import identify
 from models.vehicle import sedan
 from tests.identifier.export.conftest import BANKED
@@ -261,26 +260,3 @@ def test_an_input_on_its_limit_is_taken_and_one_beyond_is_not(packages):
                 sample = [20.0, 0.1, 0.1, 0.01, 0.0]
                 sample[place] = side * size
                 assert (run.step(*sample)[0] == Status.BAD_INPUT) == refused, (name, side, size)
-
-
-@pytest.mark.parametrize("keeping", ["dead_zone", "projection"])
-def test_the_shipped_c_keeps_the_weights_as_the_method_does(keeping, slalom):
-    """With balls so small that the slalom leaves them; without, the forces are others."""
-    paper = make_method("integral", CAR)
-    method = with_keeping(paper, paper.operation(CAR), keeping)
-    small = {
-        "dead_zone": {"W_free": 0.4, "V_free": 3.0},
-        "projection": {"W_max": 0.4, "V_max": 3.0},
-    }
-    gains = replace(method.gains, **small[keeping])
-    if keeping == "dead_zone":
-        gains = replace(gains, rho_W=50.0 * gains.rho_W, rho_V=50.0 * gains.rho_V)
-    method = replace(method, gains=gains)
-    history = identify(slalom, CAR, method)
-    run = CompiledPackage.of(build_package(method, CAR))
-    assert np.abs(run.run(slalom).axle_force - history.axle_force).max() < 1e-6
-    kept = {name: np.linalg.norm(history.state[name][-1]) for name in ("W", "V")}
-    assert kept["W"] > 0.39 and kept["V"] > 2.9
-    plain = replace(gains, W_free=0.0, V_free=0.0, W_max=np.inf, V_max=np.inf)
-    other = identify(slalom, CAR, replace(method, gains=plain)).axle_force
-    assert np.abs(other - history.axle_force).max() > 100.0

@@ -92,7 +92,6 @@ def best_printed(*, w_bar, n_h, eta_W, rho_W):
     operation = Operation(
         n_h=n_h,
         dt=0.01,
-        integrator="exact",
         bandwidth=1.0,
         disturbance=Disturbance(residual=w_bar),
         needed_force=1.0,
