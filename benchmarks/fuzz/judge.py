@@ -128,9 +128,8 @@ def _lost(words: Sequence[str], folder: Path, before: Mapping[str, str]) -> list
 
 def _written_file(words: Sequence[str]) -> str:
     """Return the file that --force lets `init` replace."""
-    if "--force" in words:
-        if "init" in words[:-1]:
-            return words[words.index("init") + 1]
+    if "--force" in words and "init" in words[:-1]:
+        return words[words.index("init") + 1]
     return ""
 
 

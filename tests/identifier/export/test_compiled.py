@@ -1,7 +1,6 @@
 """The shipped C from Python."""
 
 import re
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
