@@ -512,7 +512,6 @@ MODELS: Mapping[str, tuple[str, str]] = {  # module and class by kind, imported 
     "network": ("identifier.paper.network", "NetworkModel"),
     "axle": ("identifier.axle.model", "AxleModel"),
     "curve": ("identifier.baselines.curves", "CurveModel"),
-    "onnx": ("identifier.own_network", "OnnxModel"),
     "fit": ("identifier.estimate.model", "FittedModel"),
 }
 
@@ -523,6 +522,8 @@ def load_model(path: str | PathLike[str]) -> TireModel:
     table = _stored(path)
     _verdict_of(table)
     kind = table.text("kind")
+    if kind == "onnx":
+        table.refuse("kind", "is an ONNX network: make it a method, as examples/own_network.py")
     if kind not in MODELS:
         table.refuse("kind", f"must be one of {list(MODELS)}, it is {shown(kind)}")
     module, name = MODELS[kind]

@@ -6,7 +6,6 @@ Arguments that are wrong in themselves raise plain `TypeError` or `ValueError`.
 from codegen.errors import TireidError as TireidError
 from identifier.frozen import FrozenModelError as FrozenModelError
 from identifier.method import CannotFreezeError as CannotFreezeError
-from identifier.own_network import UnusableNetworkError as UnusableNetworkError
 from identifier.plan import PlanError as PlanError
 from identifier.reproducibility import NeverDrivesError as NeverDrivesError
 from identifier.run import DivergedError as DivergedError

@@ -1,12 +1,8 @@
-"""What `tireid identify` found, and its files: numbers as JSON, curves as CSV, figures as PNG.
-
-A network of one's own (`--network`) has the keys of a learnt model, "network" in place of a freeze
-time. What the identifier finds online over the same recordings stands beside it.
-"""
+"""What `tireid identify` found, and its files: numbers as JSON, curves as CSV, figures as PNG."""
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +14,6 @@ from codegen.escape import visible
 from identifier.compare.course import side_slip
 from identifier.frozen import vehicle_numbers
 from identifier.methods import certify
-from identifier.own_network import OnnxModel
 from identifier.reproducibility import (
     AxleRmse,
     Replay,
@@ -42,7 +37,6 @@ from tireid.figures.tires import learnt_axles_figure, slip_figure
 from tireid.output import axle_columns, text_table, write_csv, write_json, write_table
 from tireid.progress import Progress, say
 
-_NETWORK = "network"
 _OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
 _ESTIMATED = {  # columns of forces.csv by the outputs of methods that estimate v_y
     "v_y_estimated_m_s": "v_y",
@@ -58,13 +52,13 @@ _FARTHER = 1.25  # than the slip that was driven, or is known
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
-    """Models that were frozen, or a network, over recordings.
+    """Models that were frozen over recordings.
 
     runs : of the method, over the recording that was learnt and over others.
-    models, frozen : by freeze time as text [s], or `_NETWORK`, models and their replays by
-        recording; the last counts.
+    models, frozen : by freeze time as text [s], models and their replays by recording; the last
+        counts.
     verdict : on the last.   asked : on it over the others, by name.
-    parts : of the first run, where it is over several logs.   about : a network, its file.
+    parts : of the first run, where it is over several logs.
     """
 
     method: str
@@ -74,7 +68,6 @@ class Results:
     verdict: Verdict
     asked: Mapping[str, Verdict]
     parts: Sequence[History] = ()
-    about: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def learnt(
@@ -101,21 +94,6 @@ class Results:
         found: Any = {"models": models, "frozen": frozen, "verdict": verdict, "asked": asked}
         return cls(method=method, runs=runs, parts=parts, **found)
 
-    @classmethod
-    def of_network(
-        cls,
-        method: str,
-        runs: Sequence[History],
-        model: OnnxModel,
-        source: str,
-        verdict: Verdict,
-        asked: Mapping[str, Verdict],
-    ) -> "Results":
-        found: Any = {"models": {_NETWORK: model}, "frozen": {_NETWORK: _replays(model, runs)}}
-        about = {"inputs": list(model.signals), "slip_sign": model.slip_sign}
-        found["about"] = {"file": source, **about}
-        return cls(method=method, runs=runs, verdict=verdict, asked=asked, **found)
-
     @property
     def model(self) -> TireModel:
         """The last."""
@@ -129,13 +107,13 @@ class Results:
     @property
     def by_label(self) -> dict[str, Mapping[str, Replay]]:
         """The replays by what a table calls their model."""
-        return {k if k == _NETWORK else f"{k} s": replays for k, replays in self.frozen.items()}
+        return {f"{key} s": replays for key, replays in self.frozen.items()}
 
     def table(self) -> str:
         """Return a table of the errors per axle, and as a share of the force where there is truth.
 
         Under the recording that was learnt stands the paper's measure: its past, t < T_freeze,
-        against what was identified online; under a network what learns online beside it.
+        against what was identified online.
         """
         runs = {run.recording.name: run for run in (*self.runs, *self.parts)}
         rows = [["frozen at", "replayed on", "front", "rear"]]
@@ -143,10 +121,7 @@ class Results:
             for name, result in replays.items():
                 size, sides = force_rms(runs[name]), result.reproduction
                 errors = {(label, visible(name)): result.against_truth or result.against_online}
-                if label == _NETWORK:
-                    words = f"{self.method}, learning online", visible(name)
-                    errors[words] = online_error(runs[name])
-                elif sides is not None:
+                if sides is not None:
                     errors["", _OWN_PAST] = sides.past_against_online
                 for number, (words, error) in enumerate(errors.items()):
                     if number == 0 or error is not None:
@@ -193,7 +168,6 @@ class Results:
             "vehicle": vehicle_numbers(learnt.vehicle),
             "diverged_at_s": learnt.diverged_at,
             "version": __version__,
-            **({_NETWORK: dict(self.about)} if self.about else {}),
         }
 
     def write(
@@ -219,14 +193,12 @@ class Results:
         learnt, count = self.runs[0], len(self.runs)
         for k, run in enumerate(self.runs):
             replays = {
-                key if key == _NETWORK else f"frozen_{key}s": by_name[run.recording.name]
+                f"frozen_{key}s": by_name[run.recording.name]
                 for key, by_name in self.frozen.items()
             }
             end = "" if run is learnt else f"_{file_name(run.recording)}"
             share = progress.within(_WRITING * k / count, _WRITING * (k + 1) / count)
             write_table(folder / f"forces{end}.{curves}", _force_columns(run, replays, share))
-        if _NETWORK in self.models:
-            return
         if _OBSERVED in learnt.outputs:
             found = (_error_columns(learnt, one) for one in learnt.blocks())
             write_table(folder / f"errors.{curves}", found)
@@ -236,26 +208,21 @@ class Results:
     def _figures(self) -> dict[str, Figure]:
         learnt, model = self.runs[0], self.model
         recording, name = learnt.recording, learnt.recording.name
-        figures = {"inputs": inputs_figure(recording)}
-        asked = self.runs[1:]
-        if _NETWORK in self.models:
-            asked = self.runs
-            for run in self.runs:
-                end = "" if run is learnt else f"_{file_name(run.recording)}"
-                figures[f"slip{end}"] = slip_figure(model, run.recording, _beside(run))
-        else:
-            own = {float(key): replays[name] for key, replays in self.frozen.items()}
-            figures["slip"] = slip_figure(model, recording, _beside(learnt))
-            figures["forces"] = force_figure(learnt, own)
-            slip = side_slip(learnt, learnt.design.min_speed, recording.logged_v_y)
-            if _OBSERVED in learnt.outputs:
-                figures["error"] = error_figure(learnt, freeze_times=list(own))
-                figures["weights"] = weights_figure(learnt, list(own))
-            if slip is not None:
-                figures["side_slip"] = side_slip_figure([recording], {"estimate": {name: slip}})
-            if learnt.tracks_over(next(learnt.blocks())):
-                figures["learnt"] = learnt_axles_figure(learnt, list(own))
-        for run in asked:
+        own = {float(key): replays[name] for key, replays in self.frozen.items()}
+        figures = {
+            "inputs": inputs_figure(recording),
+            "slip": slip_figure(model, recording, _beside(learnt)),
+            "forces": force_figure(learnt, own),
+        }
+        slip = side_slip(learnt, learnt.design.min_speed, recording.logged_v_y)
+        if _OBSERVED in learnt.outputs:
+            figures["error"] = error_figure(learnt, freeze_times=list(own))
+            figures["weights"] = weights_figure(learnt, list(own))
+        if slip is not None:
+            figures["side_slip"] = side_slip_figure([recording], {"estimate": {name: slip}})
+        if learnt.tracks_over(next(learnt.blocks())):
+            figures["learnt"] = learnt_axles_figure(learnt, list(own))
+        for run in self.runs[1:]:
             drawn = prediction_figure(self.replays[run.recording.name], _beside(run))
             figures[f"replay_{file_name(run.recording)}"] = drawn
         return figures

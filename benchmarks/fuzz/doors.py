@@ -27,7 +27,7 @@ class Door(NamedTuple):
 
 def _files(words: str) -> tuple[str, ...]:
     """Return the words that name files of the seeds; a car brings its tire."""
-    endings = (".csv", ".csv.gz", ".parquet", ".mat", ".toml", ".json", ".onnx")
+    endings = (".csv", ".csv.gz", ".parquet", ".mat", ".toml", ".json")
     found = [word for word in words.split() if word.endswith(endings) and word != "out.toml"]
     return tuple(found) + (("sedan.tir",) if "sedan.toml" in found else ())
 
@@ -100,7 +100,6 @@ DOORS = (
     _door("drive axle", 4, f"{DRIVE} --weights axle.json", "axle.json"),
     _door("drive network", 3, f"{DRIVE} --weights network.json", "network.json"),
     _door("drive curve", 2, f"{DRIVE} --weights curve.json", "curve.json"),
-    _door("drive own", 2, f"{DRIVE} --weights own.json", "own.json"),
     _door("drive learning", 1, f"{DRIVE} --tires learning --weights axle.json", "axle.json"),
     _door("predict axle", 4, f"{PREDICT} axle.json log.csv", "axle.json"),
     _door("predict network", 2, f"{PREDICT} network.json log.csv", "network.json"),
@@ -111,11 +110,6 @@ DOORS = (
     # fleets
     _door("fleet learn", 3, FLEET, "log.csv car.toml"),
     _door("fleet learn, begun", 1, f"{FLEET} --weights fit.json", "fit.json"),
-    # networks of the user's own
-    _door("identify onnx", 8, f"{IDENTIFY} --network slip.onnx", "slip.onnx"),
-    _door("identify onnx, exported", 3, f"{IDENTIFY} --network exported.onnx", "exported.onnx"),
-    _door("compare onnx", 3, f"{COMPARE} linear --network slip.onnx", "slip.onnx"),
-    _door("drive onnx", 2, f"{DRIVE} --network slip.onnx", "slip.onnx"),
     # paths
     _door("drive path", 10, f"{DRIVE} --tires linear", "path.csv"),
     # words

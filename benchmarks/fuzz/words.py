@@ -72,11 +72,8 @@ MORE = (
         "--method linear",
         "--method none",
         "--seed -1",
-        "--network slip.onnx",
     ),
     *(
-        "--network-inputs r r",
-        "--network-iso",
         "--weights axle.json",
         "--design integral.toml",
         "--speed 1e999%",

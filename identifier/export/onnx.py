@@ -22,7 +22,6 @@ from identifier.axle.model import AxleModel
 from identifier.band import LEVEL, normal_quantile
 from identifier.estimate.model import FittedModel
 from identifier.export.specialize import INPUTS, Signal
-from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.extras import needs
@@ -273,7 +272,7 @@ def _band_of_axle(model: AxleModel, graph: _Graph, axle: int, units: str) -> Non
 def onnx_bytes(model: TireModel, *, single: bool = False, with_band: bool = False) -> bytes:
     """Return a frozen model as the content of an ONNX file; the same model gives the same bytes.
     model : the whole model for a network, the static force curves for an axle model and, in hidden
-        units, for a fit, the network itself for one that came from an ONNX file.
+        units, for a fit.
     single : whether numbers are float32; else they are float64.
     """
     if isinstance(model, AxleModel):
@@ -283,11 +282,11 @@ def onnx_bytes(model: TireModel, *, single: bool = False, with_band: bool = Fals
         band = partial(_band_of_fit, model) if with_band else None
         return _curves(model.in_units(), single=single, add_band=band)
     name = type(model).__name__
-    if not isinstance(model, NetworkModel | OnnxModel):
+    if not isinstance(model, NetworkModel):
         raise NoOnnxError(f"{name} has no ONNX form, only networks and axle curves do")
     if with_band:
         raise NoOnnxError(f"{name} cannot tell how sure it is: it has no band")
-    return model.content if isinstance(model, OnnxModel) else _network(model, single=single)
+    return _network(model, single=single)
 
 
 def export_onnx(

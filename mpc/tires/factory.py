@@ -8,14 +8,13 @@ import numpy as np
 from identifier.axle.model import AxleModel
 from identifier.baselines.curves import CurveModel
 from identifier.estimate.model import FittedModel
-from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import Vehicle
 from mpc.tires.curves import LaggedAxles, MagicAxles, linear_tire
 from mpc.tires.ladder import axle_tire, fit_tire, mounted_tire
-from mpc.tires.network import network_tire, onnx_tire
+from mpc.tires.network import network_tire
 from mpc.tires.tire import PredictionTire
 
 
@@ -65,7 +64,7 @@ def _linear(vehicle: Vehicle, tire: LinearTire) -> PredictionTire:
 
 MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {
     NetworkModel.kind: network_tire, AxleModel.kind: axle_tire, FittedModel.kind: fit_tire,
-    CurveModel.kind: _curve_tire, OnnxModel.kind: onnx_tire,
+    CurveModel.kind: _curve_tire,
 }  # fmt: skip
 TIRES: Mapping[type, Callable[[Vehicle, Any], PredictionTire]] = {
     LinearTire: _linear,

@@ -200,7 +200,6 @@ def test_a_car_that_would_spin_ends_the_drive_to_learn_on_before():
         (["--seed", "-1"], "--seed must not be negative"),
         (["--weights", "nowhere.json"], "nowhere.json"),
         (["--weights", "a.json", "--paper"], "give only one of --weights, --paper"),
-        (["--network-iso"], "go with --network"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
     ],
 )

@@ -8,8 +8,6 @@ import numpy as np
 
 from identifier.compare.study import cannot_learn, run_comparison
 from identifier.methods import DEFAULT, methods, require_method
-from identifier.own_network import FrozenMethod
-from identifier.paper.design import PaperIdentifier
 from identifier.run import History
 from identifier.verdict import Verdict, judge
 from models.recordings import Recording, RecordingError
@@ -50,7 +48,6 @@ def add_parser(commands: Any) -> None:
     )
     shared.add_seed(parser, "sensor noise, and the weights of networks")
     shared.add_log_reading(parser)
-    shared.add_network_arguments(parser, "compare with this network, which learns nothing")
     shared.add_accept(parser)
     shared.add_output(parser, "compare")
     parser.set_defaults(run=run)
@@ -65,8 +62,6 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
     watch = Stopwatch()
     vehicle = shared.read_vehicle(options)
-    network = shared.network_model(options, vehicle, PaperIdentifier.for_vehicle(vehicle).min_speed)
-    others = {} if network is None else {options.network.name: FrozenMethod(model=network)}
     parts = {"methods": 9.0, "step times, tables and figures": 1.0}
     with (
         output_folder(options.out, force=options.force) as folder,
@@ -84,7 +79,6 @@ def run(options: argparse.Namespace) -> int:
         names = [name for name in names if name not in left_out]
         if not names:
             raise RecordingError("no method is left to compare: " + next(iter(left_out.values())))
-        steps = len(names) + len(others)
         verdicts: dict[str, Verdict] = {}
 
         def seen(name: str, run: History) -> None:
@@ -96,8 +90,7 @@ def run(options: argparse.Namespace) -> int:
             vehicle,
             recordings,
             seed=seed,
-            progress=partial(work.step, steps),
-            others=others,
+            progress=partial(work.step, len(names)),
             left_out=left_out,
             seen=seen,
         )

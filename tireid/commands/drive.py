@@ -17,7 +17,7 @@ from tireid.progress import say, tell
 
 _NOT_COMPLETED = 1
 _EPILOG = (
-    "Without --weights or --network, frozen tires are identified first: the same car drives on "
+    "Without --weights, frozen tires are identified first: the same car drives on "
     f"an open field for {DRIVING_CHOSEN.duration:g} s, steered at random and ever harder until it "
     "slides, and the tires at the end are used. linear is the tire of the vehicle file, oracle the "
     "true tire of the plant, learning begins with the frozen tires and updates them while driving. "
@@ -97,7 +97,6 @@ def add_parser(commands: Any) -> None:
     formats: dict[str, Any] = {"choices": (*FORMATS, NO_FILM), "default": FORMATS[0]}
     text = f"{', '.join(FORMATS)} (by ffmpeg) or {NO_FILM} (%(default)s)"
     parser.add_argument("--film", metavar="NAME", help=text, **formats)
-    shared.add_network_arguments(parser, "steer on this frozen network")
     shared.add_output(parser, "drive")
     parser.set_defaults(run=run)
 

@@ -17,7 +17,6 @@ from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from tireid.commands.options import (
     chosen_method,
-    network_model,
     number_with_unit,
     read_vehicle,
     require_one,
@@ -117,7 +116,7 @@ def conditions_of(options: argparse.Namespace) -> runs.Conditions:
     path = _named_path(options.path)
     if options.laps != 1.0 and not path.closed:
         raise ValueError(f"--laps is for a closed path, {path.name} is not")
-    require_one(options, "weights", "network", "method", "paper", "design")
+    require_one(options, "weights", "method", "paper", "design")
     setup = make_setup(
         path,
         vehicle=None if options.vehicle is None else read_vehicle(options),
@@ -181,9 +180,6 @@ def frozen_tires(
         assert model is not None
         _require_its_car(options, model.vehicle, setup)
         return f"frozen ones from {options.weights}", model
-    network = network_model(options, setup.vehicle, 1.0)
-    if network is not None:
-        return f"frozen ones from {options.network}", network
     law, method = chosen_method(options, setup.vehicle)
     with Progress("the drive to learn on") as progress:
         recording = learning_drive(

@@ -58,7 +58,6 @@ def add_parser(commands: Any) -> None:
     add_repair(parser, "identify the repaired log, and write the repair to")
     shared.add_weights(parser, "begin with this model")
     shared.add_seed(parser, "the initial weights of the paper's network")
-    shared.add_network_arguments(parser, "judge this network instead")
     shared.add_accept(parser)
     text = "format of curves over time (csv); parquet is smaller and faster, with all digits"
     parser.add_argument("--curves", choices=("csv", "parquet"), default="csv", help=text)
@@ -70,10 +69,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where what was learnt is not valid, or not of a replayed log."""
     vehicle = shared.read_vehicle(options)
     seed = None if options.seed is None else shared.seed_of(options)
-    beside = options.network is not None  # of which something learns online
-    if beside and options.freeze is not None:
-        raise ValueError("--freeze is for identified models: the network of --network is frozen")
-    law, design = shared.chosen_method(options, vehicle, seed, online=beside)
+    law, design = shared.chosen_method(options, vehicle, seed)
     start = shared.stored_model(options.weights)
     if options.run_name is not None and len(options.logs) > 1:
         raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
@@ -85,8 +81,6 @@ def run(options: argparse.Namespace) -> int:
     _require_distinct([*logs, *others])
     recording = joined(logs)
     without_v_y = any(one.v_y is None for one in (*logs, *others))
-    choice = {"without_v_y": without_v_y, "online": beside}
-    law, design = shared.chosen_method(options, vehicle, seed, **choice)
     for one in (*logs, *others):
         check_recording(one, design)
     if without_v_y:
@@ -98,16 +92,14 @@ def run(options: argparse.Namespace) -> int:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         recording = joined(logs)
         vehicle = repair.on(vehicle)
-        law, design = shared.chosen_method(options, vehicle, seed, **choice)
+        law, design = shared.chosen_method(options, vehicle, seed)
     if options.repair is not None and not options.no_check:
         for one in (*logs, *others):
             check_physics(one)
             check_against_vehicle(one, vehicle)
-    network = shared.network_model(options, vehicle, design.min_speed)
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
-    if network is None:
-        _require_model(law, design, vehicle)
+    _require_model(law, design, vehicle)
     if start is not None and start.scales_with_load and not start.vehicle.moves_as(vehicle):
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     count = 1.0 + len(others)
@@ -127,26 +119,20 @@ def run(options: argparse.Namespace) -> int:
             )
             say(f"learnt {law} over {one.name}")
         progress.begin(_JUDGING)
-        learnt, last, closing = runs[0], freeze_times[-1], ""
-        if network is not None:
-            verdict = with_doctor(judge_prediction(network, learnt.recording), diagnosis, repair)
-            asked, file = _asked(network, others), options.network.name
-            found = Results.of_network(law, runs, network, file, verdict, asked)
-        else:
-            for t in freeze_times:
-                _require_tires(learnt, t)
-            pieces = learnt.parts(logs) if len(logs) > 1 else []
-            verdict = with_doctor(judge(learnt, last), diagnosis, repair)
-            asked = _asked(learnt.freeze(last), others)
-            tire = calibrated(learnt, last, verdict)
-            found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
-            closing = _closing_line(learnt, last, vehicle, resumed=start is not None)
+        learnt, last = runs[0], freeze_times[-1]
+        for t in freeze_times:
+            _require_tires(learnt, t)
+        pieces = learnt.parts(logs) if len(logs) > 1 else []
+        verdict = with_doctor(judge(learnt, last), diagnosis, repair)
+        asked = _asked(learnt.freeze(last), others)
+        tire = calibrated(learnt, last, verdict)
+        found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
         figures = found.write(folder, curves=options.curves, progress=progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(folder, found, figures, diagnosis, options.words)
         given = (
             found.table(),
-            closing,
+            _closing_line(learnt, last, vehicle, resumed=start is not None),
             doctor_text(diagnosis, repair, options.repair),
             verdicts_text(asked, "replayed on"),
             verdict_text(verdict),

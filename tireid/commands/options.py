@@ -1,4 +1,4 @@
-"""Options that commands share, each declared once; what they read: methods, logs, networks.
+"""Options that commands share, each declared once; what they read: methods, logs.
 
 One word means one thing in every command: `--vehicle` the car, `--method`, `--paper` and `--design`
 what learns, `--weights` what was learnt before, `--out` the folder that is written, `--force` that
@@ -19,15 +19,12 @@ from identifier.methods import (
     DEFAULT,
     LIVE,
     REFERENCE,
-    WITHOUT_V_Y,
     draws_weights,
     make_method,
     methods,
     require_method,
 )
-from identifier.own_network import OnnxModel
 from identifier.paper.design import read_design
-from identifier.paper.network import SIGNALS
 from identifier.tire_model import TireModel, load_model
 from identifier.verdict import Verdict
 from models.recordings import LogMap, Recording, read_repaired, split_log_argument
@@ -214,13 +211,11 @@ def chosen_method(
     vehicle: Vehicle,
     seed: int | None = None,
     *,
-    without_v_y: bool = False,
     online: bool = False,
 ) -> tuple[str, Method]:
     """Return what --method, --paper or --design say, by the name of its results, or the default.
 
     seed : of initial weights; None where nobody asks for one.
-    without_v_y : whether a log has no lateral velocity, which changes the default.
     online : whether the default is the one that learns sample by sample.
     """
     method_is_given(options)
@@ -229,8 +224,7 @@ def chosen_method(
             raise ValueError(f"--seed is for a method: the seed of a design is in {options.design}")
         design = read_design(options.design)
         return design.law, design
-    usual = (WITHOUT_V_Y if without_v_y else LIVE) if online else DEFAULT
-    name = options.method or (REFERENCE if options.paper else usual)
+    name = options.method or (REFERENCE if options.paper else LIVE if online else DEFAULT)
     if seed is not None and not draws_weights(name):
         raise ValueError(f"--seed is of random initial weights, and {name} begins with none")
     return name, make_method(name, vehicle, seed or 0)
@@ -330,43 +324,3 @@ def _column_words(pairs: Sequence[str]) -> dict[str, str]:
             raise ValueError(f"--columns gives {name} twice")
         columns[name] = column
     return columns
-
-
-_CONVENTIONS = (
-    "A network of --network is static: its outputs are the lateral forces F_yf, F_yr of both tires "
-    "of an axle [N], left positive, frame of the body; its inputs are slip angles alpha_f, alpha_r "
-    "[rad] in the sign in which F_y = +C alpha, alpha = delta - (v_y +- l r)/v_x, or v_x, v_y "
-    "[m/s], r [rad/s], delta_f, delta_r [rad], all SI, not scaled. Input tensors that bear the "
-    "names of signals are taken by name, else two columns are alpha_f, alpha_r and five are v_x, "
-    "v_y, r, delta_f, delta_r. Tensors are float32 or float64, (columns,) or (batch, columns)."
-)
-
-
-def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
-    group = parser.add_argument_group("your tire network", _CONVENTIONS)
-    add_options(group, Path, {"--network FILE.onnx": what})
-    text = f"what its columns are, in order, of {', '.join(SIGNALS)}"
-    group.add_argument("--network-inputs", nargs="+", metavar="SIGNAL", help=text)
-    text = "its slip angles have the sign of ISO 8855, in which F_y = -C alpha"
-    add_options(group, bool, {"--network-iso": text})
-
-
-def network_model(
-    options: argparse.Namespace, vehicle: Vehicle, min_speed: float
-) -> OnnxModel | None:
-    """Return the network as a frozen model, None where there is none.
-
-    min_speed : below this speed [m/s] the forces read zero.
-    """
-    if options.network is None:
-        if options.network_inputs or options.network_iso:
-            raise ValueError("--network-inputs and --network-iso go with --network FILE.onnx")
-        return None
-    inputs = options.network_inputs
-    return OnnxModel.from_onnx(
-        options.network,
-        vehicle,
-        min_speed=min_speed,
-        inputs=None if inputs is None else tuple(inputs),
-        slip_sign=-1 if options.network_iso else 1,
-    )

@@ -38,7 +38,7 @@ def write_identify_report(
     diagnosis: Diagnosis,
     command: str,
 ) -> None:
-    """Write the report of what was learnt, or of a network that was judged."""
+    """Write the report of what was learnt."""
     learnt, model, verdict, asked = found.runs[0], found.model, found.verdict, found.asked
     notes = [*diagnosis_warnings(diagnosis), *identify_warnings(model, found.runs)]
     numbers = [

@@ -8,7 +8,6 @@ import pytest
 
 from identifier.export.onnx import MissingOnnxError, NoOnnxError, export_onnx, onnx_bytes
 from identifier.methods import make_method
-from identifier.own_network import OnnxModel
 from identifier.paper.network import SIGNALS, Network, NetworkModel, Weights
 from identifier.run import identify
 
@@ -88,8 +87,6 @@ def test_the_static_curve_of_the_axle_model(car, drive, single, tolerance):
     forces = np.hstack(session.run(["F_yf", "F_yr"], {"alpha_f": column, "alpha_r": column}))
     assert np.abs(expected).max() > 1000
     assert np.abs(forces - expected).max() < tolerance * np.abs(expected).max()
-    own = OnnxModel(vehicle=car, content=onnx_bytes(model, single=single))  # reads its own kind
-    assert onnx_bytes(own) == own.content
 
 
 def test_a_model_that_is_no_network_is_refused(car, drive):
@@ -101,8 +98,6 @@ def test_a_model_that_is_no_network_is_refused(car, drive):
 
 def test_without_the_package_it_says_what_to_install(car, rng, monkeypatch):
     model = frozen(car, Network(), rng)
-    content = onnx_bytes(model)
     monkeypatch.setitem(sys.modules, "onnx", None)
     with pytest.raises(MissingOnnxError, match="needs the package onnx: pip install onnx "):
         onnx_bytes(model)
-    assert OnnxModel(vehicle=car, content=content).min_speed == 1.0  # reading needs no package
