@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 import tireid as ti
-from identifier.baselines import CurveModel
 from identifier.export.package import build_package
 from identifier.methods import continuing, make_method
 from models.recordings import RecordingError
@@ -25,7 +24,7 @@ from tireid.cli import main
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
 HEAVY = {"matplotlib", "control", "scipy", "casadi", "numpy"}
-KINDS = ("axle", "integral", "linear", "magic_formula_ekf")
+KINDS = ("axle", "integral", "linear", "lagged_ekf")
 STATES = ((0.0, 0.0, 0.02), (0.3, 0.4, 0.05), (-1.2, 0.2, -0.1))  # v_y, r, delta
 
 
@@ -384,7 +383,7 @@ def test_force_is_what_a_straight_drifting_car_would_be_told(tires, car, name):
     small = name in ("integral", "linear")  # their slip angle is that of (3)
     v_y = -v_x * (alpha if small else np.tan(alpha))
     steering, bias = 0.0, 0.0  # of the sensors, where a model takes them off
-    if name == "axle" or isinstance(tire, CurveModel):
+    if name in ("axle", "lagged_ekf"):
         steering, bias = tire.offset
     v_y += bias
     drifting = ti.Recording(
@@ -507,7 +506,7 @@ def test_a_run_a_model_and_a_method_are_exported(run, car, tmp_path, monkeypatch
 
 
 def test_no_method_goes_on_from_a_curve(tires, tmp_path):
-    with pytest.raises(ValueError, match="no method can continue a CurveModel"):
+    with pytest.raises(ValueError, match="no method can continue a LinearModel"):
         ti.export(tires["linear"], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
