@@ -30,7 +30,10 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
         return source if vehicle is None else source._replace(vehicle=vehicle)
     if isinstance(source, Vehicle):
         return linear_tire(source if vehicle is None else vehicle, np.array(source.bicycle[4:]))
-    if isinstance(source, TireModel) and source.kind in MODELS:
+    if isinstance(source, TireModel):
+        if source.kind not in MODELS:
+            name = type(source).__name__
+            raise ValueError(f"the tracker takes no {name}: identify with fit, axle or integral")
         return prediction_tire(MODELS[source.kind](source), vehicle)
     for kind, of_tire in TIRES.items():
         if isinstance(source, kind):
