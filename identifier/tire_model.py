@@ -511,6 +511,7 @@ def drift(vehicle: Vehicle, slope: Any, v_x: Any) -> Any:
 MODELS: Mapping[str, tuple[str, str]] = {  # module and class by kind, imported where one is read
     "network": ("identifier.paper.network", "NetworkModel"),
     "axle": ("identifier.axle.model", "AxleModel"),
+    "linear": ("identifier.baselines.linear", "LinearModel"),
     "curve": ("identifier.baselines.curves", "CurveModel"),
     "fit": ("identifier.estimate.model", "FittedModel"),
 }

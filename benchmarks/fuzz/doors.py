@@ -47,7 +47,7 @@ LOGGER = IDENTIFY.replace("log.csv", "logger.csv")
 COMPARE = "compare log.csv --vehicle car.toml --out out --method"
 PREDICT = "predict --out out"
 PLAN = "plan --area 60x12 --speed 12 --time 1.5 --out out"
-FILTER = "--method magic_formula_ekf"
+FILTER = "--method lagged_ekf"
 DRIVE = "drive --path path.csv --speed 12m/s --film none --out out"
 FLEET = "fleet learn log.csv --vehicle car.toml --jobs 1 --out out"
 DOORS = (
@@ -99,7 +99,7 @@ DOORS = (
     _door("identify curve", 2, f"{IDENTIFY} {FILTER} --weights curve.json", CURVE),
     _door("drive axle", 4, f"{DRIVE} --weights axle.json", "axle.json"),
     _door("drive network", 3, f"{DRIVE} --weights network.json", "network.json"),
-    _door("drive curve", 2, f"{DRIVE} --weights curve.json", "curve.json"),
+    _door("predict curve", 2, f"{PREDICT} curve.json log.csv", "curve.json"),
     _door("drive learning", 1, f"{DRIVE} --tires learning --weights axle.json", "axle.json"),
     _door("predict axle", 4, f"{PREDICT} axle.json log.csv", "axle.json"),
     _door("predict network", 2, f"{PREDICT} network.json log.csv", "network.json"),

@@ -26,7 +26,7 @@ FROZEN = {  # file of weights, and the method that learnt it
     "axle.json": "axle",
     "fit.json": "fit",
     "network.json": "integral",
-    "curve.json": "magic_formula_ekf",
+    "curve.json": "lagged_ekf",
 }
 DESIGNS = {"integral.toml": "integral", "lead.toml": "pi_lead"}
 

@@ -10,74 +10,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse as sparse
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
-from scipy.sparse.linalg import splu
 
 from codegen.arrays import Array
 from codegen.escape import shown
 from models.schema import limits, read_text, require_few
 from mpc.path.chosen import CHOSEN
 from mpc.path.line import Line, PathError, uniform_grid
-
-
-def _smoothed(points: Array, *, closed: bool, distance: float, name: str) -> Array:
-    """Move way-points that were measured a little, so that a line through them bends gently.
-
-    Minimizes Σ |p - q|² + λ Σ g |D³ p|², D³ the third divided difference over the chord length:
-    what it leaves alone is a path of constant bending. λ is as large as the distance permits.
-    points : X, Y [m], (k, 2); where closed, the last repeats the first and will again.
-    distance : root mean square of how far they may move [m].
-    """
-    if len(points) < 4 + closed:
-        return points
-    roughness = _roughness(points, closed)
-    q = points[:-1] if closed else points
-    if closed and (size := _apart(q, q.mean(axis=0))) <= distance:
-        raise PathError(
-            f"{name}: smoothing must be less than {size:.3g} m, at which the closed line shrinks "
-            f"to a point, it is {distance}"
-        )
-    one = sparse.identity(len(q), format="csc")
-    gap = float(np.mean(np.hypot(*np.diff(points, axis=0).T)))
-
-    def moved(exponent: float) -> Array:
-        far = np.full_like(q, np.inf)
-        try:
-            p = np.asarray(splu(one + 10.0**exponent * gap**6 * roughness).solve(q))
-        except RuntimeError:  # singular
-            return far
-        # The mean stays where it is, but for rounding where λ is too large to be solved for.
-        return p if np.abs(np.mean(p - q, axis=0)).max() < 1e-3 * min(gap, distance) else far
-
-    low, high = CHOSEN.least, CHOSEN.most
-    for _ in range(CHOSEN.halvings):  # the distance grows with λ
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if _apart(moved(middle), q) < distance else (low, middle)
-    p = moved(low)
-    return np.vstack((p, p[:1])) if closed else p
-
-
-def _apart(p: Array, q: Array) -> float:
-    """Return the root mean square distance of points (k, 2) [m]."""
-    return float(np.sqrt(np.mean(np.sum((p - q) ** 2, axis=1))))
-
-
-def _roughness(points: Array, closed: bool) -> Any:
-    """Return D' G D of the third divided differences D, weighted by the gaps G."""
-    gaps = np.hypot(*np.diff(points, axis=0).T)
-    if not closed:
-        gaps = np.append(gaps, np.inf)  # differences across the open ends become zero
-    n = gaps.size
-    D: Any = sparse.identity(n, format="csr")
-    around = sparse.csr_matrix((np.ones(n), (np.arange(n), (np.arange(n) + 1) % n)), (n, n))
-    span = np.zeros(n)
-    for order in range(3):
-        span = span + np.roll(gaps, -order)
-        D = sparse.diags(1.0 / span) @ (around @ D - D)
-    return (D.T @ sparse.diags(np.where(np.isfinite(span), span, 0.0) / 3.0) @ D).tocsc()
-
 
 _LOBES, _SHARES = np.polynomial.legendre.leggauss(8)  # nodes on -1 to 1, and weights
 
@@ -104,22 +44,16 @@ def line_through(
     closed: bool,
     name: str,
     spacing: float,
-    smoothing: float,
     minimum_radius: float,
 ) -> Line:
     """Draw the line; the arguments and errors are those of `Path.from_waypoints`.
     X : of the way-points [m], (k,).   Y : of the way-points [m], (k,).
     spacing : longest step of the samples [m].
-    smoothing : root mean square distance that the line may keep from the way-points [m].
     minimum_radius : tightest turn allowed [m].
     """
     if not minimum_radius > 0.0:
         raise PathError(f"{name}: minimum_radius must be positive, it is {minimum_radius}")
     points = _checked(X, Y, closed, name)
-    if not (smoothing >= 0.0 and np.isfinite(smoothing)):
-        raise PathError(f"{name}: smoothing must be finite and not negative, it is {smoothing}")
-    if smoothing > 0.0:
-        points = _smoothed(points, closed=closed, distance=smoothing, name=name)
     spline = _fit(points, closed)
     line = sample(spline, spline.x, spacing, name)
     # A spike between two samples shows in the heading alone.
@@ -130,7 +64,7 @@ def line_through(
         raise PathError(
             f"{name}: no turn may be tighter than {minimum_radius} m, at s = "
             f"{line.s[tightest]:.4g} m, X = {line.X[tightest]:.4g}, Y = {line.Y[tightest]:.4g} "
-            f"the radius is {1.0 / bend[tightest]:.3g} m; smooth or move the way-points"
+            f"the radius is {1.0 / bend[tightest]:.3g} m; move the way-points"
         )
     return line
 

@@ -53,7 +53,7 @@ def tiled(recording, times):
     )
 
 
-@pytest.mark.parametrize("method", ["axle", "integral", "magic_formula_ekf"])
+@pytest.mark.parametrize("method", ["axle", "integral", "lagged_ekf"])
 def test_a_run_in_blocks_has_the_bits_of_one_in_a_piece(whole, method, request):
     design = make_method(method, CAR)
     piece = identify(whole, CAR, design)

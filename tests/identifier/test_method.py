@@ -91,7 +91,7 @@ def test_the_force_unit_of_a_method_stands_in_the_units_of_its_ports():
 
 
 def test_a_step_with_an_output_or_state_that_nobody_describes_is_not_exported(monkeypatch):
-    method = make_method("magic_formula_ekf", CAR)
+    method = make_method("lagged_ekf", CAR)
     ports = tuple(port for port in method.ports if port.name != "estimate")
     monkeypatch.setattr(type(method), "ports", ports)
     with pytest.raises(KeyError, match="estimate"):

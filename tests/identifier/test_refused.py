@@ -158,7 +158,7 @@ def test_forces_are_zero_and_stale_after_half_a_second_without_a_sample(name, sl
 
 
 def test_a_held_force_is_told_until_it_is_stale(slalom):
-    rows, method = rows_of(slalom)[:421], make_method("magic_formula_ekf", CAR)
+    rows, method = rows_of(slalom)[:421], make_method("lagged_ekf", CAR)
     rows[400:, 1] = np.inf
     online = OnlineIdentifier(method, CAR, 0.01, stale_time=0.2)
     forces = np.array([update(online, row) for row in rows])
@@ -171,7 +171,7 @@ def test_a_held_force_is_told_until_it_is_stale(slalom):
 @pytest.mark.parametrize("time", [0.0, -1.0, np.nan, np.inf])
 def test_a_time_that_is_none_is_refused(time):
     with pytest.raises(ValueError, match="stale_time must be positive and finite"):
-        OnlineIdentifier(make_method("magic_formula_ekf", CAR), CAR, 0.01, stale_time=time)
+        OnlineIdentifier(make_method("lagged_ekf", CAR), CAR, 0.01, stale_time=time)
 
 
 def test_a_run_that_is_begun_anew_stays_stale_until_a_sample_comes(slalom):

@@ -136,8 +136,8 @@ def test_the_frozen_network_lies_beside_the_c(tmp_path):
         (["--method", "linear"], "formula without state"),
         (["--paper", "--method", "axle"], "give only one of --method, --paper"),
         (["--weights", "missing.json"], "missing.json"),
-        rival(["--method", "washout", "--onnx"], "--onnx"),
-        (["--method", "magic_formula_ekf", "--with-a-y"], "has no use for a_y"),
+        rival(["--method", "linear_kf", "--onnx"], "--onnx"),
+        (["--method", "integral", "--with-a-y"], "has no use for a_y"),
     ],
 )
 def test_bad_words_are_one_line_and_leave_nothing(words, complaint, tmp_path, capsys):

@@ -82,7 +82,7 @@ def test_the_tracker_begins_with_learnt_weights_and_another_car(tmp_path, logs):
     assert manifest["params"]["car"] == list(CAR.bicycle[:4])
 
 
-@pytest.mark.parametrize("law", [rival("washout"), "magic_formula_ekf"])
+@pytest.mark.parametrize("law", [rival("linear_kf"), "lagged_ekf"])
 def test_a_method_without_a_tire_for_c_is_refused_in_one_line(law, tmp_path, capsys):
     out = tmp_path / "package"
     assert main(["export", "--out", str(out), "--mpc", "--method", law]) == 2

@@ -428,7 +428,7 @@ def test_recordings_whose_files_would_be_the_same_are_refused(logs, tmp_path, ca
         (["--columns", "yaw_rate"], "--columns wants NAME=COLUMN"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
         (["--vehicle", "slalom.csv"], "--vehicle slalom.csv: must be the .toml of a car"),
-        rival(["--method", "washout"], "not a tire"),
+        rival(["--method", "linear_kf"], "not a tire"),
     ],
 )
 def test_wrong_words_are_one_clear_line_and_leave_nothing(logs, tmp_path, capsys, extra, said):
@@ -621,7 +621,7 @@ def test_a_valid_answer_says_so_with_what_each_number_is_worth(result, law):
         assert states["cornering stiffness", "front"] == "valid"
 
 
-@pytest.mark.parametrize("law", ["axle", "integral", "magic_formula_ekf"])
+@pytest.mark.parametrize("law", ["axle", "integral", "lagged_ekf"])
 def test_the_stiffness_of_a_slide_is_the_slope_of_the_steady_curve(law):
     car = sedan()
     method = make_method(law, car)

@@ -12,12 +12,12 @@ from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
-from tests.rivals import INSTALLED, needs_rivals, rival
+from tests.rivals import INSTALLED, rival
 from tireid.cli import main
 from tireid.figures.side_slip import side_slip_figure
 
 CAR = sedan()
-TOLD = (*("linear_kf", "joint_ekf", "washout") * INSTALLED, "inertial")
+TOLD = (*("linear_kf", "joint_ekf") * INSTALLED, "inertial")
 
 
 @pytest.fixture(scope="module")
@@ -68,8 +68,6 @@ def test_the_table_has_a_column_of_side_slip_and_a_dash_for_methods_that_read_it
     at = head.index("side slip")
     rows = {line.split()[0]: line[at:].split() for line in lines}
     assert rows["linear"][:2] == ["-", "-"]
-    if INSTALLED:
-        assert rows["washout"][1] == "-"
     for name in TOLD:
         told = [one["rms_deg"] for one in methods[name]["side_slip"].values()]
         assert rows[name][0] == f"{np.mean(told):.3f}"
@@ -89,9 +87,8 @@ def test_without_a_method_that_tells_there_is_no_figure(logs, tmp_path, undrawn)
     assert not (tmp_path / "out" / "side_slip.png").exists()
 
 
-@needs_rivals
 def test_a_sample_too_slow_does_not_count_and_one_that_is_off_does(slalom):
-    history = identify(slalom, CAR, make_method("washout", CAR))
+    history = identify(slalom, CAR, make_method("inertial", CAR))
     found = side_slip(history, 1.0, slalom.v_y)
     moved = slalom.v_y.copy()
     moved[100] += 9.0

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from identifier.compare.study import cannot_learn, run_comparison
-from identifier.methods import DEFAULT, methods, require_method
+from identifier.methods import DEFAULT, INSTALL, RIVALS, methods, require_method
 from identifier.run import History
 from identifier.verdict import Verdict, judge
 from models.recordings import Recording, RecordingError
@@ -58,6 +58,9 @@ def run(options: argparse.Namespace) -> int:
     seed, names = shared.seed_of(options), list(dict.fromkeys(options.method or methods()))
     for name in names:
         require_method(name)
+    absent = [name for name in RIVALS if name not in methods()]
+    if absent and not options.method:
+        say(f"without {', '.join(absent)}, which are not installed: {INSTALL}")
     if options.logs and options.vehicle is None:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
     watch = Stopwatch()

@@ -37,7 +37,7 @@ def test_sample_by_sample_is_the_whole_recording(packages, slalom, law):
     assert one.state == all_at_once.state
 
 
-@pytest.mark.parametrize("law", ["integral", "axle", "magic_formula_ekf"])
+@pytest.mark.parametrize("law", ["integral", "axle"])
 def test_frozen_c_is_the_frozen_model(law, packages, slalom):
     method = make_method(law, CAR)
     run = CompiledPackage.of(packages[law])

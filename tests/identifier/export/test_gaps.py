@@ -18,8 +18,8 @@ from tests.kept import Kept
 from tests.rivals import INSTALLED
 
 CAR = sedan()
-TOLD = ("linear_kf", "washout") * INSTALLED
-OTHERS = ("magic_formula_ekf", *TOLD)
+TOLD = ("linear_kf",) * INSTALLED
+OTHERS = ("lagged_ekf", *TOLD)
 LAWS = ("axle", "integral", *OTHERS, BANKED, "inertial")
 TELL_V_Y = (*TOLD, "inertial")
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")

@@ -91,7 +91,7 @@ def test_the_static_curve_of_the_axle_model(car, drive, single, tolerance):
 
 def test_a_model_that_is_no_network_is_refused(car, drive):
     recording = drive(100)
-    model = identify(recording, car, make_method("magic_formula_ekf", car)).freeze(recording.t[-1])
+    model = identify(recording, car, make_method("lagged_ekf", car)).freeze(recording.t[-1])
     with pytest.raises(NoOnnxError, match="CurveModel has no ONNX form"):
         onnx_bytes(model)
 

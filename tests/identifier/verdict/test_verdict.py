@@ -260,7 +260,7 @@ def test_a_prediction_is_refused_where_neither_axle_shows_a_force(clean, drive):
 
 @pytest.mark.parametrize(
     ("name", "valid"),
-    [("axle", True), ("magic_formula_ekf", True), ("integral", False), ("linear", False)],
+    [("axle", True), ("lagged_ekf", True), ("integral", False), ("linear", False)],
 )
 def test_every_method_that_freezes_has_a_verdict(drive, name, valid):
     """Where it is valid, the axles miss less than a seventh of the true force."""

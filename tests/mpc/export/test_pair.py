@@ -235,7 +235,7 @@ def test_a_curve_that_falls_is_no_tire(taught, pairs, libraries):
 
 
 @pytest.mark.parametrize(
-    ("law", "complaint"), [rival("washout", "no tire"), ("magic_formula_ekf", "CurveModel")]
+    ("law", "complaint"), [rival("linear_kf", "no tire"), ("lagged_ekf", "CurveModel")]
 )
 def test_what_cannot_be_handed_over_is_said(law, complaint):
     with pytest.raises(NoHandoverError, match=complaint):

@@ -70,13 +70,3 @@ def test_files_that_are_none_are_named(tmp_path):
     (tmp_path / "binary.csv").write_bytes(b"x,y\n\xff\xfe\n")
     with pytest.raises(PathError, match="UTF-8"):
         Path.from_csv(tmp_path / "binary.csv")
-
-
-def test_spacing_and_smoothing_are_those_of_the_caller(tmp_path):
-    rng = np.random.default_rng(3)
-    rough = [(x + 0.05 * rng.normal(), y + 0.05 * rng.normal()) for x, y in RING]
-    file = write(tmp_path, f"x,y\n{rows(rough)}")
-    fine, coarse = (Path.from_csv(file, spacing=step) for step in (0.2, 0.8))
-    assert np.diff(fine.s).max() <= 0.2 + 1e-9 < np.diff(coarse.s).max() <= 0.8 + 1e-9
-    smooth = Path.from_csv(file, smoothing=0.1)
-    assert np.ptp(smooth.kappa) < 0.7 * np.ptp(Path.from_csv(file, smoothing=0.0).kappa)

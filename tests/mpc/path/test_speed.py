@@ -72,7 +72,7 @@ def test_limits_must_be_positive(name, value):
     with pytest.raises(PathError, match=f"{name} must be positive"):
         grip_speed(Path.from_waypoints([0.0, 9.0], [0.0, 0.0]), **{**LIMITS, name: value})
     with pytest.raises(PathError, match="share must be positive"):
-        steady_speed(handling_course(spacing=1.0), a_y_max=1.0, share=value)
+        steady_speed(handling_course(), a_y_max=1.0, share=value)
 
 
 def test_a_circle_is_a_turn_however_wide_it_is():

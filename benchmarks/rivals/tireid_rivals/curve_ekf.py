@@ -17,25 +17,26 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.baselines.chosen import CHOSEN
-from identifier.baselines.curves import CURVES, CurveModel, measured_slip, unlagged
-from identifier.baselines.kalman import CARRY, PORTS, correct, midpoint
-from identifier.baselines.ports import (
-    LAG_DESCRIBED,
+from identifier.baselines.curves import (
     LAG_PORTS,
     OVER,
-    axle_loads,
+    CurveModel,
+    LaggedSlip,
     lag_symbols,
     lagged_slip,
-    motion_rate,
+    magic_formula,
+    measured_slip,
     sample_ports,
+    unlagged,
+    wheel_slip,
 )
+from identifier.baselines.lagged_ekf import CARRY, PORTS, SHAPE, axle_loads, midpoint, motion_rate
 from identifier.method import Method
 from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters
 from models.rules import require_positive
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import Vehicle
 
 # Numbers without limits for parameters that have some: what a filter may add noise to.
 #
@@ -43,13 +44,13 @@ from models.vehicle import GRAVITY, Vehicle
 # friction positive; a logistic keeps the Magic Formula's shape C between 1 and 2, where the force
 # has a peak and keeps its sign.
 
-_LOGIT = math.log((CHOSEN.typical_shape - 1.0) / (2.0 - CHOSEN.typical_shape))
-_STIFFNESS, _SHAPE, _FRICTION = range(3)
-
-
-_SPREADS = ("stiffness_spread", "shape_spread", "friction_spread")  # in the order of the kinds
-KINDS = (_STIFFNESS, _STIFFNESS, _SHAPE, _SHAPE, _FRICTION, _FRICTION)  # of each θ of the curve
-MAGIC = CURVES["magic_formula"]
+_LOGIT = math.log((SHAPE - 1.0) / (2.0 - SHAPE))
+_SPREADS = ("stiffness_spread", "shape_spread", "friction_spread")
+KINDS = (0, 0, 1, 1, 2, 2)  # of each θ of the curve, in the order of the spreads
+LIMITS = (2.0, 3.0, 1.5)  # of |θ| by kind: stiffness within a factor of 7.4, friction 4.5
+LAG_LIMIT = 2.0  # of |ln σ/σ₀|: a relaxation length within a factor of 7.4
+OFFSET_LIMITS = (5.0, 8.0)  # spreads of δ₀ and of b: 0.01 rad, for a sedan 0.2 m/s
+OWN = 4  # unknowns beside those of the curve: ln σ/σ₀ (2,), δ₀ and b over their spreads
 
 
 def _decoded(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any:
@@ -58,6 +59,29 @@ def _decoded(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any
     C = 1 + 1 / (1 + ca.exp(-theta[2:4] - _LOGIT))
     D = friction * loads * ca.exp(theta[4:6])
     return ca.horzcat(slope / (C * D), C, D)
+
+
+def _correct(
+    estimate: Any, P: Any, R: Any, x: Any, outlier: Any, *, follow: bool
+) -> tuple[Any, Any]:
+    """Return estimate and covariance after the measurement of the first two states.
+
+    An innovation beyond `outlier` standard deviations counts as one at that distance.
+    estimate : before, (n,).   P : its covariance (n, n).
+    R : covariance of the measurement (2, 2).   x : the measurement (2,).
+    follow : whether it counts for the first two all the same.
+    """
+    S = P[:2, :2] + R
+    gain = P[:, :2] @ ca.inv_minor(S)
+    innovation = x - estimate[:2]
+    deviation = ca.sqrt(ca.vertcat(S[0, 0], S[1, 1]))
+    trusted = ca.fmin(ca.fmax(innovation, -outlier * deviation), outlier * deviation)
+    leading = innovation if follow else trusted
+    move = ca.vertcat(gain[:2, :] @ leading, gain[2:, :] @ trusted)
+    keep = ca.SX.eye(estimate.numel())
+    keep[:, :2] -= gain
+    after = keep @ P @ keep.T + gain @ R @ gain.T  # Joseph
+    return estimate + move, (after + after.T) / 2
 
 
 _NOISE = ("v_y_noise", "r_noise", "v_y_disturbance", "r_disturbance", "outlier")
@@ -78,7 +102,7 @@ def _build_step(textbook: bool) -> ca.Function:
     textbook : whether it is without lag and offsets; then θ is that of the curve alone.
     """
     s, of_curve = sample_ports(), len(KINDS)
-    lags, own, prior = (0, 0, 1) if textbook else (2, CHOSEN.own, 1 + len(_OWN_PRIOR))
+    lags, own, prior = (0, 0, 1) if textbook else (2, OWN, 1 + len(_OWN_PRIOR))
     unknowns = of_curve + own
     p, dt, n = s.parameters, s.sampling[0], 2 + lags + unknowns
     estimate, P, before = ca.SX.sym("estimate", n), ca.SX.sym("P", n, n), ca.SX.sym("before", 3)
@@ -86,16 +110,16 @@ def _build_step(textbook: bool) -> ca.Function:
     walk, limit = ca.SX.sym("walk", unknowns), ca.SX.sym("limit", unknowns)
     known, learning_speed = ca.SX.sym("prior", prior), ca.SX.sym("learning_speed")
     moved, theta = estimate[: 2 + lags], estimate[2 + lags :]
-    x, loads = estimate[:2], axle_loads(p, GRAVITY)
+    x, loads = estimate[:2], axle_loads(p)
     learning = s.v_x >= learning_speed
 
     def slip_of(v_x: Any, x: Any, u: Any) -> Any:
         if textbook:
-            return MAGIC.slip(p, v_x, x, u)
-        return measured_slip(MAGIC, p, known[2:4] * theta[of_curve + 2 :], v_x, x, u)
+            return wheel_slip(p, v_x, x, u)
+        return measured_slip(p, known[2:4] * theta[of_curve + 2 :], v_x, x, u)
 
     def force_of(slip: Any, u: Any) -> Any:
-        return MAGIC.force(_decoded(p, known[0], loads, theta[:of_curve]), loads, slip, u)
+        return magic_formula(_decoded(p, known[0], loads, theta[:of_curve]), slip, u)
 
     u_mean = (before[:2] + s.u) / 2
     v_mean = ca.fmax((before[2] + s.v_x) / 2, learning_speed)
@@ -109,7 +133,7 @@ def _build_step(textbook: bool) -> ca.Function:
     F = ca.jacobian(ahead, estimate)
     Q = ca.diag(ca.vertcat(noise[2:4], ca.SX(lags, 1), walk) ** 2 * dt)
     R = ca.diag(noise[:2] ** 2)
-    found, P_found = correct(ahead, F @ P @ F.T + Q, R, s.x, noise[4], follow=textbook)
+    found, P_found = _correct(ahead, F @ P @ F.T + Q, R, s.x, noise[4], follow=textbook)
 
     going = ca.logic_and(learning, running > 0.5)
     lagged = alpha_now = slip_of(s.speed, s.x, s.u)
@@ -147,7 +171,7 @@ def _build_step(textbook: bool) -> ca.Function:
 
 
 def _carry(textbook: bool) -> tuple[str, ...]:
-    return CARRY if textbook else (*CARRY, *LAG_PORTS)
+    return CARRY if textbook else (*CARRY, *LaggedSlip._fields)
 
 
 @cache
@@ -229,7 +253,7 @@ class CurveEkf(Method):
     @property
     def ports(self) -> tuple[Port, ...]:
         """Outputs and state of its step, axle_force first."""
-        return PORTS if self.textbook else (*PORTS, *LAG_DESCRIBED)
+        return PORTS if self.textbook else (*PORTS, *LAG_PORTS)
 
     @property
     def remark(self) -> str:
@@ -275,21 +299,17 @@ class CurveEkf(Method):
     @property
     def limit(self) -> Array:
         """What the unknowns θ stay within, (n,) [-]."""
-        of_curve = [CHOSEN.limits[kind] for kind in KINDS]
-        own = [] if self.textbook else [CHOSEN.lag_limit, CHOSEN.lag_limit, *CHOSEN.offset_limits]
+        of_curve = [LIMITS[kind] for kind in KINDS]
+        own = [] if self.textbook else [LAG_LIMIT, LAG_LIMIT, *OFFSET_LIMITS]
         return np.array([*of_curve, *own])
 
-    def model(self, vehicle: Vehicle, theta: Array) -> CurveModel:
-        """Return the curve, its lag and its offsets that unknowns make.
-        theta : unknowns, (n,).
-        """
-        n, loads = len(KINDS), ca.DM(vehicle.axle_loads)
+    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
+        """Return the curve with the carried parameters, lag and offsets."""
+        theta, n = state["estimate"].ravel()[-self.limit.size :], len(KINDS)
+        loads = ca.DM(vehicle.axle_loads)
         values = _decoded(vehicle.bicycle, self.friction, loads, ca.DM(theta[:n]))
         curve = CurveModel(
-            vehicle=vehicle,
-            curve="magic_formula",
-            parameters=np.array(ca.DM(values)),
-            min_speed=self.min_speed,
+            vehicle=vehicle, parameters=np.array(ca.DM(values)), min_speed=self.min_speed
         )
         if self.textbook:
             return curve
@@ -299,14 +319,3 @@ class CurveEkf(Method):
             relaxation_length=self.relaxation_length * np.exp(lag),
             offset=offset * (self.steering_spread, self.v_y_spread),
         )
-
-    def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
-        """Return the curve with the carried parameters, lag and offsets."""
-        return self.model(vehicle, state["estimate"].ravel()[-self.limit.size :])
-
-
-def magic_formula_ekf(vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = False) -> CurveEkf:
-    """Return the method for a car.
-    vehicle : the car; its stiffness B C D is the prior.   dt : sampling interval [s].
-    """
-    return CurveEkf.for_vehicle(vehicle, dt=dt, textbook=textbook)
