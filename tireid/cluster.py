@@ -43,7 +43,7 @@ def cluster(address: str) -> Iterator[Map]:
     try:
         _require_workers(client, address)
         _tell_of_idle_threads(client, address)
-        yield partial(_map, dask, client, address)
+        yield partial(_map, dask, client)
     finally:
         client.close()
 
@@ -80,22 +80,18 @@ def _tell_of_idle_threads(client: Any, address: str) -> None:
 def _map(
     dask: Any,
     client: Any,
-    address: str,
     work: Callable[[Any], Any],
     items: Iterable[Any],
-    *,
-    lost: Callable[[Any], None] | None = None,
+    lost: Callable[[Any], None],
 ) -> Iterator[Any]:
-    """Yield results; `lost` gets items that several workers died of, None ends with an error."""
+    """Yield results; `lost` gets items that several workers died of."""
     shared = client.scatter(work, broadcast=True, hash=False)  # once to each worker
     futures = {client.submit(_work_alone, shared, item, pure=False): item for item in items}
     try:
         for future in dask.as_completed(list(futures), loop=client.loop):
             try:
                 result = future.result()
-            except dask.KilledWorker as error:
-                if lost is None:
-                    raise ClusterError(f"{address}: workers die of their work: {error}") from error
+            except dask.KilledWorker:
                 lost(futures[future])
                 continue
             yield result

@@ -22,11 +22,7 @@ from identifier.stability.operation import proven_bounds
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS, DONE, FAILS
 from tireid.commands import options as shared
-from tireid.commands.certificate_table import (
-    certificate_text,
-    method_text,
-    unit_text,
-)
+from tireid.commands.certificate_table import certificate_text, method_text, unit_text
 from tireid.commands.demo_story import drive_to_learn
 from tireid.figures.paper import error_figure, locus_figure
 from tireid.figures.style import paper_design, save_figures
