@@ -230,7 +230,7 @@ class ByHand:
         self.evidence = kept * self.evidence + new
         self.ln_friction += change
         squared, told = np.minimum(error**2 / V, 25), (error / sd) ** 2
-        self.fast += dt / c.fast * (squared - self.fast)
+        self.fast += min(dt / c.fast, 1) * (squared - self.fast)
         self.trend += dt / c.trend * (np.maximum(squared, 1) - self.trend)
         self.slow += dt / c.slow * (np.minimum(told, 4 * self.slow) - self.slow)
         self.slow = np.clip(self.slow, 1, 4)
