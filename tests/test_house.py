@@ -121,6 +121,7 @@ def test_the_table_of_the_page_is_what_was_kept():
     assert house.written(page, other) != page
 
 
+@pytest.mark.heavy
 def test_the_table_is_of_this_tree_but_for_small_changes():
     now = house.counts(ROOT)
     far = {
@@ -136,6 +137,7 @@ def test_a_command_that_fails_stops_with_what_it_said(tmp_path):
         house.archived("no-such-revision", tmp_path)
 
 
+@pytest.mark.heavy
 def test_imports_are_timed_against_an_empty_python(tmp_path, monkeypatch):
     monkeypatch.setattr(house, "STARTS", 3)
     (tmp_path / "tireid").mkdir()

@@ -49,6 +49,7 @@ def test_what_was_learnt_from_a_log_predicts_another_drive(executed):
     assert executed["again"].to_dict() == executed["tire"].to_dict()
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("executed", ["from_a_tire_to_a_controller"], indirect=True)
 def test_controllers_on_a_learnt_tire_steer_and_its_c_passes_its_own_test(executed):
     assert 0.0 < executed["furthest"]["identified"] < 0.25 * executed["LANE"]

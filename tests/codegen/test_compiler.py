@@ -127,6 +127,7 @@ def require_a_new_one(library, caplog):
     assert list(library.parent.iterdir()) == [library]
 
 
+@pytest.mark.sweep("0.0", "0.5", "0.9545*", "0.0909*")
 @pytest.mark.parametrize("share", [i / 22 for i in range(22)])
 def test_a_library_that_was_cut_short_is_built_anew(cache, caplog, share):
     library = build_library(ONE, "one")

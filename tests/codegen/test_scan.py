@@ -34,6 +34,7 @@ def test_scan_repeats_the_loop_by_hand(scan, values, n, every):
         np.testing.assert_array_equal(values[port], value)
 
 
+@pytest.mark.sweep("compiled-1-ports[02]", "compiled-3-ports[13]")
 @pytest.mark.parametrize("ports", [(), ("s",), ("corner",), ("M", "y")])
 @pytest.mark.parametrize("every", [1, 3])
 def test_what_is_recorded_alone_has_the_bits_that_it_has_among_all(scan, values, ports, every):

@@ -54,6 +54,7 @@ def test_only_the_leakage_forgets_a_slalom_on_five_minutes_of_a_straight_road(ke
         assert gained[1] > 0.95 * gained[0]
 
 
+@pytest.mark.sweep("rk4-integral", "euler-pi_lead", "euler-instantaneous")
 @pytest.mark.parametrize("law", ["integral", "instantaneous", "pi_lead"])
 @pytest.mark.parametrize("integrator", ["euler", "rk4"])
 def test_every_keeping_of_a_found_design_passes_its_certificate(law, integrator):

@@ -183,6 +183,7 @@ def least_squares(method, car, y, u, v, start, iterations):
     return flat[-6:]
 
 
+@pytest.mark.heavy
 def test_the_horizon_minimizes_its_cost(car, drive):
     recording = felt(drive(n=12, amplitude=1.2))
     method = short_horizon(car, samples=12, iterations=10)

@@ -75,6 +75,7 @@ def test_what_is_used_is_imported_and_drawing_still_is_not():
     assert "casadi" in packages and "matplotlib" not in packages
 
 
+@pytest.mark.sweep("identify*")
 @pytest.mark.parametrize(
     ("command", "unwanted"),
     [
@@ -428,6 +429,7 @@ def test_the_equations_of_motion_are_those_of_the_tracker(tires, name):
         assert np.allclose(np.array(ours).ravel(), np.array(told).ravel()[rows], rtol=1e-9)
 
 
+@pytest.mark.sweep("axle", "linear")
 @pytest.mark.parametrize("name", KINDS)
 def test_the_step_integrates_the_equations_of_motion(tires, name):
     tire = tires[name]
@@ -487,6 +489,7 @@ def test_representations_are_short(tires, run, log, car):
     assert "sedan" in repr(tires["axle"])
 
 
+@pytest.mark.heavy
 def test_a_run_a_model_and_a_method_are_exported(run, car, tmp_path, monkeypatch):
     monkeypatch.setattr("tireid.exporting.measure", lambda *_: [])  # has tests of its own
     written = ti.export(run, tmp_path / "run", name="axle")
@@ -512,6 +515,7 @@ def test_no_method_goes_on_from_a_curve(tires, tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.heavy
 def test_learnt_tires_steer_better_than_linear_ones(car):
     log = ti.sample_recording(car)
     tire, path = ti.identify(log, car).freeze(), ti.paths.iso_3888_2()

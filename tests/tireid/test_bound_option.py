@@ -74,6 +74,7 @@ def test_a_bound_that_is_told_is_taken_or_refused_in_one_line(words, tmp_path, c
         assert not (tmp_path / "no").exists()
 
 
+@pytest.mark.sweep("fit")
 @pytest.mark.parametrize("method", ["fit", "integral"])
 def test_a_method_without_such_curves_says_so(words, tmp_path, capsys, undrawn, method):
     assert main([*words, method, "--bound", "--out", str(tmp_path / "out")]) == 0

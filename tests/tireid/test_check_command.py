@@ -234,6 +234,7 @@ def test_advice_is_given_for_what_does_not_pass_and_says_what_to_do():
     assert told.endswith("verdict: fail")
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("keeping", KEEPINGS)
 def test_weights_of_a_found_design_are_kept_as_asked(capsys, tmp_path, keeping):
     path = tmp_path / "design.toml"

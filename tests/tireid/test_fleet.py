@@ -498,6 +498,7 @@ def harmless(tasks):
     return telling, {task.vehicle: Car.read(task.vehicle, telling) for task in tasks}
 
 
+@pytest.mark.heavy
 def test_a_log_that_kills_its_process_costs_its_own_row_alone():
     tasks, _ = find_logs(["red/summer/2026-03-02-*.csv", "red/summer/*-03-quick.csv"], CAR, TAGS)
     work = Deadly(*harmless(tasks))
@@ -525,6 +526,7 @@ def test_a_log_that_kills_workers_of_a_cluster_costs_its_own_row_alone():
     assert [row.log for row in rows if "died" in row.error] == [str(Path(DEADLY).absolute())]
 
 
+@pytest.mark.heavy
 def test_a_dask_worker_that_is_killed_loses_nothing_and_the_bytes_are_the_same(tmp_path):
     pytest.importorskip("distributed", reason="needs Dask")
     tasks, _ = find_logs(["*/*/*.csv"], CAR, TAGS)

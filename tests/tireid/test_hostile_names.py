@@ -78,6 +78,7 @@ def test_a_name_is_a_comment_in_what_other_tools_read(name, tmp_path):
         assert [line.startswith("$") for line in lines] == [k < 9 for k in range(len(lines))]
 
 
+@pytest.mark.sweep("an order to cmake")
 @pytest.mark.skipif(which("cmake") is None, reason="needs cmake")
 @pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
 def test_a_package_is_built_and_nothing_else_is_run(name, tmp_path, monkeypatch):
@@ -93,6 +94,7 @@ def test_a_package_is_built_and_nothing_else_is_run(name, tmp_path, monkeypatch)
             assert text.replace("\n", "").isprintable(), file
 
 
+@pytest.mark.heavy
 @pytest.mark.skipif(which("cmake") is None, reason="needs cmake")
 def test_identifier_and_tracker_are_built_and_nothing_else_is_run(tmp_path, monkeypatch):
     if find_compiler() is None:
@@ -110,6 +112,7 @@ def test_identifier_and_tracker_are_built_and_nothing_else_is_run(tmp_path, monk
     assert not list(tmp_path.rglob("ran"))
 
 
+@pytest.mark.heavy
 def test_an_fmu_is_loaded_and_nothing_in_it_is_run(tmp_path, monkeypatch):
     fmpy = pytest.importorskip("fmpy")
     if find_compiler() is None:

@@ -104,6 +104,7 @@ def test_a_log_without_forces_is_judged_against_what_is_learnt(
     assert summary["rmse_N"]["frozen"]["network"]["blind"] is None
 
 
+@pytest.mark.heavy
 def test_other_signs_and_orders_are_told_by_options(words, tmp_path, undrawn):
     results = {}
     for name, shape, options in (
@@ -155,6 +156,7 @@ def test_a_network_cannot_be_learnt_on_from_a_model():
         FrozenMethod(model=method).setup(CAR, start=object())
 
 
+@pytest.mark.sweep("not a network*", "content[24]*")
 @pytest.mark.parametrize(
     ("content", "options", "complaint"),
     [

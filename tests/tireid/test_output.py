@@ -383,6 +383,7 @@ def test_of_twenty_runs_to_one_folder_exactly_one_wins(tmp_path):
     assert ran(textwrap.dedent(FORKED) + textwrap.dedent(program), tmp_path) == ["out"]
 
 
+@pytest.mark.sweep("True")
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 @pytest.mark.parametrize("at_once", [True, False])
 def test_a_run_that_is_killed_leaves_the_old_folder_or_the_new_one(tmp_path, at_once):

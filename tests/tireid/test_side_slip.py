@@ -50,6 +50,7 @@ def by_hand(name, recording):
     return np.degrees(np.sqrt((slip**2).mean())), None if sd is None else (away <= 2 * sd).mean()
 
 
+@pytest.mark.heavy
 def test_errors_of_side_slip_are_those_of_the_outputs(methods, logs):
     for name in TOLD:
         for log in ("slalom", "quick"):
@@ -61,6 +62,7 @@ def test_errors_of_side_slip_are_those_of_the_outputs(methods, logs):
     assert methods["linear"]["side_slip"] == {}
 
 
+@pytest.mark.heavy
 def test_the_table_has_a_column_of_side_slip_and_a_dash_for_methods_that_read_it(result, methods):
     page = outline((result / "report.html").read_text(encoding="utf-8")).text
     head, *lines = (result / "tables.txt").read_text().splitlines()[1 : 3 + len(TOLD)]
@@ -122,6 +124,7 @@ def test_a_comparison_shows_no_lateral_velocity_to_a_method_that_tells_it(name, 
     assert (found == other) == (name != "axle")
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("method", ["inertial", rival("joint_ekf")])
 def test_identify_draws_the_side_slip_that_was_told(logs, tmp_path, method, laid_out):
     for log, name in ((logs / "slalom.csv", "with"), (tmp_path / "blind.csv", "without")):

@@ -214,6 +214,7 @@ def test_a_band_survives_a_file_and_old_files_have_none(run, model, tmp_path, re
     refused_in_one_line(data | {"band": 3}, "band")
 
 
+@pytest.mark.heavy
 def test_samples_fill_the_band(model):
     """They have one factor where the band has one for each range of slip: alike to a half."""
     drawn = model.band.samples(1000, np.random.default_rng(1))

@@ -48,6 +48,7 @@ def test_with_a_lag_they_agree_from_the_slip_on_that_was_carried(car, drive):
 LAG, OFFSET = np.array([0.9, 0.6]), np.array([0.004, -0.08])  # m; rad and m/s
 
 
+@pytest.mark.heavy
 def test_lag_and_offsets_are_found_on_a_car_that_has_them(car, curve_drive, rng):
     """The car drives on its lagged tires; its steering and v_y are read with offsets."""
     recording = curve_drive(car, magic, n=6000, rng=rng, lag=LAG)

@@ -41,6 +41,7 @@ def test_planted_lag_and_offsets_are_found_too(car, drive, rng):
     assert share_of_force(model, recording).max() < 1e-3
 
 
+@pytest.mark.sweep("for_vehicle-axle_structure")
 @pytest.mark.parametrize(
     ("make", "structure_of"),
     [(magic_formula_ekf, curve_structure), (AxleIdentifier.for_vehicle, axle_structure)],

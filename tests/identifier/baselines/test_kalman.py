@@ -63,6 +63,7 @@ def magic(car, method):
     return force
 
 
+@pytest.mark.sweep("0.01")
 @pytest.mark.parametrize("dt", [0.01, 0.03])
 def test_magic_formula_filter_is_the_textbook(dt, car, drive, rng):
     clean = drive(n=120, dt=dt)

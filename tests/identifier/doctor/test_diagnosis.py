@@ -61,6 +61,7 @@ def test_the_ratio_of_the_steering_wheel_is_found(found):
     assert not found.healthy
 
 
+@pytest.mark.heavy
 def test_a_ratio_is_asked_together_with_what_distorts_the_motion(ratio):
     car, log = ratio
     said = diagnose(Lagging(channels=("r",), time_constant=0.1).apply(log), car)
@@ -136,6 +137,7 @@ def test_a_log_alone_proves_nothing():
     assert found.lines() == ["it goes straight ahead (confidence 99 %)"]
 
 
+@pytest.mark.heavy
 def test_nothing_fine_is_sure_on_a_reading_that_is_not(driven):
     car, log = driven
     late = Late(channels=("r",), delay=0.08).apply(log)
@@ -149,6 +151,7 @@ def test_nothing_fine_is_sure_on_a_reading_that_is_not(driven):
     assert not diagnose(wheel, car).repair
 
 
+@pytest.mark.heavy
 def test_a_receiver_of_satellites_is_brought_to_the_clock_of_the_others(driven):
     """v_y at 10 Hz, held in between, 150 ms late: 195 ms in the mean."""
     car, log = driven
@@ -169,6 +172,7 @@ def test_nothing_is_looked_for_where_nothing_was_driven(driven):
     assert any(line.startswith("offsets, delays") for line in found.unobservable)
 
 
+@pytest.mark.heavy
 def test_a_law_that_no_reading_mends_is_told_as_it_is(driven):
     car, log = driven
     noise = np.random.default_rng(0).normal(size=len(log))

@@ -53,6 +53,7 @@ def test_nothing_is_found_on_a_clean_drive_and_little_is_unseen(driven):
     assert len(said.unobservable) < 3
 
 
+@pytest.mark.sweep("offset v_y", "delay r")
 @pytest.mark.parametrize("kind", SIZED)
 def test_a_planted_fault_is_named_first_or_second_with_its_size(driven, kind):
     car, log, _ = driven
@@ -86,12 +87,14 @@ def rolling(exact, log, degrees_per_g):
     return replace(log, a_y=shown + log.a_y - exact.a_y)
 
 
+@pytest.mark.sweep("0.0", "6.0")
 @pytest.mark.parametrize("degrees_per_g", [0.0, 2.0, 4.0, 6.0])
 def test_an_accelerometer_on_a_body_that_rolls_has_no_fault(driven, degrees_per_g):
     car, log, exact = driven
     assert examine(rolling(exact, log, degrees_per_g), car).findings == ()
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("factor", [0.8, 1.28, 1.4])
 def test_a_scale_that_no_roll_explains_is_named_beside_it(driven, factor):
     car, log, exact = driven
@@ -119,6 +122,7 @@ def test_every_kind_of_fault_has_a_suspect():
         assert (fault.code, fault.channel) in codes
 
 
+@pytest.mark.heavy
 def test_two_faults_at_once_are_both_found(driven):
     car, log, _ = driven
     faults = Together(
@@ -142,6 +146,7 @@ def test_a_slow_yaw_rate_is_found_where_a_place_of_the_accelerometer_explains_mo
     assert not any(one.code == "acceleration_sensor_x" for one in others)
 
 
+@pytest.mark.heavy
 def test_an_inertial_unit_that_is_late_is_one_fault(driven):
     car, log, _ = driven
     found = found_in(Late(channels=("r", "a_y"), delay=0.09).apply(log), car)
@@ -160,6 +165,7 @@ def test_a_repair_of_what_was_found_leaves_a_log_in_which_nothing_is_found(drive
     assert not [one for one in found_in(repaired, same) if one.matters]
 
 
+@pytest.mark.heavy
 def test_what_is_alike_at_constant_speed_is_named_beside_it(driven):
     """v_y off by 3 % of the speed: a sensor that is turned, or what looks so."""
     car, log, _ = driven
@@ -302,6 +308,7 @@ def test_a_rival_that_helps_as_much_takes_the_sureness(driven):
     assert not search.stands(best, same, base), "the rival's repair is as good as this"
 
 
+@pytest.mark.sweep("3")
 @pytest.mark.parametrize("between", [2, 3])
 def test_nothing_is_found_in_a_right_log_that_was_drawn_from_a_slower_clock(driven, between):
     car, log, _ = driven
@@ -390,6 +397,7 @@ def test_a_log_that_is_hardly_longer_than_what_is_looked_at_is_cut_all_the_same(
         assert [len(part) for part in parts] == [1500] * 4
 
 
+@pytest.mark.heavy
 def test_nothing_is_made_of_the_jump_over_a_gap(driven):
     car, log, _ = driven
     n = len(log)

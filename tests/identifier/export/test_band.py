@@ -35,6 +35,7 @@ def package(model):
     return build_package(AXLE, CAR, model, with_band=True)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("single", [False, True])
 def test_the_c_tells_the_band_of_the_model(single, package, model, slalom):
     """That over slip, and on top what the noise of the sensors makes of it."""
@@ -120,6 +121,7 @@ def test_an_fmu_has_a_band_where_its_step_tells_one():
         assert all((f'name="F_y{end}_half_band"' in text) == told for end in "fr")
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("version", [2, 3])
 def test_an_fmu_tells_the_band_of_the_step_to_the_last_bit(
     version, package, slalom, tmp_path, monkeypatch

@@ -39,6 +39,7 @@ def test_sample_by_sample_is_the_whole_recording(packages, slalom, law):
     assert one.state == all_at_once.state
 
 
+@pytest.mark.sweep("axle")
 @pytest.mark.parametrize("law", ["integral", "axle", "magic_formula_ekf"])
 def test_frozen_c_is_the_frozen_model(law, packages, slalom):
     method = make_method(law, CAR)
@@ -263,6 +264,7 @@ def test_an_input_on_its_limit_is_taken_and_one_beyond_is_not(packages):
                 assert (run.step(*sample)[0] == Status.BAD_INPUT) == refused, (name, side, size)
 
 
+@pytest.mark.sweep("projection")
 @pytest.mark.parametrize("keeping", ["dead_zone", "projection"])
 def test_the_shipped_c_keeps_the_weights_as_the_method_does(keeping, slalom):
     """With balls so small that the slalom leaves them; without, the forces are others."""

@@ -23,6 +23,7 @@ def test_the_paper_s_network_keeps_the_targets(packages, samples):
     assert 4000 < size.flash <= 7000
 
 
+@pytest.mark.heavy
 def test_the_counter_counts(packages, samples):
     """A thousand additions more are a thousand additions and their loop."""
     package = packages["integral"]
@@ -45,6 +46,7 @@ def test_data_that_may_change_would_be_counted(packages):
     assert _size_on(PROCESSORS[0], "tireid", files, single=True).static_ram == 8
 
 
+@pytest.mark.heavy
 def test_the_table_has_a_row_for_each_processor_and_precision(packages):
     costs = measure(packages["integral"])
     text = figures_text(costs)
@@ -62,6 +64,7 @@ def test_the_table_has_a_row_for_each_processor_and_precision(packages):
     assert str(costs[0].replay.instructions) in text
 
 
+@pytest.mark.heavy
 def test_a_processor_that_does_not_end_is_told(monkeypatch, tmp_path):
     """A program that would sleep for an hour ends at the limit, which is a second here."""
     monkeypatch.setattr(processor, "TIMEOUT", 1.0)

@@ -39,6 +39,7 @@ def test_c_computes_the_bits_of_casadi(package, rows):
         np.testing.assert_array_equal(value, state[name].reshape(value.shape))
 
 
+@pytest.mark.heavy
 def test_the_package_learns_what_identify_learns(package, slalom):
     compiled = CompiledPackage.of(build_package(AXLE, RACER))
     forces = compiled.run(slalom).axle_force

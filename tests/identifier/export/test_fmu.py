@@ -138,6 +138,7 @@ def in_python(drive, start=None):
     return scan(drive.t.size, {**start, "x": drive.x, "u": drive.u, "v_x": drive.v_x})
 
 
+@pytest.mark.sweep("0.01-2")
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("dt", [0.001, 0.01])
 def test_forces_are_those_of_python_to_the_last_bit(master, version, dt):
@@ -247,6 +248,7 @@ def test_after_a_reset_a_step_waits_for_the_initialization(master, version, capf
     one.fmu.exitInitializationMode()
 
 
+@pytest.mark.sweep("3")
 @pytest.mark.parametrize("version", [2, 3])
 def test_the_state_of_another_model_is_refused(master, version, capfd):
     saved = save(master(version, dt=0.001))

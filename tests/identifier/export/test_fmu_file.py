@@ -41,6 +41,7 @@ def test_fmpy_finds_nothing_to_complain_about(exported, version):
     assert validation.validate_fmu(str(exported[version])) == []
 
 
+@pytest.mark.heavy
 @needs_compiler
 def test_the_same_step_gives_the_same_bytes_on_every_platform(tmp_path):
     paths = [tmp_path / name for name in ("a.fmu", "b.fmu")]
@@ -57,6 +58,7 @@ def test_the_same_step_gives_the_same_bytes_on_every_platform(tmp_path):
     assert libraries.get("win64", b"MZ").startswith(b"MZ")
 
 
+@pytest.mark.heavy
 def test_every_number_changes_the_token():
     def token(step):
         return re.search(r'guid="([^"]+)"', fmu_text(step, 2)["modelDescription.xml"])[1]

@@ -62,6 +62,7 @@ def simulated(path, drive, names):
     return {name: told[name][1:] for name in told.dtype.names}  # a step ends with its outputs
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("version", [2, 3])
 def test_fmpy_finds_nothing_to_complain_about_and_all_has_units(paths, version):
     assert validation.validate_fmu(str(paths[version])) == []
@@ -74,6 +75,7 @@ def test_fmpy_finds_nothing_to_complain_about_and_all_has_units(paths, version):
     assert len(set(references)) == len(references)
 
 
+@pytest.mark.sweep("3")
 @pytest.mark.parametrize("version", [2, 3])
 def test_side_slip_is_told_without_a_lateral_velocity(paths, version, slalom):
     """An input that is not connected is no number, so that nothing is measured by it."""
@@ -124,6 +126,7 @@ def test_what_is_told_is_to_the_last_bit_what_the_step_tells(paths, version, ste
     assert np.ptp(told[:, 2]) > 0.1
 
 
+@pytest.mark.sweep("washout")
 @needs_rivals
 @pytest.mark.parametrize("law", ["linear_kf", "washout"])
 def test_an_fmu_tells_as_much_of_side_slip_as_its_step(law, tmp_path, monkeypatch):
@@ -136,6 +139,7 @@ def test_an_fmu_tells_as_much_of_side_slip_as_its_step(law, tmp_path, monkeypatc
     assert told == list(TOLD[: len(step.side_slip)]) and 0 < len(told) < 3
 
 
+@pytest.mark.heavy
 def test_an_fmu_has_a_y_where_its_step_reads_it_and_no_side_slip_where_it_tells_none():
     axle = make_method("axle", CAR)
     for with_a_y in (False, True):

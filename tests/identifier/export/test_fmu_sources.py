@@ -150,6 +150,7 @@ def test_fast_math_is_refused(tmp_path):
     assert "guards against NaN" in answer.stderr
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("version", [2, 3])
 def test_built_anew_from_its_own_sources_it_gives_the_same_bits(tmp_path, version, monkeypatch):
     fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")

@@ -66,6 +66,7 @@ def slip(drive, car):
     )
 
 
+@pytest.mark.sweep("batch-Tanh", "batch-Elu", "None-Tanh", "1-Elu")
 @pytest.mark.parametrize("activation", ["Tanh", "Sigmoid", "Elu", "Softsign", "Atan"])
 @pytest.mark.parametrize("batch", ["batch", 1, None])
 def test_its_forces_are_those_of_onnxruntime(car, drive, rng, activation, batch):

@@ -39,6 +39,7 @@ def test_every_number_of_the_weights_is_looked_at_before_they_are_taken(law, pac
                     run.set_weights(spoilt)
 
 
+@pytest.mark.sweep("clang-0-integral")
 @pytest.mark.parametrize("law", ["integral", "axle", BANKED, "inertial"])
 @pytest.mark.parametrize("single", [0, 1])
 def test_no_compiler_has_anything_to_say(law, single, compiler, packages, write, run):
@@ -60,6 +61,7 @@ def test_the_warnings_are_on(compiler, packages, write, run):
     assert answer.returncode != 0
 
 
+@pytest.mark.sweep("gcc-integral")
 @pytest.mark.parametrize("law", ["integral", "axle", "magic_formula_ekf", "inertial"])
 def test_symbols_begin_with_the_name_and_nothing_is_called_but_roots_and_copies(
     law, compiler, write, run
@@ -86,6 +88,7 @@ def test_fast_math_is_refused(compiler, packages, write, run):
         assert "guards against NaN" in answer.stderr
 
 
+@pytest.mark.heavy
 def test_misra_findings_do_not_grow(packages, write, run):
     folder = write(packages["integral"])
     answer = run(
@@ -100,6 +103,7 @@ def test_misra_findings_do_not_grow(packages, write, run):
     assert len(findings) == MISRA_FINDINGS, sorted(findings)
 
 
+@pytest.mark.sweep("axle")
 @pytest.mark.parametrize("law", ["integral", "axle", "magic_formula_ekf"])
 def test_the_same_input_gives_the_same_bytes(law, packages):
     one, two = packages[law], build_package(make_method(law, CAR), CAR)
@@ -173,6 +177,7 @@ def test_nothing_is_left_to_fill_in(law, packages):
         assert "@" not in text, path
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("law", ["integral", "axle"])
 @pytest.mark.parametrize("single", ["OFF", "ON"])
 def test_cmake_builds_and_the_self_test_passes(law, single, packages, write, run, slalom, tmp_path):
@@ -190,6 +195,7 @@ def test_cmake_builds_and_the_self_test_passes(law, single, packages, write, run
     assert np.sqrt((error**2).mean()) < 0.2 * np.sqrt((slalom.axle_force[2000:] ** 2).mean())
 
 
+@pytest.mark.sweep("gcc-*")
 @pytest.mark.parametrize(
     ("file", "right", "wrong"),
     [
@@ -215,6 +221,7 @@ def test_the_self_test_sees_a_wrong_sign_and_a_wrong_vector(
 STEPS = [name for name in METHODS if name not in ("linear", "fit")]  # a fit takes a whole log
 
 
+@pytest.mark.sweep("axle")
 @pytest.mark.parametrize("law", [*STEPS, *map(rival, NAMES)])
 def test_every_method_passes_its_own_test_without_a_warning(law, packages, write, run):
     folder = write(packages[law])
@@ -282,6 +289,7 @@ def test_the_example_prints_the_band_beside_the_forces(packages, write, run, sla
     assert (compiled[10:] > 0.0).all()
 
 
+@pytest.mark.sweep("inertial-*")
 @pytest.mark.parametrize(
     ("law", "columns", "missing"),
     [

@@ -31,6 +31,7 @@ def run_folded(specialized: SpecializedStep, recording):
     return scan(recording.t.size, {**carry, **signals})["axle_force"]
 
 
+@pytest.mark.sweep("integral", "linear")
 @pytest.mark.parametrize("law", [*(law for law in METHODS if law != "fit"), *map(rival, NAMES)])
 def test_the_folded_step_is_the_method_up_to_rounding(law, slalom):
     method = make_method(law, CAR)
@@ -71,6 +72,7 @@ def test_a_method_that_tells_v_y_says_so_of_its_inputs():
     assert names == ["axle_force", "v_y", "v_y_sd", "side_slip_observable"]
 
 
+@pytest.mark.heavy
 def test_a_banked_road_is_told_apart_where_a_y_is_an_input(slalom):
     """As the method does in Python; and the accelerometer makes a difference."""
     felt = replace(slalom, a_y=slalom.axle_force.sum(axis=1) / CAR.mass - 0.5)
@@ -110,6 +112,7 @@ def test_what_is_learnt_is_told_apart_from_filters():
     assert "filters" not in specialize(make_method("axle", CAR), CAR).learnt
 
 
+@pytest.mark.sweep("axle", "integral")
 @pytest.mark.parametrize("law", ["integral", "axle", "magic_formula_ekf", "inertial"])
 def test_every_port_has_a_unit_and_words(law):
     specialized = specialize(make_method(law, CAR), CAR)

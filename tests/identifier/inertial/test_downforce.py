@@ -36,6 +36,7 @@ def models(drive):
     return [identify(felt(drive), one, METHOD).freeze() for one in (RACER, UNTOLD)]
 
 
+@pytest.mark.heavy
 def test_the_told_area_leaves_the_static_curve_to_learn(models, drive):
     told, untold = models
     np.testing.assert_allclose(told.force(SLIPS), static(SLIPS[:, None]), rtol=0.15)
@@ -66,6 +67,7 @@ def test_at_one_speed_a_load_is_a_scale_of_the_weights():
     assert np.abs(pressed - stepped(z, static_load)).max() > 1e-4
 
 
+@pytest.mark.heavy
 def test_c_computes_the_bits_of_casadi(drive):
     package = build_package(METHOD, RACER)
     shown = replace(felt(drive), v_y=drive.v_y)

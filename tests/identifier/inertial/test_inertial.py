@@ -150,6 +150,7 @@ def test_it_freezes_to_the_kind_of_model_that_an_axle_identifier_learns(history,
     assert (model.band.relative_sd(alpha) < 0.7).all()  # and knows that it learnt
 
 
+@pytest.mark.heavy
 def test_its_own_bounds_hold_and_its_own_ladder_is_used(banked):
     shown = as_shown(banked)
     tight = replace(METHOD.bounds, most_grip=0.7, most_stiffness=9.0)

@@ -137,6 +137,7 @@ def test_motion_follows_its_equations_and_halving_the_step_more_than_halves_the_
     assert (coarse / fine > 2.2).all()
 
 
+@pytest.mark.heavy
 def test_the_bank_and_the_rolling_body_follow_theirs():
     exact, tilt = integrated(state(), np.array([2.0, 1.0]), 0.08)
     found, body = walked(0.001)

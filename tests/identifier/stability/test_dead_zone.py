@@ -60,6 +60,7 @@ def largest_weights(law, errors, directions, *, staged, free, rho=RHO, start=0.0
     return at_samples, np.maximum(at_samples, at_stages)
 
 
+@pytest.mark.sweep("False")
 @pytest.mark.parametrize("staged", [False, True])
 def test_an_error_that_is_held_and_then_small_fills_the_bound(staged):
     """And passes that of the leakage alone, which is what a certificate without the radius says."""
@@ -74,6 +75,7 @@ def test_an_error_that_is_held_and_then_small_fills_the_bound(staged):
     assert found > 1.3 * learning(INTEGRAL, staged=staged, free=0.0).kept(X)
 
 
+@pytest.mark.sweep("law2-False")
 @pytest.mark.parametrize("staged", [False, True])
 @pytest.mark.parametrize("law", [INTEGRAL, DrivingError(0.0, 1.0), DrivingError(1.0, 0.2)])
 def test_no_error_drives_the_weights_beyond_their_bound(staged, law, rng):
@@ -102,6 +104,7 @@ def test_more_than_one_whole_sample_of_leakage_is_not_covered():
     assert learning(INTEGRAL, staged=False, free=3.0, rho=0.0).kept(2.0) == np.inf
 
 
+@pytest.mark.sweep("euler-projection")
 @pytest.mark.parametrize("keeping", ["dead_zone", "projection"])
 @pytest.mark.parametrize("integrator", ["euler", "rk4"])
 def test_drives_keep_the_bounds_of_the_certificate(keeping, integrator):
@@ -125,6 +128,7 @@ def test_drives_keep_the_bounds_of_the_certificate(keeping, integrator):
     assert seen.diverged == 0 and [row.passed for row in rows] == [0] * len(rows)
 
 
+@pytest.mark.heavy
 def test_a_certificate_of_a_smaller_dead_zone_than_the_one_that_runs_is_found_out():
     design = replace(PaperIdentifier.for_vehicle(CAR), driving=natural_driving(CAR))
     design = with_keeping(design, design.operation(CAR), "dead_zone")

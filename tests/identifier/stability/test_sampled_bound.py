@@ -122,6 +122,7 @@ def test_inner_stages_of_rk4_are_projected():
     assert max(seen) > 5.0
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("integrator", ["euler", "rk4"])
 @pytest.mark.parametrize("law", ["integral", "instantaneous", "pi_lead"])
 def test_no_drive_passes_a_bound_with_noise_resumed_weights_and_a_high_gain(law, integrator):

@@ -160,6 +160,7 @@ def test_a_straight_drive_teaches_nothing_and_nothing_is_called_learnt(drive):
     assert not [number for number in verdict.numbers if number.valid]
 
 
+@pytest.mark.sweep("0.0", "0.3")
 @pytest.mark.parametrize("value", [0.0, 0.3, -1.7])
 def test_v_y_that_is_not_measured_is_noticed(drive, value):
     verdict = judge(answer(replace(drive, v_y=np.full(len(drive), value))))
@@ -188,6 +189,7 @@ def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
     }
 
 
+@pytest.mark.heavy
 def test_a_number_of_a_refused_axle_is_not_valid(drive):
     verdict = judge(answer(drive, replace(sedan(), yaw_inertia=25000.0)))
     assert not [number for number in verdict.numbers if number.valid]
@@ -258,6 +260,7 @@ def test_a_prediction_is_refused_where_neither_axle_shows_a_force(clean, drive):
     }
 
 
+@pytest.mark.sweep("axle*", "linear*")
 @pytest.mark.parametrize(
     ("name", "valid"),
     [("axle", True), ("magic_formula_ekf", True), ("integral", False), ("linear", False)],

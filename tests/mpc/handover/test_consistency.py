@@ -70,6 +70,7 @@ def test_good_sensors_agree(sensors, seed):
     assert not times.size
 
 
+@pytest.mark.sweep("v_y-biased-0.5-v_y", "r-zero*", "v_x-scaled*", "X-lost*", "delta-stuck*")
 @pytest.mark.parametrize(
     ("channel", "kind", "size", "relation"),
     [
@@ -128,6 +129,7 @@ def test_without_a_word_of_what_was_asked_the_steering_is_not_judged():
     assert all(watch.observe(broken.measure(state, rng)) for state in states(3.0))
 
 
+@pytest.mark.sweep("nan-*", "-1e+308-v_y", "inf-delta")
 @pytest.mark.parametrize("channel", Measured._fields[1:])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1e308])
 def test_one_sample_that_is_no_number_is_noticed_and_forgotten(channel, value):

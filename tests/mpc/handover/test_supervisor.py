@@ -173,6 +173,9 @@ def test_the_baseline_follows_what_is_seen_slowly_and_not_a_change(
     np.testing.assert_allclose(baseline, wanted[mean], rtol=1e-9)
 
 
+@pytest.mark.sweep(
+    "40.0-2.2-False-3.0", "40.0-1.8-True-1.0", "3.6-0.0-False-1.0", "4.4-0.0-True-3.0"
+)
 @pytest.mark.parametrize("baseline", [1.0, 3.0])
 @pytest.mark.parametrize(
     ("better", "worse_lately", "taken"),
@@ -263,6 +266,7 @@ def test_after_a_fault_learning_goes_on_from_what_was_known_before_it(car, learn
     assert supervisor.identifier.model().to_dict() != known.to_dict()
 
 
+@pytest.mark.sweep("2.0")
 @pytest.mark.parametrize("relapse", [6.0, 2.0])
 def test_a_fault_that_comes_back_soon_takes_back_what_was_learnt_between(car, learnt, dry, relapse):
     rules, calm = Rules(relapse=relapse), 4.0

@@ -35,6 +35,7 @@ def driven(caution):
     ), tracker
 
 
+@pytest.mark.heavy
 def test_caution_keeps_the_path_on_tires_of_the_dry_road():
     bold, _ = driven(0.0)
     careful, tracker = driven(1.0)

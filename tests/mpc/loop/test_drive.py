@@ -183,6 +183,7 @@ def test_what_does_not_fit_together_is_refused(bump):
         CarSensors(r=Sensor(delay=0.01))
 
 
+@pytest.mark.sweep("psi")
 @pytest.mark.parametrize("channel", ["X", "Y", "psi"])
 def test_a_place_that_is_no_number_goes_on_by_dead_reckoning(bump, channel):
     """Half a second without it, and the car is where it was steered to, to some centimeters."""
@@ -225,6 +226,7 @@ def broken_drive(bump, tracker, sensors, **keys):
 NO_NUMBERS = (math.nan, math.inf, -math.inf, 1e308, -1e308)
 
 
+@pytest.mark.sweep("nan-all", "1e+308-v_x")
 @pytest.mark.parametrize("channel", [*Measured._fields[1:], "all"])
 @pytest.mark.parametrize("value", NO_NUMBERS)
 def test_half_a_second_without_a_number_is_driven_through(channel, value, bump):
@@ -238,6 +240,7 @@ def test_half_a_second_without_a_number_is_driven_through(channel, value, bump):
     assert [(round(t, 6), text) for t, text in run.notes] == noted
 
 
+@pytest.mark.sweep("nan-*", "-1e+308-psi", "1e+308-v_x", "inf-X", "-inf-Y")
 @pytest.mark.parametrize("channel", GUIDES)
 @pytest.mark.parametrize("value", NO_NUMBERS)
 def test_a_car_that_stays_blind_ends_its_drive_and_says_why(channel, value, bump):

@@ -127,6 +127,7 @@ def test_where_the_friction_is_another_the_position_keeps_it_right():
     assert np.abs(blind["error"][after]).max() > 1.5 * worst
 
 
+@pytest.mark.sweep("r", "X", "a_y")
 @pytest.mark.parametrize("channel", ["X", "psi", "v_x", "r", "delta", "a_y"])
 def test_a_lost_channel_widens_the_band_and_is_driven_through(swings, channel, told):
     fault = SensorFault(channel=channel, kind="lost", start=4.0, duration=0.5)
@@ -279,6 +280,7 @@ def test_a_friction_that_drops_is_noticed_without_v_y_and_the_car_stays_on_its_p
     assert not [note for _, note in run.notes if note.startswith("sensor fault")]
 
 
+@pytest.mark.sweep("a_y*")
 @pytest.mark.parametrize(
     ("channel", "kind", "size"),
     [("r", "biased", 0.06), ("v_x", "scaled", 0.8), ("a_y", "stuck", 0.0), ("delta", "stuck", 0.0)],

@@ -35,6 +35,7 @@ def integrated(profile, s, v, t):
     return s, v
 
 
+@pytest.mark.sweep("20.0*", "180.0*")
 @pytest.mark.parametrize(("s", "v"), [(20.0, 15.0), (120.0, 17.0), (180.0, 12.0)])
 def test_the_road_ahead_is_where_the_driver_brings_the_car(ring, s, v):
     profile = SpeedProfile(ring, wave(ring))

@@ -20,6 +20,7 @@ TABLE = {
 }
 
 
+@pytest.mark.sweep("1.6-iso_3888_1", "2.2-iso_3888_2")
 @pytest.mark.parametrize("build", TABLE)
 @pytest.mark.parametrize("b", [1.6, 2.2])
 def test_the_car_passes_between_the_cones_of_the_standard(build, b):

@@ -58,6 +58,7 @@ def test_a_set_finds_what_a_dense_solver_finds(linear, problem, seed):
     np.testing.assert_allclose(command.plan_u, by_highs(tracker, *at), atol=1e-5)
 
 
+@pytest.mark.sweep("linear")
 def test_a_set_finds_what_the_interior_point_finds(tire, problem):
     by_sets = Tracker(tire, problem)
     alone = Tracker(tire, problem, tolerance=1e-12, max_active_sets=0)
@@ -147,6 +148,7 @@ def test_no_set_is_tried_where_the_car_is_thrown_off_its_plan(counting):
     np.testing.assert_array_equal(first.plan_u, again.plan_u)
 
 
+@pytest.mark.sweep("pull*")
 @pytest.mark.parametrize(
     ("pattern", "mistake"),
     [

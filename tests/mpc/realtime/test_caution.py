@@ -72,6 +72,7 @@ def test_wheels_that_are_off_what_is_commanded_are_found_and_not_taken_for_ice(l
     assert grips[-1] > 0.85
 
 
+@pytest.mark.sweep("bias0*")
 @pytest.mark.parametrize(
     ("bias", "found"), [((0.3, 0.0), ("drift", -0.3)), ((0.0, 0.02), ("turning", -0.02))]
 )

@@ -131,6 +131,7 @@ def bends(v_x):
     return Path.from_waypoints(x, y, name="bends")
 
 
+@pytest.mark.sweep("50.0")
 @pytest.mark.parametrize("v_x", SPEEDS)
 def test_without_a_plan_the_built_in_car_keeps_its_path(v_x):
     tracker = Blind(None)

@@ -22,6 +22,9 @@ def numbers(tracker):
     return np.concatenate([tracker.instance.state[name].ravel() for name in CARRIED])
 
 
+@pytest.mark.sweep(
+    "linear-1e+308-*", "lagging-nan-*", "lagging-inf-True-*", "linear--1e+308-True-*"
+)
 @pytest.mark.parametrize("field", ["e_y", "e_psi", "v_y", "r", "kappa", "v_x"])
 @pytest.mark.parametrize("planned", [False, True])
 @pytest.mark.parametrize("value", HUGE)

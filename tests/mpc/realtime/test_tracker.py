@@ -139,6 +139,7 @@ def test_after_a_fault_it_plans_again(tracker, measure):
     assert tracker.step(measure(e_y=0.3)).status == Status.OK
 
 
+@pytest.mark.sweep("lagging")
 def test_damped_tracking_alone_brings_the_car_back(tire, problem, measure):
     tracker = Tracker(tire, problem, period=PERIOD, guards=Guards(hold_time=0.0))
 
