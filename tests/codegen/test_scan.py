@@ -179,8 +179,3 @@ def test_the_values_at_the_start_stay_the_callers(scan, values):
     for port, value in kept.items():
         np.testing.assert_array_equal(start[port], value)
         np.testing.assert_array_equal(state[port], value)  # a copy, not a view
-
-
-def test_a_wrong_shape_is_refused_at_the_start(scan):
-    with pytest.raises(ValueError, match=r"s must have shape \(2, 1\)"):
-        Stepper(scan, {"M": np.zeros((2, 3)), "s": np.zeros(3), "c": np.array(0.1)})

@@ -239,30 +239,6 @@ def test_delays_and_lags_in_sequence_add(drive):
     assert one.then(Repair()) == one == Repair().then(one)
 
 
-def test_an_angle_of_which_something_was_taken_off_is_refused():
-    for one in (Repair(offset={"v_y": 0.1}), Repair(sideslip=True)):
-        with pytest.raises(RecordingError, match="sideslip angle"):
-            one.then(Repair(sideslip=True))
-
-
-@pytest.mark.parametrize(
-    ("made", "words"),
-    [
-        ({"factor": {"v_z": 1.0}}, "factor must be of v_x"),
-        ({"factor": {"v_y": 0.0}}, "must not be 0"),
-        ({"offset": {"v_y": np.nan}}, "offset.v_y must be finite"),
-        ({"delay": {"v_y": np.inf}}, "delay.v_y must be finite"),
-        ({"lag": {"v_y": -0.1}}, "lag.v_y must be positive"),
-        ({"vehicle": {"wheelbase": 2.7}}, "vehicle must be of mass"),
-        ({"vehicle": {"mass": 0.0}}, "vehicle.mass must be positive"),
-        ({"velocity_sensor_x": np.nan}, "velocity_sensor_x must be finite"),
-    ],
-)
-def test_what_repairs_nothing_is_refused(made, words):
-    with pytest.raises(RecordingError, match=words):
-        Repair(**made)
-
-
 def test_areas_of_downforce_come_into_the_car_and_may_be_of_lift(drive):
     areas = {"downforce_area_front": 1.2, "downforce_area_rear": -0.3}
     repair = Repair(vehicle=areas)

@@ -19,7 +19,6 @@ from models.schema import (
     read_bytes,
     read_json,
     read_toml,
-    require_few,
     require_name,
 )
 
@@ -213,11 +212,6 @@ def test_what_cannot_be_a_name_is_refused(name):
     with pytest.raises(RefusedError):
         require_name(RefusedError, "name", name)
     require_name(RefusedError, "name", "Käfer \x1b[0m 車")  # shown escaped wherever it goes
-
-
-def test_a_count_that_is_no_number_is_too_many():
-    with pytest.raises(RefusedError, match="here are nan"):
-        require_few(RefusedError, "--laps", float("nan"), "runs", "laps")
 
 
 def test_the_limits_that_hold_are_told(monkeypatch):

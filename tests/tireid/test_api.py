@@ -15,8 +15,7 @@ import pytest
 
 import tireid as ti
 from identifier.baselines import CurveModel
-from identifier.export.package import build_package
-from identifier.methods import continuing, make_method
+from identifier.methods import make_method
 from models.recordings import RecordingError
 from mpc.prediction import build_dynamics
 from mpc.tires import prediction_tire
@@ -271,61 +270,6 @@ def test_columns_of_another_name_and_runs_are_chosen(log):
         ti.read_recording(twice, run="b")
 
 
-@pytest.mark.parametrize(
-    ("name", "change", "said"),
-    [
-        ("r", np.negative, "delta_f must turn the car to the left"),
-        ("r", np.degrees, "degrees per second"),
-        ("vy", lambda v: v[:-1], "columns must have one length"),
-        ("vy", lambda v: v[:, None], "one axis"),
-        ("vx", lambda v: np.where(v > 0, np.nan, v), "must be finite"),
-        ("vx", lambda v: v.astype(str), "must be numeric"),
-        ("vx", lambda v: v + 1j, "vx must be numeric, its type is complex128"),
-        ("vx", lambda v: v > 0, "vx must be numeric, its type is bool"),
-        ("vx", lambda v: [*v[1:], [1.0, 2.0]], "vx must have one axis, its rows are of several"),
-        ("vx", lambda v: np.ma.array(v, mask=np.arange(v.size) == 5), "finite, 1 of .* index 5"),
-        ("t", lambda t: 1e3 * t, "milliseconds"),
-        ("t", lambda t: t[::-1], "must increase"),
-    ],
-)
-def test_arrays_are_judged_as_a_file_is(log, name, change, said):
-    columns = columns_of(log)
-    columns[name] = change(columns[name])
-    with pytest.raises(RecordingError, match=f"^recording: .*{said}"):
-        ti.read_recording(columns)
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ({"dt": "0.01"}, "dt must be positive, it is '0.01'"),
-        ({"dt": None}, "dt must be positive, it is None"),
-        ({"columns": "r=yaw_rate"}, "columns must be a mapping as .* it is 'r=yaw_rate'"),
-        ({"columns": ["r"]}, "columns must be a mapping as .* it is a list of 1"),
-    ],
-)
-def test_arguments_of_another_kind_are_refused_by_their_name(log, words, said):
-    with pytest.raises(RecordingError, match=said):
-        ti.read_recording(columns_of(log), **words)
-
-
-def test_what_a_command_takes_as_a_word_is_refused_with_the_remedy(log, tires):
-    car, tire = ti.sedan(), next(iter(tires.values()))
-    run = ti.identify(log, car)
-    for call, said in (
-        (lambda: ti.identify("log.csv", car), "recording must be a Recording, as of read_rec"),
-        (lambda: ti.identify([log, log], car), "recording must be a Recording, .* a list of 2"),
-        (lambda: ti.identify(log, "car.toml"), "vehicle must be a Vehicle, as of Vehicle.from_"),
-        (lambda: ti.identify(log, car, 3), r"method must be a Method, as of make_method\("),
-        (lambda: ti.replay(log, run), "tire must be a TireModel, as of Run.tire"),
-        (lambda: ti.replay(tire, log), "recording must be a Recording, as of read_recording"),
-        (lambda: run.freeze("20"), "a time to freeze at is a number of seconds, not '20'"),
-        (lambda: ti.replay("log.csv", tire), "recording must be a Recording"),
-    ):
-        with pytest.raises(TypeError, match=f"^{said}"):
-            call()
-
-
 @pytest.mark.parametrize("kind", ["datetime64[ns]", "datetime64[us]", "timedelta64[ms]"])
 def test_times_of_the_calendar_and_durations_count_from_the_first(log, kind):
     columns = {"vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
@@ -347,21 +291,6 @@ def test_an_hour_that_is_there_twice_in_summer_time_is_no_jump(log):
     columns = {"vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
     data = pandas.DataFrame({"t": t.tz_convert("Europe/Berlin"), **columns})
     np.testing.assert_allclose(ti.read_recording(data).t, log.t - log.t[0], atol=1e-6)
-
-
-@pytest.mark.parametrize("unit", ["milli", "micro", "nano"])
-def test_the_unit_of_a_time_that_is_not_in_seconds_is_guessed(log, unit):
-    power = {"milli": 3, "micro": 6, "nano": 9}[unit]
-    data = {"t": 10.0**power * log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r,
-            "delta_f": log.delta_f}  # fmt: skip
-    with pytest.raises(RecordingError, match=f"; {unit}seconds[?] divide by 1{power * '0'}$"):
-        ti.read_recording(data)
-
-
-@pytest.mark.parametrize("data", [[1.0, 2.0], 3.0, None])
-def test_what_has_no_columns_is_refused(data):
-    with pytest.raises(RecordingError, match="a data frame or a mapping"):
-        ti.read_recording(data)
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -489,55 +418,10 @@ def test_representations_are_short(tires, run, log, car):
     assert "sedan" in repr(tires["axle"])
 
 
-@pytest.mark.heavy
-def test_a_run_a_model_and_a_method_are_exported(run, car, tmp_path, monkeypatch):
-    monkeypatch.setattr("tireid.exporting.measure", lambda *_: [])  # has tests of its own
-    written = ti.export(run, tmp_path / "run", name="axle")
-    assert (tmp_path / "run" / "include" / "axle.h").is_file()
-    learns = continuing(run.freeze(), car, run.method.dt)  # sample by sample, from the fit
-    expected = build_package(learns, car, run.freeze(), name="axle", single=False)
-    assert written.package.about["hash"] == expected.about["hash"]
-    assert str(written).endswith(f"wrote {tmp_path / 'run'}/, hash {expected.about['hash']}")
-    from_model = ti.export(run.freeze(), str(tmp_path / "model"), name="axle")
-    assert from_model.package.about["hash"] == expected.about["hash"]
-    fresh = ti.export(learns, tmp_path / "method", vehicle=car, name="axle")
-    assert fresh.package.about["hash"] != expected.about["hash"]
-    with pytest.raises(FileExistsError, match="overwrite=True replaces it"):
-        ti.export(run, tmp_path / "run")
-    again = ti.export(run, tmp_path / "run", name="other", overwrite=True)
-    assert (again.folder / "include" / "other.h").is_file()
-    assert not (again.folder / "include" / "axle.h").exists()
-
-
 def test_no_method_goes_on_from_a_curve(tires, tmp_path):
     with pytest.raises(ValueError, match="no method can continue a CurveModel"):
         ti.export(tires["linear"], tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.heavy
-def test_learnt_tires_steer_better_than_linear_ones(car):
-    log = ti.sample_recording(car)
-    tire, path = ti.identify(log, car).freeze(), ti.paths.iso_3888_2()
-    learnt, linear = ti.drive(path, car, tire), ti.drive(path, car)
-    assert learnt.scores.completed
-    assert learnt.scores.rms_e_y_m < 0.5 * linear.scores.rms_e_y_m
-    assert "frozen tires" in repr(learnt) and len(repr(learnt)) < 160
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ({"delay": 0.015}, "delay must be 0 to 100 ms in steps of 10 ms, it is 15"),
-        ({"share": 0.0}, "share must be positive"),
-        ({"friction": 9.0}, "friction must lie between"),
-        ({"laps": 2.0}, "laps are of a closed path"),
-        ({"learning": True}, "none is given"),
-    ],
-)
-def test_a_drive_that_cannot_be_is_refused(car, words, said):
-    with pytest.raises(ValueError, match=said):
-        ti.drive(ti.paths.iso_3888_2(), car, **words)
 
 
 def test_logs_runs_and_tires_are_equal_to_themselves_alone(log, run, tires):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tireid
-from benchmarks.faults import Held, Lagging, Late, Together, WrongUnit
+from benchmarks.faults import Together, WrongUnit
 from benchmarks.random_cars import random_car, random_drive
 from identifier.axle import AxleIdentifier
 from identifier.doctor import Finding, diagnose
@@ -59,15 +59,6 @@ def test_the_ratio_of_the_steering_wheel_is_found(found):
     assert first.size == pytest.approx(14.6, rel=0.08)
     assert first.deviation > 0.0
     assert not found.healthy
-
-
-@pytest.mark.heavy
-def test_a_ratio_is_asked_together_with_what_distorts_the_motion(ratio):
-    car, log = ratio
-    said = diagnose(Lagging(channels=("r",), time_constant=0.1).apply(log), car)
-    sizes = {(one.code, one.channel): one.size for one in said.findings}
-    assert sizes["steering_ratio", "delta_f"] == pytest.approx(14.6, rel=0.08)
-    assert sizes["lag", "r"] == pytest.approx(0.1, abs=0.01)
 
 
 def test_what_is_sure_mends_the_log_as_well_as_the_right_one(driven, ratio, found):
@@ -137,47 +128,12 @@ def test_a_log_alone_proves_nothing():
     assert found.lines() == ["it goes straight ahead (confidence 99 %)"]
 
 
-@pytest.mark.heavy
-def test_nothing_fine_is_sure_on_a_reading_that_is_not(driven):
-    car, log = driven
-    late = Late(channels=("r",), delay=0.08).apply(log)
-    on_its_own = diagnose(late, car).findings[0]
-    assert (on_its_own.code, on_its_own.channel, on_its_own.sure) == ("delay", "r", True)
-    wheel = SensorFault(channel="delta_f", kind="scaled", size=3.0).apply(late)
-    found = {(one.code, one.channel): one for one in diagnose(wheel, car).findings}
-    assert not found["factor", "delta_f"].sure
-    assert found["delay", "r"].size == pytest.approx(0.08, abs=0.01)
-    assert not found["delay", "r"].sure
-    assert not diagnose(wheel, car).repair
-
-
-@pytest.mark.heavy
-def test_a_receiver_of_satellites_is_brought_to_the_clock_of_the_others(driven):
-    """v_y at 10 Hz, held in between, 150 ms late: 195 ms in the mean."""
-    car, log = driven
-    late = Late(channels=("v_y",), delay=0.15).apply(log)
-    received = Held(channels=("v_y",), every=0.1, lasts=0.1).apply(late)
-    found = diagnose(received, car)
-    assert {(one.code, one.channel) for one in found.findings if one.sure} == {
-        ("held", "v_y"), ("delay", "v_y")
-    }  # fmt: skip
-    assert found.repair.delay == {"v_y": pytest.approx(0.195, abs=0.02)}
-
-
 def test_nothing_is_looked_for_where_nothing_was_driven(driven):
     _, log = driven
     standing = replace(log, v_x=0.0 * log.v_x, v_y=0.0 * log.v_y, r=0.0 * log.r)
     found = diagnose(standing, sedan())
     assert not found.healthy
     assert any(line.startswith("offsets, delays") for line in found.unobservable)
-
-
-@pytest.mark.heavy
-def test_a_law_that_no_reading_mends_is_told_as_it_is(driven):
-    car, log = driven
-    noise = np.random.default_rng(0).normal(size=len(log))
-    found = diagnose(replace(log, a_y=3.0 * np.cumsum(noise) / 30.0), car)
-    assert not found.healthy
 
 
 def test_the_interface_has_the_doctor():

@@ -9,7 +9,7 @@ import pytest
 from benchmarks.answers import drawn
 from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
-from benchmarks.faults import Lagging, Late, Misaligned, Together
+from benchmarks.faults import Lagging, Late, Misaligned
 from identifier.doctor import Finding, diagnose, examine
 from identifier.doctor.faults import Candidate, Search, _all_move, prepared
 from identifier.doctor.pieces import segments_of
@@ -17,8 +17,6 @@ from identifier.doctor.suspects import NOTES, SUSPECTS
 from identifier.estimate import Drive
 from identifier.estimate.solve import descend, simulate
 from identifier.motion.parameters import INDEX
-from models.faults import SensorFault
-from models.recordings import Repair
 from models.vehicle import GRAVITY, sedan
 from tests.identifier.conftest import areas_of, pressed
 from tireid.diagnoses import NAMES
@@ -94,16 +92,6 @@ def test_an_accelerometer_on_a_body_that_rolls_has_no_fault(driven, degrees_per_
     assert examine(rolling(exact, log, degrees_per_g), car).findings == ()
 
 
-@pytest.mark.heavy
-@pytest.mark.parametrize("factor", [0.8, 1.28, 1.4])
-def test_a_scale_that_no_roll_explains_is_named_beside_it(driven, factor):
-    car, log, exact = driven
-    shown = rolling(exact, log, 4.0)
-    found = found_in(replace(shown, a_y=factor * shown.a_y), car)
-    assert (found[0].code, found[0].channel) == ("factor", "a_y")
-    assert found[0].size == pytest.approx(factor, rel=0.1)
-
-
 def test_downforce_is_a_note_and_none_is_missing_where_it_is_told():
     log, car = pressed(0.3, np.random.default_rng(3))
     found = found_in(log, car)
@@ -122,20 +110,6 @@ def test_every_kind_of_fault_has_a_suspect():
         assert (fault.code, fault.channel) in codes
 
 
-@pytest.mark.heavy
-def test_two_faults_at_once_are_both_found(driven):
-    car, log, _ = driven
-    faults = Together(
-        faults=(
-            Late(channels=("a_y",), delay=0.06),
-            SensorFault(channel="delta_f", kind="biased", size=0.02),
-        )
-    )
-    codes = {(one.code, one.channel): one.size for one in found_in(faults.apply(log), car)}
-    assert codes["delay", "a_y"] == pytest.approx(0.06, abs=0.006)
-    assert codes["offset", "delta_f"] == pytest.approx(0.02, abs=0.002)
-
-
 def test_a_slow_yaw_rate_is_found_where_a_place_of_the_accelerometer_explains_more_than_a_delay():
     drive = drawn("sedan", 8001)
     log = replace(drive.log(np.random.default_rng([8001, 1])), axle_force=None)
@@ -144,16 +118,6 @@ def test_a_slow_yaw_rate_is_found_where_a_place_of_the_accelerometer_explains_mo
     assert (found.code, found.channel) == ("lag", "r")
     assert found.size == pytest.approx(0.16, abs=0.02)
     assert not any(one.code == "acceleration_sensor_x" for one in others)
-
-
-@pytest.mark.heavy
-def test_an_inertial_unit_that_is_late_is_one_fault(driven):
-    car, log, _ = driven
-    found = found_in(Late(channels=("r", "a_y"), delay=0.09).apply(log), car)
-    one = next(one for one in found if one.code == "delay")
-    assert one.channel == "r+a_y"
-    assert one.size == pytest.approx(0.09, abs=0.005)
-    assert one.repair == Repair(delay={"r": one.size, "a_y": one.size})
 
 
 def test_a_repair_of_what_was_found_leaves_a_log_in_which_nothing_is_found(driven):
@@ -395,21 +359,6 @@ def test_a_log_that_is_hardly_longer_than_what_is_looked_at_is_cut_all_the_same(
         assert parts == (minute,)
     else:
         assert [len(part) for part in parts] == [1500] * 4
-
-
-@pytest.mark.heavy
-def test_nothing_is_made_of_the_jump_over_a_gap(driven):
-    car, log, _ = driven
-    n = len(log)
-    kept = np.r_[0 : n // 3, n // 3 + 700 : n // 3 + 750, n // 2 : n]
-    broken = log.taken(kept)
-    assert len(broken.breaks) == 2
-    parts = segments_of(broken, car, longest=61.0, pieces=4)
-    assert [len(part) for part in parts] == [n // 3, n - n // 2]  # half a second is left out
-    assert not any(part.breaks for part in parts)
-    assert found_in(broken, car) == ()
-    late = Late(channels=("r",), delay=0.08).apply(log).taken(kept)
-    assert found_in(late, car)[0].size == pytest.approx(0.08, abs=0.006)
 
 
 @pytest.mark.parametrize("suspect", SUSPECTS, ids=lambda one: one.parameter)

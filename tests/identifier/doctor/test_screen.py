@@ -131,16 +131,6 @@ def test_a_repair_of_a_gross_fault_gives_the_drive_back(driven, case):
         np.testing.assert_allclose(getattr(mended, name), getattr(log, name), atol=1e-9)
 
 
-@pytest.mark.heavy
-def test_speeds_in_kmh_and_angles_in_degrees_with_a_steering_wheel_are_all_found(one):
-    car, log = one
-    faults = [scaled("v_x", 3.6), scaled("v_y", 3.6), scaled("r", DEGREES)]
-    broken = Together(faults=(*faults, scaled("delta_f", -15.0 * DEGREES))).apply(log)
-    assert set(named(broken, car)) == {
-        *("unit v_x", "unit v_y", "unit r", "steering_ratio delta_f")
-    }
-
-
 def test_speeds_in_mm_per_s_are_read_as_such():
     """Of a small car: those of others are beyond what a log may hold."""
     rng = np.random.default_rng(41)
@@ -173,34 +163,6 @@ def test_a_velocity_sensor_at_an_axle_is_no_gross_fault(kind, seed):
     log, car = drawn(kind, seed)
     for x in (car.l_f, -car.l_r):
         assert screen(elsewhere(log, x), car).findings == ()
-
-
-def figure_of_eight(car, speed):
-    """Circles to the left and to the right in turn, twice, by good sensors."""
-    t = np.arange(0.0, 48.0, 1.0)
-    angles = np.where(t % 24.0 < 12.0, 0.08, -0.08) * (t > 0.0)
-    steering = SampledSteer(
-        times=tuple(t), angles=tuple(angles), rate_limit=0.2, duration=float(t[-1])
-    )
-
-    def wanted(t):
-        return speed * (1.0 + 0.2 * np.sin(0.4 * t))
-
-    log = Plant(car).simulate(steering, speed=wanted, name="eight").recording()
-    return good_sensors(car).apply(log, np.random.default_rng(3))
-
-
-@pytest.mark.heavy
-@pytest.mark.parametrize("share", [0.5, -0.5])
-def test_a_figure_of_eight_tells_the_place_of_the_velocity_sensor_and_no_unit(share):
-    """In steady circles v_y is nearly a multiple of r: read in mph, an arm is nearly as good."""
-    car = sedan()
-    x = share * car.wheelbase
-    log = elsewhere(figure_of_eight(car, 10.0), x)
-    assert screen(log, car).findings == ()
-    first = diagnose(log, car).findings[0]
-    assert first.code == "velocity_sensor_x"
-    assert first.size == pytest.approx(x, abs=0.15 * car.wheelbase)
 
 
 @pytest.mark.sweep("sedan-r flipped", "tenth-a_y in g", "race-v_x flipped", "compact-r in degrees")
@@ -382,14 +344,6 @@ def part_of(recording, **signals):
     for name, value in signals.items():
         changed[name][recording.segments[0]] = value
     return replace(recording, **changed)
-
-
-@pytest.mark.heavy
-def test_a_while_of_standing_does_not_end_the_search_in_a_long_log(long):
-    car, log = long
-    standing = part_of(log, v_x=0.0, v_y=0.0, r=0.0)
-    assert screen(standing, car).findings == ()
-    assert named(scaled("r", DEGREES).apply(standing), car) == ["unit r"]
 
 
 def test_a_channel_that_rests_for_a_while_is_told_and_the_rest_is_asked(long):

@@ -112,12 +112,6 @@ def test_the_cheapest_path_changes_where_it_gains_more_than_the_price():
     assert not _cheapest(loss, 6.0).any()
 
 
-def test_a_log_without_a_sample_that_counts_is_refused_by_its_name():
-    slow = replace(driven(3), v_x=np.full(len(driven(3)), 0.5))
-    with pytest.raises(ValueError, match="drive3: no sample is fast enough to learn from"):
-        fit([slow], sedan())
-
-
 def test_a_steering_with_play_leaves_a_curve_that_rises(learnt):
     """What a dead zone would have the curve do, fall at zero slip, no tire does."""
     log = driven(3)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from codegen import find_compiler
-from identifier.export.compiled import CompiledPackage, PackageFileError, Status, samples_of
+from identifier.export.compiled import CompiledPackage, Status, samples_of
 from identifier.export.package import build_package
 from identifier.methods import make_method
 from identifier.paper.design import with_keeping
@@ -222,12 +222,6 @@ def test_a_folder_is_loaded_with_its_own_precision(write, slalom):
     np.testing.assert_array_equal(
         from_folder.run(slalom).axle_force, CompiledPackage.of(package).run(slalom).axle_force
     )
-
-
-def test_a_folder_without_a_package_is_refused(tmp_path):
-    (tmp_path / "other.json").write_text("{}")
-    with pytest.raises(PackageFileError, match="no package"):
-        CompiledPackage.from_folder(tmp_path)
 
 
 def test_a_recording_of_another_interval_is_refused(packages, drive):

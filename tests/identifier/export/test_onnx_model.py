@@ -218,8 +218,3 @@ def test_what_cannot_be_used_is_told_in_one_line(car, rng, tmp_path, reason):
 def test_inputs_must_be_signals_one_a_column(car, rng, inputs):
     with pytest.raises(UnusableNetworkError, match="inputs must be 2 different signals"):
         OnnxModel(vehicle=car, content=network_file(tire(rng)), inputs=inputs)
-
-
-def test_a_missing_file_is_told(car, tmp_path):
-    with pytest.raises(UnusableNetworkError, match=r"absent\.onnx"):
-        OnnxModel.from_onnx(tmp_path / "absent.onnx", car)

@@ -72,18 +72,6 @@ def test_a_method_that_tells_v_y_says_so_of_its_inputs():
     assert names == ["axle_force", "v_y", "v_y_sd", "side_slip_observable"]
 
 
-@pytest.mark.heavy
-def test_a_banked_road_is_told_apart_where_a_y_is_an_input(slalom):
-    """As the method does in Python; and the accelerometer makes a difference."""
-    felt = replace(slalom, a_y=slalom.axle_force.sum(axis=1) / CAR.mass - 0.5)
-    method = make_method("axle", CAR)
-    told, untold = (specialize(method, CAR, with_a_y=with_a_y) for with_a_y in (True, False))
-    assert "bank" in told.carry and "bank" not in untold.carry
-    force = run_folded(told, felt)
-    assert np.abs(force - identify(felt, CAR, method).axle_force).max() <= 1e-6
-    assert np.abs(force - run_folded(untold, felt)).max() > 1.0
-
-
 def test_a_forgotten_constant_would_be_noticed(slalom):
     other = make_method("integral", CAR, seed=1)
     expected = identify(slalom, CAR, make_method("integral", CAR)).axle_force

@@ -150,22 +150,6 @@ def test_it_freezes_to_the_kind_of_model_that_an_axle_identifier_learns(history,
     assert (model.band.relative_sd(alpha) < 0.7).all()  # and knows that it learnt
 
 
-@pytest.mark.heavy
-def test_its_own_bounds_hold_and_its_own_ladder_is_used(banked):
-    shown = as_shown(banked)
-    tight = replace(METHOD.bounds, most_grip=0.7, most_stiffness=9.0)
-    kept = identify(shown, CAR, replace(METHOD, bounds=tight)).state["W"]
-    free = identify(shown, CAR, METHOD).state["W"]
-    slope = [(W[1:] / np.array(METHOD.ladder)).sum(axis=2).max() for W in (kept, free)]
-    grip = [W[1:].sum(axis=2).max() for W in (kept, free)]
-    assert grip[0] <= 0.7 < grip[1] and slope[0] <= 9.0 < slope[1]
-    ladder = (0.02, 0.08, 0.32)
-    other = learn(shown, CAR, replace(METHOD, ladder=ladder))
-    assert other.ladder == ladder and other.W.shape == (2, 3)
-    exact, usual = banked.recording(), learn(shown, CAR, METHOD)
-    assert (missed(other, exact) < 2.0 * missed(usual, exact)).all()
-
-
 def test_a_recording_without_an_accelerometer_is_refused_before_it_is_learnt_on(banked):
     blind = replace(as_shown(banked), a_y=None)
     for run in (identify, learn):

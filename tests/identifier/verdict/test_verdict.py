@@ -189,16 +189,6 @@ def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
     }
 
 
-@pytest.mark.heavy
-def test_a_number_of_a_refused_axle_is_not_valid(drive):
-    verdict = judge(answer(drive, replace(sedan(), yaw_inertia=25000.0)))
-    assert not [number for number in verdict.numbers if number.valid]
-    tires = [number for number in verdict.numbers if number.title in (STIFFNESS, GRIP)]
-    assert len(tires) == 4
-    states = {number.state for number in tires}
-    assert "not valid" in states and "valid" not in states
-
-
 def moved(model, **by):
     """A model with numbers of both axles, or of one, moved."""
     p = model.p.copy()

@@ -239,10 +239,3 @@ def test_the_sedan_tire_is_what_its_header_says():
     lock = SEDAN.forces(0.0, -1.0, 0.0, 4000.0).F_x
     assert lock == pytest.approx(-0.7 * 1.08 * 4000.0, rel=0.02)
     assert SEDAN.valid_range.F_z[0] < 4000.0 < SEDAN.valid_range.F_z[1] < 12000.0
-
-
-def test_a_side_that_no_car_has_is_refused():
-    with pytest.raises(ValueError, match="'middle'"):
-        SEDAN.mounted("middle")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="'middle'"):
-        replace(SEDAN, side="middle")  # type: ignore[arg-type]

@@ -151,13 +151,3 @@ def test_symbols_and_floats_give_the_same_force(tire, kind):
     x = [kind.sym(name) for name in ("alpha", "kappa", "gamma", "F_z", "mu")]
     values = ca.Function("f", x, list(tire.forces(*x))).call(list(point))
     assert [float(v) for v in values] == pytest.approx(tire.forces(*point), rel=1e-13)
-
-
-@pytest.mark.parametrize("bad", [0.0, -1.0, nan, float("inf")])
-def test_parameters_that_are_not_positive_are_refused(bad):
-    with pytest.raises(ValueError, match="C_alpha must be positive"):
-        LinearTire(C_alpha=bad, C_kappa=1.0)
-    with pytest.raises(ValueError, match="C_kappa must be positive"):
-        DugoffTire(C_alpha=1.0, C_kappa=bad, friction=1.0)
-    with pytest.raises(ValueError, match="friction must be positive"):
-        FialaTire(C_alpha=1.0, C_kappa=1.0, friction=bad)

@@ -73,11 +73,3 @@ def test_the_reference_keeps_a_proportional_driver_from_lagging(straight):
         errors[gain] = worst
     assert errors[GAIN] < 0.15
     assert errors[np.inf] > 0.4
-
-
-def test_speeds_that_no_car_has_are_refused(straight):
-    for wrong in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="positive and finite"):
-            SpeedProfile(straight, wrong)
-    with pytest.raises(ValueError, match="broadcast"):
-        SpeedProfile(straight, np.ones(3))

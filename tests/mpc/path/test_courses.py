@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mpc.path import BUILT_IN, PathError, constant_radius, handling_course
+from mpc.path import BUILT_IN, constant_radius, handling_course
 
 
 @pytest.fixture(scope="module")
@@ -54,11 +54,3 @@ def test_the_names_of_the_command_line_build_paths():
     assert set(BUILT_IN) == {"iso-3888-1", "iso-3888-2", "slalom", "circle", "course"}
     with pytest.raises(TypeError):
         BUILT_IN["mine"] = handling_course
-
-
-@pytest.mark.parametrize(
-    "numbers", [{"radius": -1.0}, {"turns": 0.0}, {"radius": np.nan}, {"radius": np.inf}]
-)
-def test_circles_that_are_none_are_refused(numbers):
-    with pytest.raises(PathError, match="radius must be positive"):
-        constant_radius(**{"radius": 30.0, **numbers})

@@ -64,14 +64,6 @@ def test_bad_files_are_named_with_the_place(tmp_path, text, message):
     assert "\n" not in str(caught.value)
 
 
-def test_files_that_are_none_are_named(tmp_path):
-    with pytest.raises(PathError, match="no such file"):
-        Path.from_csv(tmp_path / "absent.csv")
-    (tmp_path / "binary.csv").write_bytes(b"x,y\n\xff\xfe\n")
-    with pytest.raises(PathError, match="UTF-8"):
-        Path.from_csv(tmp_path / "binary.csv")
-
-
 def test_spacing_and_smoothing_are_those_of_the_caller(tmp_path):
     rng = np.random.default_rng(3)
     rough = [(x + 0.05 * rng.normal(), y + 0.05 * rng.normal()) for x, y in RING]

@@ -133,12 +133,6 @@ def test_samples_too_coarse_for_the_turns_are_refused():
         Path.from_line(line, name="coarse")
 
 
-def test_a_closed_path_must_close():
-    path = Path.from_waypoints(*WAYPOINTS)
-    with pytest.raises(PathError, match="must end as it starts"):
-        Path(**fields_of(path, closed=True))
-
-
 def test_examples_in_the_documentation_are_true():
     tried = 0
     for name in ("path", "gates", "courses"):

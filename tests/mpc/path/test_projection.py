@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from mpc.path import BUILT_IN, Path, PathError, constant_radius, handling_course
+from mpc.path import BUILT_IN, Path, constant_radius, handling_course
 from mpc.path.courses import Straight, Turn, line_along
 
 # Two legs, 6 m apart, 40 m long, joined by a turn of 3 m with easings.
@@ -99,10 +99,3 @@ def test_heading_errors_are_told_within_half_a_turn():
     assert here.psi == pytest.approx(2 * np.pi, abs=0.01)
     assert here.heading_error(0.1) == pytest.approx(0.1, abs=0.01)
     assert here.heading_error(-0.1 + 6 * np.pi) == pytest.approx(-0.1, abs=0.01)
-
-
-def test_what_is_not_a_number_is_refused():
-    path = Path.from_waypoints([0.0, 50.0], [0.0, 0.0])
-    for arguments in ((np.nan, 0.0, None), (0.0, np.inf, 1.0), (0.0, 0.0, np.nan)):
-        with pytest.raises(PathError, match="cannot project"):
-            path.project(*arguments)

@@ -96,13 +96,6 @@ def test_a_closed_line_of_few_points_keeps_the_distance_that_smoothing_allows(po
     assert np.sqrt(np.mean(np.square(apart))) == pytest.approx(distance, rel=1e-3)
 
 
-def test_a_closed_line_that_smoothing_would_shrink_to_a_point_is_refused():
-    X, Y = circle(40)
-    rule = r"^way-points: smoothing must be less than 30 m, at which .* a point, it is 31.0$"
-    with pytest.raises(PathError, match=rule):
-        Path.from_waypoints(X, Y, closed=True, smoothing=31.0)
-
-
 @pytest.mark.parametrize("points", [4, 6, 40])
 def test_an_open_line_that_may_move_far_becomes_one_of_constant_bending(points):
     x = np.linspace(0.0, 90.0, points)
@@ -118,32 +111,3 @@ def test_smoothing_ten_thousand_noisy_way_points_takes_a_second(rng):
     assert process_time() - start < 5.0
     apart = np.sum((moved - ring)[:-1] ** 2, axis=1)
     assert np.sqrt(apart.mean()) == pytest.approx(0.005, rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("X", "Y", "options", "message"),
-    [
-        ([0.0, 1.0], [0.0], {}, r"\(2,\) and \(1,\)"),
-        ([[0.0, 1.0]], [[0.0, 1.0]], {}, "alike"),
-        ([0.0, 10.0, np.nan], [0.0, 0.0, 0.0], {}, "number 3 is"),
-        (
-            [0.0, 10.0, 10.0, 20.0],
-            [0.0, 1.0, 1.0, 2.0],
-            {},
-            r"numbers 2 and 3 are both \[10.0, 1.0\]",
-        ),
-        ([0.0], [0.0], {}, "at least 2 different way-points, it has 1"),
-        ([], [], {}, "it has 0"),
-        ([0.0, 0.0], [0.0, 0.0], {}, "numbers 1 and 2"),
-        ([0.0, 10.0, 10.0, 0.0], [0.0, 0.0, 10.0, 0.0], {"closed": True}, "at least 4"),
-        ([0.0, 10.0, 0.0], [0.0, 0.0, 0.1], {}, r"tighter than 3.0 m, at s = "),
-        ([0.0, 20.0, 40.0], [0.0, 5.0, 0.0], {"minimum_radius": 500.0}, "tighter than 500"),
-        ([0.0, 20.0], [0.0, 5.0], {"minimum_radius": np.nan}, "minimum_radius must be positive"),
-        ([0.0, 20.0], [0.0, 5.0], {"smoothing": -1.0}, "smoothing must be"),
-        ([0.0, 20.0], [0.0, 5.0], {"spacing": 0.0}, "way-points: spacing must be"),
-        ([0.0, 20.0], [0.0, 5.0], {"spacing": 15.0}, "quarter of the length"),
-    ],
-)
-def test_bad_way_points_are_named(X, Y, options, message):
-    with pytest.raises(PathError, match=message):
-        Path.from_waypoints(X, Y, **options)

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from mpc.prediction import build_rk4
-from mpc.problem import Problem
 from mpc.realtime import Guards, Status, Tracker
 from mpc.tires.tire import ALL
 
@@ -231,27 +230,6 @@ def test_the_road_is_asked_for_where_the_plan_will_be(tracker, problem):
     assert tracker.times[1] == pytest.approx(ahead + 0.5 * problem.dt)
     assert tracker.plan_times[[0, -1]] == pytest.approx([ahead, ahead + 20 * problem.dt])
     assert len(tracker.times) == len(tracker.plan_times) == problem.horizon + 1
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"period": 0.0}, {"period": 0.06}, {"delay": -0.01}, {"delay": 0.5}, {"tolerance": 0.0},
-        {"max_iterations": 0}, {"linearizations": 0},
-    ],
-)  # fmt: skip
-def test_numbers_out_of_range_are_refused_by_name(linear, wrong):
-    (name,) = wrong
-    with pytest.raises(ValueError, match=f"{name} must be"):
-        Tracker(linear, Problem(dt=0.05), **wrong)
-
-
-@pytest.mark.parametrize(
-    "wrong", [{"e_y": 0.0}, {"min_speed": np.nan}, {"hold_time": -0.1}, {"fall_back_e_y": 0.0}]
-)
-def test_guards_are_checked(wrong):
-    with pytest.raises(ValueError, match=f"{next(iter(wrong))} must be"):
-        Guards(**wrong)
 
 
 def test_the_longest_delay_is_that_of_the_commands_it_remembers(linear, problem, measure):
