@@ -70,19 +70,6 @@ def test_ports_that_there_are_not_are_refused(scan, values):
         Scan(leaky_step(), carry=("u",), over=())
 
 
-def test_a_single_sample_may_come_flat(scan, values):
-    flat = scan(1, values | {"u": values["u"][0]})
-    np.testing.assert_allclose(flat["y"], [values["M"] @ np.exp(values["u"][0])], rtol=1e-13)
-
-
-def test_a_library_is_built_once(cache, values, caplog):
-    with caplog.at_level("INFO", logger="tireid"):
-        for _ in range(2):
-            Scan(leaky_step(), carry=("M", "s"), over=("u",))(8, values)
-    assert sum("compiling leaky" in message for message in caplog.messages) == 1
-    assert len(list(cache.glob("leaky-*.so"))) == 1
-
-
 def no_compiler(*_):
     raise CompilationError("gcc refused\nthe code")
 
@@ -104,17 +91,6 @@ def test_a_build_that_fails_is_one_warning_and_the_same_numbers(
     assert len(caplog.messages) == 1
     assert "virtual machine" in caplog.messages[0]
     assert "\n" not in caplog.messages[0]
-
-
-def test_a_compiler_that_cannot_compile_is_no_error(monkeypatch, cache, values, caplog):
-    monkeypatch.setenv("CC", "false")
-    codegen.find_compiler.cache_clear()
-    try:
-        with caplog.at_level("WARNING", logger="tireid"):
-            Scan(leaky_step(), carry=("M", "s"), over=("u",))(8, values)
-    finally:
-        codegen.find_compiler.cache_clear()
-    assert "false refused the generated code of leaky" in caplog.messages[0]
 
 
 def test_a_matrix_for_each_sample_is_laid_out_by_columns_in_one_row(cache, rng):

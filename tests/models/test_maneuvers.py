@@ -45,19 +45,6 @@ def test_nothing_happens_before_the_onset_and_the_amplitude_is_kept(maneuver):
 
 
 @every_maneuver
-def test_a_negative_amplitude_is_the_mirror_image(maneuver):
-    t = np.linspace(0.0, maneuver.duration, 777)
-    mirrored = replace(maneuver, amplitude=-maneuver.amplitude)
-    np.testing.assert_array_equal(mirrored.steering(t), -maneuver.steering(t))
-
-
-@every_maneuver
-def test_angles_do_not_depend_on_the_sampling(maneuver):
-    fine = np.arange(0.0, maneuver.duration, 0.001)
-    np.testing.assert_array_equal(maneuver.steering(fine)[::10], maneuver.steering(fine[::10]))
-
-
-@every_maneuver
 def test_the_rear_axle_follows_its_ratio_and_the_limit_holds_for_it_too(maneuver):
     t = np.linspace(0.0, maneuver.duration, 12001)
     both = replace(maneuver, rear_ratio=-1.1).steering(t)

@@ -154,15 +154,6 @@ def test_numbers_of_the_car_are_put_right(drive, told):
     np.testing.assert_array_equal(repaired.v_y, drive.v_y)
 
 
-def test_nothing_repaired_is_nothing_changed(drive):
-    repaired, car = Repair().apply(drive, CAR)
-    assert not Repair()
-    assert Repair(delay={"r": 0.01})
-    assert car is CAR
-    assert all(value == 0.0 for value in apart(repaired, drive).values())
-    assert Repair(vehicle={"mass": 1400.0}).apply(drive, CAR)[0] is drive
-
-
 def test_a_document_holds_a_repair_bit_for_bit():
     repair = Repair(
         factor={"delta_f": 1.0 / 15.9}, offset={"v_y": 0.1}, delay={"a_y": 0.09}, lag={"r": 0.02},
@@ -233,12 +224,6 @@ def test_two_repairs_in_sequence_are_one(drive, name):
     assert "car" in name or max(apart(alone, in_sequence).values()) > 0.02
 
 
-def test_delays_and_lags_in_sequence_add(drive):
-    one, other = Repair(delay={"r": 0.02}, lag={"v_y": 0.1}), Repair(delay={"r": 0.03})
-    assert one.then(other) == Repair(delay={"r": 0.05}, lag={"v_y": 0.1})
-    assert one.then(Repair()) == one == Repair().then(one)
-
-
 def test_areas_of_downforce_come_into_the_car_and_may_be_of_lift(drive):
     areas = {"downforce_area_front": 1.2, "downforce_area_rear": -0.3}
     repair = Repair(vehicle=areas)
@@ -302,13 +287,6 @@ def test_a_repair_of_a_segment_looks_at_no_other(drive, broken, name):
     assert middle is not None
     for channel in ("t", "v_x", "v_y", "r", "delta_f", "a_y", "axle_force"):
         np.testing.assert_array_equal(getattr(repaired, channel)[middle], getattr(alone, channel))
-
-
-def test_segments_one_step_apart_are_repaired_as_they_are(drive):
-    whole = replace(drive, breaks=(5 * 200,))
-    repaired, _ = Repair(offset={"r": 0.1}, acceleration_sensor_x=0.2).apply(whole, CAR)
-    np.testing.assert_array_equal(repaired.t, drive.t)
-    assert repaired.breaks == whole.breaks
 
 
 # Low passes: by fine integration, by what they leave alone, and by going back.

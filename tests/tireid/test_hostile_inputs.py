@@ -303,23 +303,6 @@ def test_a_compiler_that_refuses_is_one_line(capsys, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == [refusing]
 
 
-def test_figures_are_not_left_where_the_design_cannot_be_written(capsys, tmp_path, monkeypatch):
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("tireid.commands.check.write_atomically", full)
-    monkeypatch.setattr("tireid.commands.check.draw_check", _drawn, raising=False)
-    monkeypatch.setattr("tireid.commands.check.draw_check", _drawn)
-    words = ["check", "--tune", tmp_path / "d.toml", "--out", tmp_path / "judged"]
-    refused(capsys, words, "no space left on device")
-    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == []
-
-
-def _drawn(folder, *_):
-    for name in ("locus.png", "bounds.png"):
-        (folder / name).write_bytes(b"drawn")
-
-
 @pytest.mark.parametrize(
     "marker",
     [

@@ -110,12 +110,3 @@ def test_the_figure_has_truth_band_and_errors(slalom):
     assert band_of(upper) > 2.0 * reach
     without = side_slip_figure([slalom], {"linear_kf": {name: slow}}).axes[0]
     assert band_of(without) < band_of(upper)
-
-
-def test_without_a_recorded_v_y_the_figure_shows_the_estimate_alone(slalom):
-    blind = replace(slalom, v_y=None)
-    told = {"joint_ekf": {slalom.name: made_up(slalom, 0.9, sd=0.1)}}
-    (axes,) = side_slip_figure([blind], told).axes
-    assert "recorded" not in axes.get_legend_handles_labels()[1]
-    with pytest.raises(ValueError, match="no method estimated a lateral velocity"):
-        side_slip_figure([blind], {"axle": {}})

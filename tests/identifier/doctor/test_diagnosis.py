@@ -1,12 +1,10 @@
 """A diagnosis: the order, what is sure, what is not observable, and a repair of the log."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-import tireid
 from benchmarks.faults import Together, WrongUnit
 from benchmarks.random_cars import random_car, random_drive
 from identifier.axle import AxleIdentifier
@@ -75,13 +73,6 @@ def test_what_is_sure_mends_the_log_as_well_as_the_right_one(driven, ratio, foun
     assert diagnose(mended, told).healthy
 
 
-def test_a_diagnosis_is_ready_for_json_and_short_to_print(found):
-    data = json.loads(json.dumps(found.to_dict()))
-    assert data["findings"][0]["repair"] == data["repair"]
-    assert repr(found).startswith("<Diagnosis of 'sedan, straight': steering_ratio delta_f")
-    assert "not observable: mass" in found.summary()
-
-
 def test_gross_repairs_come_before_fine_ones_and_only_sure_ones_are_taken():
     findings = (
         Finding(
@@ -121,22 +112,9 @@ def test_whether_something_is_wrong_is_one_question_and_which_of_several_another
     assert Finding(code="straight", confidence=0.99).alarm == 0.99
 
 
-def test_a_log_alone_proves_nothing():
-    certain = Finding(code="straight", confidence=1.0, text="it goes straight ahead")
-    found = Diagnosis(name="log", findings=(certain,), unobservable=())
-    assert certain.percent == "99 %"
-    assert found.lines() == ["it goes straight ahead (confidence 99 %)"]
-
-
 def test_nothing_is_looked_for_where_nothing_was_driven(driven):
     _, log = driven
     standing = replace(log, v_x=0.0 * log.v_x, v_y=0.0 * log.v_y, r=0.0 * log.r)
     found = diagnose(standing, sedan())
     assert not found.healthy
     assert any(line.startswith("offsets, delays") for line in found.unobservable)
-
-
-def test_the_interface_has_the_doctor():
-    assert tireid.diagnose is diagnose
-    assert tireid.Diagnosis is Diagnosis
-    assert tireid.Repair is Repair

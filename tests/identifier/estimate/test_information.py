@@ -66,13 +66,6 @@ def test_logs_added_up_teach_what_they_do_at_once(drives, told):
         assert abs(p[INDEX[name]] - at_once.posterior[name]) < at_once.posterior.sd(name)
 
 
-def test_nothing_told_leaves_the_prior():
-    p, covariance = settled(PRIORS.after(Information.nothing()), PRIORS.mean)
-    assert p == pytest.approx(PRIORS.mean)
-    moves = np.ix_(PRIORS.moves, PRIORS.moves)
-    assert covariance[moves] == pytest.approx(PRIORS.covariance[moves], rel=1e-6, abs=1e-12)
-
-
 def test_errors_of_a_drives_own_are_marginal(told):
     """As a Gaussian of u and the errors, whose inverse of the covariance of u it is."""
     along = np.zeros((SIZE, 2))

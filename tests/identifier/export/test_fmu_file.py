@@ -66,19 +66,3 @@ def test_a_start_that_is_not_finite_is_refused(tmp_path):
     carry = {port: np.full_like(value, np.nan) for port, value in specialized.carry.items()}
     with pytest.raises(ValueError, match="must be finite to be exported, it is nan"):
         export_fmu(specialized._replace(carry=carry), tmp_path / "nan.fmu")
-
-
-@pytest.mark.parametrize("version", [2, 3])
-def test_the_switch_of_learning_says_what_it_holds(exported, version, tmp_path):
-    def said(path):
-        about = fmpy.read_model_description(str(path))
-        (switch,) = (v for v in about.modelVariables if v.name == "adaptation")
-        return switch.description
-
-    step = specialize(DESIGN, CAR)
-    held = said(exported[version]).removeprefix("whether it adapts; false freezes ")
-    assert step.learnt and held.split(", ") == list(step.learnt)
-    export_fmu(step._replace(learnt=()), tmp_path / "none.fmu", version)
-    assert said(tmp_path / "none.fmu").endswith(
-        "freezes nothing: this method has no memory of the tire"
-    )

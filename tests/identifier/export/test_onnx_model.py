@@ -117,13 +117,6 @@ def test_its_derivative_is_that_of_the_file(car, rng):
     assert np.abs(slope.ravel() - differences[:, 0]).max() < 1e-6 * np.abs(differences).max()
 
 
-def test_it_generates_code(car, rng):
-    model = OnnxModel(vehicle=car, content=network_file(tire(rng)))
-    generator = ca.CodeGenerator("tire.c")
-    generator.add(model.step)
-    assert "frozen_onnx" in generator.dump()
-
-
 def test_a_network_in_the_sign_of_iso_8855_is_turned_round(car, drive, rng):
     state = rng.bit_generator.state
     paper = network_file(tire(rng))
@@ -143,14 +136,6 @@ def test_columns_may_be_named_in_any_order(car, drive, rng):
     told = OnnxModel(vehicle=car, content=swapped, inputs=("alpha_r", "alpha_f"))
     named = network_file([weights[0][::-1], weights[1]], inputs=[("alpha_r", 1), ("alpha_f", 1)])
     assert np.array_equal(told.predict(recording), plain)
-    assert np.array_equal(OnnxModel(vehicle=car, content=named).predict(recording), plain)
-
-
-def test_forces_may_be_named_in_any_order(car, drive, rng):
-    recording, weights = drive(100), tire(rng)
-    plain = OnnxModel(vehicle=car, content=network_file(weights)).predict(recording)
-    turned = [weights[0], weights[1][:, ::-1]]
-    named = network_file(turned, outputs=[("F_yr", 1), ("F_yf", 1)])
     assert np.array_equal(OnnxModel(vehicle=car, content=named).predict(recording), plain)
 
 

@@ -123,22 +123,6 @@ def test_everything_that_goes_in_changes_the_hash(packages):
     assert len({package.about["hash"] for package in found}) == len(found)
 
 
-def test_a_package_says_what_is_proven_of_it(packages):
-    """The boxes and the properties of the default are those of its design."""
-    axle, integral = packages["axle"], packages["integral"]
-    told = json.loads(axle.files["tireid.json"])["certificate"]
-    held, method = told["limits"], axle.specialized.method
-    assert told["verdict"] == "pass"
-    assert told["properties"]["jump"]["value"] == method.certify(CAR)["jump"].value
-    bounds = method.bounds
-    assert held["grip_static_axle_loads"] == [bounds.least_grip, bounds.most_grip]
-    text = readme(axle, "")
-    assert "built for: **pass**" in text and "| largest jump of a force by learning" in text
-    assert f"| compliance_m | [0.0, {bounds.compliance}] |" in text
-    assert "not certified" not in readme(integral, "")
-    assert "`tireid check`" in readme(integral, "")
-
-
 def test_the_manifest_tells_all_that_went_in(packages):
     files = packages["integral"].files
     manifest = json.loads(files["tireid.json"])
@@ -156,13 +140,6 @@ def test_the_manifest_tells_all_that_went_in(packages):
     np.testing.assert_array_equal(
         start["V"], design.network.initial_weights(np.random.default_rng(0)).V
     )
-
-
-@pytest.mark.parametrize("law", ["integral", "axle", "inertial", BANKED])
-def test_nothing_is_left_to_fill_in(law, packages):
-    package = packages[law]
-    for path, text in {**package.files, "README.md": readme(package, "none")}.items():
-        assert "@" not in text, path
 
 
 @pytest.mark.heavy
@@ -230,15 +207,6 @@ def test_every_method_passes_its_own_test_without_a_warning(law, packages, write
     assert "largest difference of a force: 0 N" not in told[1]
 
 
-def test_a_cell_without_a_number_is_a_fault_in_the_example(packages, write, run):
-    folder = write(packages["integral"])
-    log = folder / "log.csv"
-    log.write_text("t,r,vx,delta_f,vy\n0,0.1,20,0.02,0.1\n0.01,,20,0.02,0.1\n0.02,0.1,20\n")
-    answer = example(folder, run, log)
-    assert [line.split(",")[-1] for line in answer.stdout.splitlines()[1:]] == ["0", "3", "3"]
-    assert "faults: 2" in answer.stderr
-
-
 def example(folder, run, log):
     """What the example prints, one row a sample."""
     sources = ["src/tireid.c", "src/tireid_equations.c", "examples/main.c"]
@@ -261,20 +229,6 @@ def test_the_example_tells_side_slip_from_a_log_without_a_lateral_velocity(
     for column, port in enumerate(("v_y", "v_y_sd", "side_slip_observable"), start=3):
         np.testing.assert_allclose(rows[:, column], expected.outputs[port].ravel(), atol=1e-8)
     assert (rows[:, -1] == 0).all() and rows[2000:, 5].mean() > 0.5
-
-
-def test_the_example_prints_the_band_beside_the_forces(packages, write, run, slalom):
-    folder, drive = write(packages[BANKED]), slalom.taken(np.arange(400))
-    names = {"t": "t", "ay": "a_y", "vx": "v_x", "vy": "v_y", "r": "r", "delta_f": "delta_f"}
-    table = np.column_stack([getattr(drive, signal) for signal in names.values()])
-    log = folder / "log.csv"
-    np.savetxt(log, table, delimiter=",", header=",".join(names), comments="", fmt="%.17g")
-    told = example(folder, run, log).stdout.splitlines()
-    assert told[0] == "t,Fyf,Fyr,Fyf_half_band,Fyr_half_band,status"
-    rows = np.loadtxt(told[1:], delimiter=",")
-    compiled = CompiledPackage.of(packages[BANKED]).run(drive).outputs["half_band"]
-    np.testing.assert_allclose(rows[:, 3:5], compiled, rtol=1e-6)
-    assert (compiled[10:] > 0.0).all()
 
 
 @pytest.mark.sweep("inertial-*")

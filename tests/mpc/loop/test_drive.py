@@ -5,14 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from models.faults import SensorFault
 from models.friction import Friction
 from models.sensors import Sensor
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
 from mpc.loop.drive import COMPLETED, GUIDES, drive
 from mpc.loop.record import scores
-from mpc.loop.sensing import CarSensors, FaultySensors, Measured, SpeedProfile, inertial_unit
+from mpc.loop.sensing import CarSensors, Measured, SpeedProfile, inertial_unit
 from mpc.path.path import Path
 from mpc.realtime import Command
 
@@ -174,27 +173,6 @@ def test_scores_are_those_of_the_signals(noisy):
     assert found.solve_ms == pytest.approx({"median": 0.1, "p99": 0.1, "max": 0.1})
 
 
-@pytest.mark.sweep("psi")
-@pytest.mark.parametrize("channel", ["X", "Y", "psi"])
-def test_a_place_that_is_no_number_goes_on_by_dead_reckoning(bump, channel):
-    """Half a second without it, and the car is where it was steered to, to some centimeters."""
-    fault = SensorFault(channel=channel, kind="lost", start=1.0, duration=0.5)
-    driven = drive(
-        bump,
-        DoubleTrackCar(sedan()),
-        driver := Driver(),
-        speed=15.0,
-        sensors=FaultySensors(inertial_unit(), [fault]),
-        rng=np.random.default_rng(0),
-    )
-    assert driven.completed
-    assert np.isfinite([[m.e_y, m.e_psi] for m in driver.seen]).all()
-    lost = fault.active(driven.t)
-    told = np.array([m.e_y for m in driver.seen])
-    assert np.abs(told - driven.e_y)[lost].max() < 0.15
-    assert np.isnan(driven.measured[channel][lost]).all()
-
-
 class Broken:
     """Sensors of which one channel shows something that is no number of a car, for some time."""
 
@@ -239,12 +217,3 @@ def test_a_car_that_stays_blind_ends_its_drive_and_says_why(channel, value, bump
     assert (run.completed, run.ending) == (False, f"no number of {channel} for 1.5 s")
     assert run.t[-1] == pytest.approx(1.0 + 1.5, abs=0.011)
     assert np.abs(run.e_y).max() < 0.6
-
-
-def test_a_car_that_is_blind_now_and_then_goes_on(bump):
-    class Flickers(Broken):
-        def measure(self, state, rng):
-            self.start = 0.0 if round(100 * state.t) % 50 else 1e9  # one good sample in 0.5 s
-            return super().measure(state, rng)
-
-    assert broken_drive(bump, Driver(), Flickers("all", math.nan)).completed

@@ -47,12 +47,6 @@ def test_the_road_ahead_is_where_the_driver_brings_the_car(ring, s, v):
     assert ahead.kappa == pytest.approx(1.0 / 30.0, rel=1e-3)
 
 
-def test_at_the_wanted_speed_the_time_of_a_lap_leads_around_it(ring):
-    profile = SpeedProfile(ring, wave(ring))
-    ahead = profile.ahead(40.0, float(profile.at(40.0)), np.array([0.0, profile.lap_time]), GAIN)
-    assert ahead.s[1] - ahead.s[0] == pytest.approx(ring.length, abs=1e-6)
-
-
 def test_beyond_the_end_of_an_open_path_the_speed_is_held(straight):
     profile = SpeedProfile(straight, 20.0)
     ahead = profile.ahead(195.0, 20.0, np.array([0.0, 1.0]), GAIN)

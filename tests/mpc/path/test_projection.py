@@ -63,14 +63,6 @@ def test_laps_are_counted_forwards_and_backwards():
         assert abs(s) > 2.99 * path.length
 
 
-def test_a_circle_driven_twice_tells_the_rounds_apart():
-    path = constant_radius(20.0, turns=2.2)
-    s = 0.0
-    for true in np.arange(0.0, path.length, 0.7):
-        s = path.project(*beside(path, true, -0.5), near=s).s
-        assert s == pytest.approx(true, abs=1e-6)
-
-
 def test_beyond_the_ends_s_goes_on():
     path = Path.from_waypoints([0.0, 30.0, 60.0], [0.0, 4.0, 0.0])
     for s in (-300.0, -4.0, path.length + 4.0, path.length + 300.0):
