@@ -38,7 +38,7 @@ bare: $(VENV)/.test
 	$(PY) -m tests.optional_tools $(PY) -m pytest -n auto --dist worksteal -m "not heavy" \
 		$$(cat tests/optional_tools.txt)
 
-# The sweeps that tests/heavy.toml lists.
+# What is marked as heavy, and the other cases of sweeps.
 heavy: $(VENV)/.test
 	$(PY) -m pytest -n auto --dist worksteal -m heavy
 

@@ -6,9 +6,9 @@ number above it, in their order:
     <!-- numbers learn_and_extrapolate: input=5 plant/over_floor/{least,most} target=1.3 -->
 
     script:          whose recorded values, benchmarks/results/<script>.json, the next keys are of;
-                     tireid_paper has those of the tables that a test computes again, house
-                     what docs/house.py counts of the code, fault_table_before what
-                     fault_table.py measured at the commit that the file names, mpc_speed_before
+                     tireid_paper has those of the tables that a test computes again,
+                     fault_table_before what fault_table.py measured at the commit that the file
+                     names, mpc_speed_before
                      instructions of a step there, and at the end
     key              measured: the number is the recorded value, rounded as it is printed
     key*1e3          times a factor, where the document has another unit
@@ -43,7 +43,6 @@ from benchmarks.targets import RESULTS
 ROOT = Path(__file__).resolve().parents[1]
 COMMITTED = {
     "tireid_paper": ROOT / "tests" / "tireid" / "expected_tables.json",
-    "house": ROOT / "docs" / "house.json",
     "fault_table_before": ROOT / "benchmarks" / "fault_table_before.json",
     "mpc_speed_before": ROOT / "benchmarks" / "mpc_speed_before.json",
 }

@@ -9,6 +9,7 @@ ROOT = Path(__file__).resolve().parents[1]
 EXAMPLES = sorted((ROOT / "examples").glob("*.py"))
 
 
+@pytest.mark.sweep("learn_and_freeze", "derivations")
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_example_runs_and_stays_short(path, tmp_path, monkeypatch, capsys):
     if path.stem == "own_network":

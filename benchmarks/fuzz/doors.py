@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-CURVE = "curve.json"
 WORDS = ""  # in place of a file: the words of the command are mutated
 
 
@@ -94,9 +93,8 @@ DOORS = (
     # frozen models
     _door("export axle", 6, "export --out out --weights axle.json", "axle.json"),
     _door("export network", 4, "export --out out --weights network.json", "network.json"),
-    _door("identify axle", 6, f"{IDENTIFY} --weights axle.json", "axle.json"),
+    _door("identify axle", 6, f"{IDENTIFY} --method axle --weights axle.json", "axle.json"),
     _door("identify network", 4, f"{IDENTIFY} --paper --weights network.json", "network.json"),
-    _door("identify curve", 2, f"{IDENTIFY} {FILTER} --weights curve.json", CURVE),
     _door("drive axle", 4, f"{DRIVE} --weights axle.json", "axle.json"),
     _door("drive network", 3, f"{DRIVE} --weights network.json", "network.json"),
     _door("predict curve", 2, f"{PREDICT} curve.json log.csv", "curve.json"),

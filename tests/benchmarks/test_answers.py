@@ -38,6 +38,7 @@ def log(drive):
     return drive.log(np.random.default_rng(1))
 
 
+@pytest.mark.heavy
 def test_the_error_is_that_of_the_frozen_model_in_percent_of_the_rms_force(drive, log):
     found = answer(log, drive.car.told, drive.exact)
     force = ti.identify(blind(log), drive.car.told).freeze().predict(drive.exact)
@@ -67,6 +68,7 @@ def test_nothing_that_judges_sees_a_true_force(drive, log, monkeypatch):
     assert log.axle_force is not None
 
 
+@pytest.mark.sweep("refused")
 @pytest.mark.parametrize(
     ("fault", "code"),
     [(None, 0), (Mirrored(channels=("r",)), 2), (Late(channels=("r",), delay=0.3), 3)],
@@ -174,6 +176,7 @@ def shared(drive, monkeypatch):
     monkeypatch.setattr(noisy_runs, "drive_of", lambda _: drive)
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("shared")
 def test_noisy_runs_end_well():
     assert noisy_runs.chunk(range(30)) == []

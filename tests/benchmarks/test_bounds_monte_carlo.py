@@ -43,6 +43,7 @@ def test_weights_are_resumed_and_sensors_err_on_the_drives(case, monkeypatch):
     assert {kind.noise_r > 0.0 for kind in kinds} == {True, False}
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("share", [1.0, 1e-3])
 def test_a_bound_that_is_passed_misses_the_target(monkeypatch, share):
     """A certificate that states a thousandth of what it proves is found out."""

@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 from tests.sources import nodes_of, tree_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -90,6 +92,7 @@ def only_in_benchmarks(root: Path) -> set[Name]:
     }
 
 
+@pytest.mark.heavy
 def test_benchmarks_call_what_the_product_calls():
     assert only_in_benchmarks(ROOT) <= CHECKED
 

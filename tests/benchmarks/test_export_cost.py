@@ -29,10 +29,12 @@ def samples():
     return np.column_stack([20.0 + t, -0.3 * wave, 0.2 * wave, 0.05 * wave, 0.01 * wave])
 
 
+@pytest.mark.heavy
 def test_every_way_to_write_the_step_gives_the_same_forces(package, samples):
     check(steps(package), samples, Targets("export_cost"))
 
 
+@pytest.mark.heavy
 def test_a_hand_written_step_that_computes_something_else_is_seen(
     package, samples, monkeypatch, tmp_path
 ):

@@ -61,6 +61,7 @@ def warmed(tmp_path_factory):
     warm(tmp_path_factory.mktemp("warm"))
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("warmed")
 def test_a_folder_that_is_written_in_place_is_lost_when_its_run_is_killed(tmp_path, monkeypatch):
     def copied(new, target, final, **_):
@@ -74,6 +75,7 @@ def test_a_folder_that_is_written_in_place_is_lost_when_its_run_is_killed(tmp_pa
     assert seen["lost"] > 0
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("warmed")
 def test_runs_that_are_killed_lose_nothing(tmp_path):
     seen = kill_and_fill.kill(Bench(tmp_path / "bench"), RUNS, random.Random(0))

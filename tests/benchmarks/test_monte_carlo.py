@@ -70,6 +70,7 @@ def learnt_alone(design: PaperIdentifier, drives: Drives, weights: Weights, i: i
     return identify(recording_of(drives, i), CAR, design, start)
 
 
+@pytest.mark.sweep("integral", "instantaneous")
 @pytest.mark.parametrize("law", ["integral", "instantaneous", "pi_lead"])
 def test_the_largest_norms_are_those_of_the_same_run_alone(drives, law):
     design = PaperIdentifier.for_vehicle(CAR, law=law)

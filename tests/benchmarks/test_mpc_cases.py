@@ -11,6 +11,7 @@ from tireid.cli import main
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("tires", TIRES)
 def test_a_case_is_what_the_command_drives(tires, tmp_path, undrawn):
     case = Case("iso-3888-2", 0.9, 0.5, tires, seed=3)
@@ -29,6 +30,7 @@ def test_a_case_is_what_the_command_drives(tires, tmp_path, undrawn):
     assert summary["inputs"]["delay_ms"] == 20.0
 
 
+@pytest.mark.heavy
 def test_another_path_is_driven_on_the_same_learnt_tire(tmp_path, undrawn):
     out = tmp_path / "out"
     words = ["--path", "slalom", "--speed", "50%", "--seed", "4", "--film", "none"]

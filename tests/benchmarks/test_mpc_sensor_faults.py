@@ -39,6 +39,7 @@ def test_a_fault_is_what_the_command_is_told(fault):
     assert (told.channel, told.kind, told.duration, told.size) == fault and told.start == 9.0
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("driver", DRIVERS)
 def test_every_drive_is_one_of_the_command_and_goes_on_after_its_fault_began(driver):
     cases = cases_of(FAULTS[0], driver)

@@ -53,6 +53,7 @@ def test_cars_are_of_their_class_and_drive(kind):
     assert len(TIRES) == 3
 
 
+@pytest.mark.sweep("[03]")
 @pytest.mark.parametrize("seed", range(6))
 def test_the_stiffness_of_a_car_is_that_of_its_tires(seed):
     """Axle force over slip on a gentle circle, against the number the car carries."""
@@ -100,6 +101,7 @@ def test_a_drive_without_corners_and_one_that_spins_are_no_good(car):
     assert not is_good(car, spun, begin, speed)
 
 
+@pytest.mark.heavy
 def test_the_same_seed_is_the_same_drive_and_noise(car):
     one, two = (random_drive(car, generator(4)).log(generator(5)) for _ in range(2))
     other = random_drive(car, generator(6)).log(generator(5))

@@ -15,6 +15,7 @@ from models.vehicle import sedan
 from tireid.commands.demo_story import plant_recordings
 
 
+@pytest.mark.heavy
 def test_the_errors_on_recorded_cars_are_those_recorded():
     if not recorded_cars.DATA.is_dir():
         pytest.skip(f"the recordings are not there: {recorded_cars.DATA}")

@@ -30,6 +30,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.sweep("biased", "refused")
 @pytest.mark.parametrize("name", FAULTS)
 def test_the_compiled_run_is_that_of_a_car_sample_by_sample(drive, name):
     """Beside a car samples that are no numbers are refused, and the forces go on, bit for bit."""

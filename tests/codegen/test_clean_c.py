@@ -123,6 +123,7 @@ def many(n):
     return ca.Function("f", [x], [ca.vertcat(*(one / (1 + ca.sumsqr(x)) for one in sums))])
 
 
+@pytest.mark.sweep("20")
 @needs_compiler
 @pytest.mark.parametrize("n", [20, 200])
 def test_many_results_are_those_of_casadi_and_so_is_their_sum(n, rng):

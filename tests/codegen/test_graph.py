@@ -8,9 +8,6 @@ from codegen import clean_c as recognize
 from codegen.clean_c import EXPANDED, recognized
 from codegen.elementary import atan, exp, sin, tanh
 from codegen.graph import (
-    Graph,
-    Node,
-    UnknownOperationError,
     assumed,
     decision,
     function_of,
@@ -79,18 +76,6 @@ def test_functions_that_differ_in_their_constants_alone_become_one():
     other, of_other = lifted(spring(1500.0, 40.0))
     assert one.serialize() == other.serialize() and sorted(of_one) == [-2000.0, 3.0, 30.0]
     assert other(0.1, 2.0, of_other) == spring(1500.0, 40.0)(0.1, 2.0)
-
-
-def test_a_function_without_constants_is_told_none():
-    x = ca.SX.sym("x", 0, 1), ca.SX.sym("y")
-    told, constants = lifted(ca.Function("f", x, [x[1] * x[1]], ["x", "y"], ["z"]))
-    assert constants.size == 0 and told([], 3.0, constants) == 9.0
-
-
-def test_equal_expressions_are_one_node():
-    x = ca.SX.sym("x")
-    function = ca.Function("f", [x], [ca.sin(x) * 2, ca.sin(x) * 3])
-    assert operations(graph_of(function)).count("sin") == 1
 
 
 def test_operations_that_a_result_takes_are_counted_once():
@@ -255,14 +240,6 @@ def test_a_function_that_decides_nothing_stays_whole():
 def test_casadi_simplifies_again_afterwards():
     tuned(learning_step(), sampled=("v",))
     assert ca.GlobalOptions.getSimplificationOnTheFly()
-
-
-def test_an_operation_without_plain_c_is_refused():
-    graph = Graph()
-    graph.outputs = [[graph.add(Node("erf", (graph.constant(1.0),)))]]
-    x = ca.SX.sym("x")
-    with pytest.raises(UnknownOperationError, match="f: there is no plain C for erf"):
-        function_of(graph, ca.Function("f", [x], [x]))
 
 
 @pytest.mark.parametrize("turned", [False, True])

@@ -57,6 +57,7 @@ def assert_by_hand(recording, design, car):
     return np.linalg.norm(W), np.linalg.norm(V)
 
 
+@pytest.mark.sweep("inf-measured-integral", "0.5-estimated-instantaneous", "inf-estimated-pi_lead")
 @pytest.mark.parametrize("law", ["integral", "instantaneous", "pi_lead"])
 @pytest.mark.parametrize("source", ["measured", "estimated"])
 def test_step_repeats_the_equations_by_hand(law, source, car, drive):

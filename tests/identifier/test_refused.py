@@ -50,6 +50,7 @@ def error(force, truth):
     return float((np.sqrt(((force - truth) ** 2).mean(0) / (truth**2).mean(0))).max())
 
 
+@pytest.mark.sweep("magic_formula_ekf")
 @pytest.mark.parametrize("name", [one for one in METHODS if not make_method(one, CAR).whole])
 def test_a_gap_of_refused_samples_costs_less_than_two_percent(name, slalom):
     rows, truth, method = rows_of(slalom), slalom.axle_force, make_method(name, CAR)
@@ -79,6 +80,7 @@ def test_a_gap_that_does_not_count_as_time_costs_more(slalom):
     assert worst > 0.005
 
 
+@pytest.mark.sweep("nan-*", "1e+308-0", "-inf-2")
 @pytest.mark.parametrize("channel", range(5))
 @pytest.mark.parametrize("broken", BROKEN)
 def test_no_channel_without_a_number_changes_what_was_learnt(channel, broken, slalom):
@@ -99,6 +101,7 @@ def test_no_channel_without_a_number_changes_what_was_learnt(channel, broken, sl
     assert np.abs(force).max() > 100.0
 
 
+@pytest.mark.heavy
 def test_no_sample_is_refused_for_a_lateral_velocity_that_the_method_tells(slalom):
     """What no car can have is as if there were no sensor, to the bit; NaN is none."""
     method, rows, found = make_method("inertial", CAR), rows_of(slalom)[:900], []
@@ -116,6 +119,7 @@ def test_no_sample_is_refused_for_a_lateral_velocity_that_the_method_tells(slalo
     assert driven(paper, refused)[1].counts.refused == 50
 
 
+@pytest.mark.sweep("axle")
 @pytest.mark.parametrize("name", ["axle", "inertial"])
 def test_no_input_brings_a_number_into_a_step_that_is_none(name):
     """The step alone, without the door before it: every channel and all of them, in any state."""

@@ -77,6 +77,7 @@ def glued(cut: Recording) -> Recording:
     return replace(cut, t=cut.dt * np.arange(len(cut)), breaks=())
 
 
+@pytest.mark.sweep("axle", "inertial", "instantaneous", "linear*")
 @pytest.mark.parametrize("name", sorted({*METHODS} - {"fit"}))  # which learns from both segments
 def test_what_is_learnt_stays_over_a_gap_and_the_rest_begins_anew(name, log, cut) -> None:
     method = make_method(name, CAR)
@@ -96,6 +97,7 @@ def test_what_is_learnt_stays_over_a_gap_and_the_rest_begins_anew(name, log, cut
         assert not np.array_equal(lost.axle_force[k + 1 :], run.axle_force[k + 1 :])
 
 
+@pytest.mark.sweep("axle", "inertial", "instantaneous")
 @pytest.mark.parametrize("name", sorted(METHODS))
 def test_a_gate_is_off_at_each_break(name, log, cut) -> None:
     whole, run = (identify(one, CAR, make_method(name, CAR)) for one in (log, cut))

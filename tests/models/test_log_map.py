@@ -100,12 +100,6 @@ def test_a_map_that_is_written_to_another_folder_finds_its_database(tmp_path, mo
     assert below.get(other, str(tmp_path / "there" / "car.dbc")) in named
 
 
-def test_an_empty_map_is_an_empty_file(tmp_path):
-    LogMap().to_toml(tmp_path / "log.toml")
-    assert (tmp_path / "log.toml").read_text() == ""
-    assert LogMap.from_toml(tmp_path / "log.toml") == LogMap()
-
-
 @pytest.mark.parametrize(
     ("text", "rule"),
     [

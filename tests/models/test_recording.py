@@ -208,6 +208,7 @@ def test_segments_are_read_back_where_gaps_are_long_or_the_map_says_so(tmp_path,
     assert bridged.breaks == (made.breaks if gap > 0.1 else ())
 
 
+@pytest.mark.sweep(".csv")
 @pytest.mark.parametrize("ending", [".csv", ".csv.gz"])
 def test_a_long_recording_is_written_by_blocks_with_the_bytes_of_one_piece(
     tmp_path, monkeypatch, ending

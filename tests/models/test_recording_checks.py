@@ -152,6 +152,7 @@ def test_every_planted_error_rings_its_own_alarm(driven, car, error):
     assert remedy in message
 
 
+@pytest.mark.sweep("1.0-sedan", "3.0-tenth", "6.0-forty-third", "3.0-truck", "6.0-formula")
 @pytest.mark.parametrize("car", CARS)
 @pytest.mark.parametrize("peak", [1.0, 3.0, 6.0])
 def test_a_right_recording_passes(car, peak):
@@ -164,6 +165,7 @@ def test_a_right_recording_passes(car, peak):
     check_against_vehicle(replace(made, axle_force=None), axles)
 
 
+@pytest.mark.sweep("2", "50")
 @pytest.mark.parametrize("every", [2, 20, 50, 90])
 def test_at_every_rate_above_ten_hertz_a_right_recording_passes_and_errors_ring(every):
     made = drive(every=every)
@@ -197,6 +199,7 @@ def test_one_degree_of_steering_in_degrees_is_found_without_acceleration():
     assert "effective wheelbase" in refusal(scaled(delta_f=DEGREES, bare=1)(made))
 
 
+@pytest.mark.sweep("8.0-0.1", "15.0-0.8", "25.0-0.3")
 @pytest.mark.parametrize("grip", [0.1, 0.3, 0.8])
 @pytest.mark.parametrize("speed", [8.0, 15.0, 25.0])
 def test_a_car_that_plows_over_its_front_wheels_passes(grip, speed):
@@ -306,6 +309,7 @@ def test_the_vehicle_of_another_scale_is_refused():
         check_against_vehicle(drive(speed=6.0), SimpleNamespace(l_f=0.08, l_r=0.09, mass=1.5))
 
 
+@pytest.mark.sweep("carmaker*")
 @pytest.mark.parametrize("file", ["carmaker.csv.gz", "dart.csv.gz"])
 def test_real_runs_pass_and_their_corruptions_ring(shared_data, file):
     path = shared_data / file

@@ -64,6 +64,7 @@ def drive(rng, k, n=3000):
     return rows, (rows - before) / (5.0 * DT)
 
 
+@pytest.mark.sweep("0-2", "2-4", "3-5", "5-2")
 @pytest.mark.parametrize("k", [1, 2, 4, 5])
 @pytest.mark.parametrize("seed", range(6))
 def test_every_sample_has_the_bits_of_plain_python(k, seed):

@@ -67,20 +67,6 @@ def test_turns_and_speeds_give_the_same_recording_whatever_their_unit(run, wheel
     np.testing.assert_allclose(want, run.v_x, atol=0.5)
 
 
-def test_our_names_without_a_unit_are_in_si(run, wheels):
-    got = read_recording(columns(run, wheels), log_map=LogMap(wheels=replace(TRACK, radius=())))
-    np.testing.assert_allclose(got.v_x, run.v_x, atol=0.5)
-
-
-def test_the_notes_say_of_what_the_speed_is_made_and_what_was_left_out(run, wheels):
-    (note,) = (one for one in read_recording(columns(run, wheels)).notes if "vx is computed" in one)
-    assert "wheel_fl, wheel_fr, wheel_rl, wheel_rr" in note
-    share = float(note.split(" % of the samples")[0].split()[-1])
-    assert 8.0 < share < 13.0  # 2 of 20 s
-    calm = shown(run, gentle_slip(run))
-    assert any("at 0 % of" in one for one in read_recording(columns(run, calm)).notes)
-
-
 def test_wheels_are_told_by_words_and_by_a_map_that_is_written_and_read(run, wheels, tmp_path):
     data = {"t": run.t, "yaw": run.r, "steer": run.delta_f, "lat": run.a_y}
     data |= {f"corner{k}": one / RADIUS for k, one in enumerate(wheels.values())}

@@ -230,11 +230,3 @@ def test_straight_driving_tells_the_radius_and_slip_does_not(run):
     value, seconds = _identified_scale(run.t, gnss, run.r, speeds["wheel_rl"] / 0.317)
     assert value == pytest.approx(0.317, rel=2e-3)
     assert 2.0 < seconds < 30.0
-
-
-def test_where_nothing_is_straight_or_nothing_agrees_no_radius_is_told(run):
-    speeds = shown(run, gentle_slip(run))
-    assert _identified_scale(run.t, run.v_x, run.r + 0.3, speeds["wheel_rl"]) is None
-    unlike = 20.0 + 5.0 * np.random.default_rng(0).standard_normal(run.t.size)
-    assert _identified_scale(run.t, run.v_x, run.r, unlike) is None
-    assert _identified_scale(run.t, run.v_x, run.r, np.zeros(run.t.size)) is None

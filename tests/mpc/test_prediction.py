@@ -86,6 +86,7 @@ def worst(tire, reference, count=60):
     )
 
 
+@pytest.mark.sweep("lagged magic", "ladder", "network", "oracle")
 @pytest.mark.parametrize("kind", TIRES)
 def test_the_stage_is_the_derivative_of_plain_runge_kutta(kind):
     assert worst(TIRES[kind], differentiated(TIRES[kind].structure)) < 1e-10

@@ -71,6 +71,7 @@ def test_what_is_there_of_a_log_without_lateral_velocity_is_what_stands_in_for_i
     assert "all that is needed is there: vx, r, delta_f, ay\n" in capsys.readouterr().out
 
 
+@pytest.mark.heavy
 def test_a_log_of_a_logger_goes_to_the_verdict_of_the_same_in_si(folder, tmp_path, capsys):
     told = tmp_path / "log.toml"
     motec, car = str(folder / "motec.csv"), str(folder / "car.toml")

@@ -9,9 +9,9 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from benchmarks.local_cluster import free_port, start
 
 import tireid.cluster
-from benchmarks.local_cluster import free_port, start
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.cluster import ClusterError, cluster
@@ -40,6 +40,7 @@ def where(pause, item):
     return os.getpid(), item
 
 
+@pytest.mark.heavy
 def test_both_workers_work_and_no_result_is_lost(address):
     with cluster(address) as elsewhere:
         found = list(elsewhere(partial(where, 0.05), range(20)))
@@ -53,11 +54,13 @@ def fail(item):
     raise ValueError(f"item {item} cannot be done")
 
 
+@pytest.mark.heavy
 def test_an_error_of_a_worker_arrives_here(address):
     with cluster(address) as elsewhere, pytest.raises(ValueError, match="item 1 cannot be done"):
         list(elsewhere(fail, [1]))
 
 
+@pytest.mark.heavy
 def test_a_worker_of_another_version_is_refused(address, monkeypatch):
     monkeypatch.setattr(tireid.cluster, "source_digest", another_version)
     with pytest.raises(ClusterError, match="has another version of tireid"), cluster(address):
@@ -68,6 +71,7 @@ def another_version():
     return f"that of process {os.getpid()}"
 
 
+@pytest.mark.heavy
 def test_a_scheduler_without_workers_is_told_of(monkeypatch, tmp_path):
     monkeypatch.setattr(tireid.cluster, "PATIENCE", 2.0)
     port = free_port()

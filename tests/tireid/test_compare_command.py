@@ -87,6 +87,7 @@ def test_a_signal_estimator_has_no_frozen_error(numbers, result):
 
 
 @needs_rivals
+@pytest.mark.heavy
 @pytest.mark.usefixtures("undrawn")
 def test_the_table_says_which_baselines_know_lag_and_offsets(words, tmp_path, capsys):
     out, names = tmp_path / "out", ("linear", "textbook_ekf", "magic_formula_ekf")
@@ -232,6 +233,7 @@ def test_without_a_log_the_plant_drives(tmp_path, laid_out):
     assert set(data["recordings"]) == {"slalom_20", "step_steer", "lane_change", "slalom_25"}
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("undrawn")
 def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(
     logs, tmp_path, capsys, undrawn

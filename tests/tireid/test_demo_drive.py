@@ -29,6 +29,7 @@ def quick(monkeypatch, undrawn):
     monkeypatch.setattr(frames, "CHOSEN", frames.CHOSEN._replace(most=4))
 
 
+@pytest.mark.heavy
 def test_learnt_tires_steer_as_the_true_ones_and_learning_stays_on_the_road(story, tmp_path, quick):
     if find_compiler() is None:
         pytest.skip("needs a C compiler")

@@ -125,6 +125,7 @@ def test_stored_weights_steer_alike_and_the_hash_tells_what_went_in(
     assert not (tmp_path / "same" / "drive.webp").exists()
 
 
+@pytest.mark.heavy
 def test_learning_and_oracle_are_told_of_a_friction_that_drops(
     result, bend, tmp_path, capsys, undrawn
 ):
@@ -158,6 +159,7 @@ def test_a_car_that_leaves_its_path_is_told_with_exit_code_1(bend, tmp_path, cap
     assert summary_of(tmp_path / "out")["completed"] is False
 
 
+@pytest.mark.heavy
 def test_the_drive_to_learn_on_slides_but_neither_spins_nor_tips():
     car = DoubleTrackCar(sedan(), friction=Friction())
     grip = cornering_limit(car.vehicle, car.tire)
@@ -220,6 +222,7 @@ def test_without_a_compiler_it_says_so_before_it_learns(bend, tmp_path, capsys, 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.heavy
 def test_tires_of_another_car_lead_somewhere(bend, tmp_path, capsys, undrawn):
     """The name of a car is no difference, its mass is."""
     car, log = sedan(), ti.sample_recording()

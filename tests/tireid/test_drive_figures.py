@@ -162,6 +162,7 @@ def test_the_camera_sees_what_is_ahead_to_the_right_and_left_above():
         assert abs(here[0]) < 1e-6
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     ("drives", "kind", "frame_bytes"),
     [(ON_LANE, "webp", 2e4), (ON_COURSE, "webp", 2e4), (ON_LANE, "gif", 5e4)],
@@ -183,6 +184,7 @@ def test_the_film_is_crisp_and_small_and_moves(drives, kind, frame_bytes, tmp_pa
         assert (before != after).any()
 
 
+@pytest.mark.heavy
 def test_the_last_picture_is_held(tmp_path, monkeypatch):
     monkeypatch.setattr(frames, "CHOSEN", frames.CHOSEN._replace(most=2))
     file = tmp_path / "drive.gif"

@@ -162,6 +162,7 @@ def test_outer_axes_have_labels_with_units(draw: Callable[[], Figure]) -> None:
             assert re.search(r"\[.+\]$", axes.get_xlabel()), axes
 
 
+@pytest.mark.sweep("slip", "weights", "comparison", "tires")
 @every_figure
 def test_nothing_is_clipped_and_no_legend_covers_data(draw: Callable[[], Figure]) -> None:
     figure = draw()
@@ -515,6 +516,7 @@ def far_away(history: History) -> History:
     return replace(history, recording=replace(recording, t=recording.t + 1.7e9))
 
 
+@pytest.mark.heavy
 def test_times_of_a_clock_that_began_long_ago_fit_their_titles_and_axes() -> None:
     history = far_away(made_up())
     past = AxleRmse(front=260.0, rear=140.0)

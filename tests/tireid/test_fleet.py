@@ -313,6 +313,7 @@ class Deadly(LearnLog):
         return Learnt(task, row.file, [row])
 
 
+@pytest.mark.heavy
 def test_a_log_that_kills_its_process_costs_its_own_row_alone():
     tasks, _ = find_logs(["red/summer/2026-03-02-*.csv"], CAR, TAGS)
     work = told_by(tasks)

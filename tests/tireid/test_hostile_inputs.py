@@ -7,7 +7,6 @@ import subprocess
 import sys
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from codegen import compiler
@@ -109,21 +108,6 @@ def weights():
     return design.frozen(car, design.setup(car).carry).to_dict()
 
 
-def read_recording_of(r):
-    from models.recordings import Recording
-
-    n = len(r)
-    return Recording(
-        name="a",
-        t=0.01 * np.arange(n),
-        v_x=np.full(n, 20.0),
-        v_y=np.zeros(n),
-        r=r,
-        delta_f=np.zeros(n),
-        delta_r=np.zeros(n),
-    )
-
-
 @pytest.mark.parametrize(
     ("keys", "value", "said"),
     [
@@ -202,11 +186,6 @@ def test_numbers_of_no_car_never_reach_linear_algebra(
     assert not (tmp_path / "out").exists()
 
 
-def test_a_recording_of_such_numbers_is_not_made_either():
-    with pytest.raises(RecordingError, match=r"r must be of a car, within \+-10000, its peak"):
-        read_recording_of(np.full(50, -1e308))
-
-
 def test_a_gzip_bomb_and_too_many_rows_are_refused(capsys, tmp_path, monkeypatch):
     sedan().to_toml(tmp_path / "car.toml")
     rest = ["--vehicle", tmp_path / "car.toml", "--out", tmp_path / "out"]
@@ -268,11 +247,6 @@ def test_numbers_of_the_command_line_are_bounded(capsys, tmp_path, words, said):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_limits_that_are_none_are_said_by_the_command(capsys, monkeypatch):
-    monkeypatch.setenv("TIREID_LIMITS", "hidden=lots")
-    refused(capsys, ["check"], "TIREID_LIMITS must hold NAME=NUMBER")
-
-
 def test_a_limit_that_is_raised_lets_the_file_in(tmp_path, monkeypatch):
     text = design_text(replace(PaperIdentifier.for_vehicle(sedan()), network=Network(hidden=128)))
     path = tmp_path / "design.toml"
@@ -300,18 +274,6 @@ def test_a_compiler_that_refuses_is_one_line(capsys, tmp_path, monkeypatch):
     said = capsys.readouterr().err.splitlines()[-1]
     assert said.endswith("refused the generated code of one: fatal: no")
     assert list(tmp_path.iterdir()) == [refusing]
-
-
-def test_a_certificate_is_not_left_where_its_figures_cannot_be_written(
-    capsys, tmp_path, monkeypatch
-):
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("tireid.commands.check.save_figures", full)
-    words = ["check", "--paper", "--out", tmp_path / "judged"]
-    refused(capsys, words, "no space left on device")
-    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == []
 
 
 @pytest.mark.parametrize(

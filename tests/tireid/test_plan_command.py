@@ -51,6 +51,7 @@ def test_a_plan_is_written_with_its_course_and_said_in_words(tmp_path, capsys, u
     assert "2 passes of 2.0 s at 15 m/s in 40 x 20 m" in said and "slalom" in said
 
 
+@pytest.mark.heavy
 def test_the_same_seed_plans_the_same(tmp_path, undrawn):
     for name in ("one", "two"):
         assert plan(tmp_path / name, "--time", "2", "--seed", "3") == 0
@@ -58,6 +59,7 @@ def test_the_same_seed_plans_the_same(tmp_path, undrawn):
     assert texts[0] == texts[1]
 
 
+@pytest.mark.heavy
 def test_a_plan_follows_what_was_learnt(tmp_path, undrawn):
     ti.identify(ti.sample_recording(), ti.sedan()).freeze().save(tmp_path / "tire.json")
     out = tmp_path / "after"

@@ -170,6 +170,7 @@ def test_an_axle_model_is_mounted_on_the_car_that_drove(model, logs, tmp_path, c
     assert "scaled by the axle loads" not in capsys.readouterr().err
 
 
+@pytest.mark.sweep("words1*", "words2*")
 @pytest.mark.parametrize(
     ("words", "told"),
     [

@@ -3,7 +3,6 @@
 import csv
 import json
 import tomllib
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -158,14 +157,3 @@ def test_identify_says_what_a_speed_tells_of_wheels_and_uses_the_speed(run, whee
     recording = ti.read_recording(path, columns=told)
     assert any("the wheels are not used" in note for note in recording.notes)
     assert recording.t.size == run.t.size
-
-
-def test_one_encoder_is_enough_where_it_does_not_slip(run):
-    slips = shown(run, gentle_slip(run), np.random.default_rng(0))
-    encoder = np.mean([*slips.values()], axis=0)
-    known = replace(Wheels().completed(CAR), radius=(0.316,))
-    one = read_recording({**imu(run), "wheel": encoder / 0.316}, log_map=LogMap(wheels=known))
-    slip, force = errors(run, one)
-    slip_of_exact, force_of_exact = errors(run, read_recording({**imu(run), "vx": run.v_x}))
-    assert slip < 1.3 * slip_of_exact + 0.02
-    assert force < 1.2 * force_of_exact + 0.01

@@ -49,6 +49,14 @@ def broken(design, car, state):
     return found
 
 
+@pytest.mark.sweep(
+    "flipped_v_y-20.0",
+    "dead_steering-20.0",
+    "spikes-20.0",
+    "stuck-20.0",
+    "backwards-20.0",
+    "standstill-20.0",
+)
 @pytest.mark.parametrize("speed", [8.0, 20.0, 35.0])
 @pytest.mark.parametrize("fault", HOSTILE)
 def test_what_is_declared_holds_after_every_sample(fault, speed, car, drive):
@@ -65,6 +73,7 @@ def test_what_is_declared_holds_after_every_sample(fault, speed, car, drive):
     assert np.isfinite(model.predict(history.recording)).all()
 
 
+@pytest.mark.sweep("0.3")
 @pytest.mark.parametrize("dt", [0.2, 0.3, 0.5])
 def test_what_is_declared_holds_of_coarse_samples_too(dt, car, drive):
     """A sample is then longer than the memories of the filters."""
@@ -77,6 +86,7 @@ def test_what_is_declared_holds_of_coarse_samples_too(dt, car, drive):
     assert broken(design, car, history.state) == set()
 
 
+@pytest.mark.heavy
 def test_left_free_the_same_drives_leave_the_box(car, drive):
     design = AxleIdentifier.for_vehicle(car)
     wide = replace(design.bounds, least_grip=1e-3, most_grip=30.0, weight=60.0)
@@ -131,6 +141,7 @@ def test_what_is_inside_is_not_moved_by_a_bit(rng):
         np.testing.assert_array_equal(kept(theta, np.eye(4)), theta)
 
 
+@pytest.mark.sweep("1.0", "1000000000000000.0")
 @pytest.mark.parametrize("scale", [1.0, 1e3, 1e15])
 def test_the_set_is_reached_from_anywhere_by_any_metric(scale, rng):
     """Also by one that is singular, or that rounding has made indefinite."""

@@ -98,6 +98,7 @@ def test_the_step_repeats_the_equations_by_hand(drive):
     assert hand.time.min() > 3.0
 
 
+@pytest.mark.heavy
 def test_an_axle_that_lifts_keeps_a_fifth_of_its_load():
     drive = race(n=1200, car=LIFTING)
     assert_by_hand(AxleIdentifier.for_vehicle(LIFTING), LIFTING, drive)

@@ -8,7 +8,6 @@ import pytest
 
 from identifier.estimate.fit import fit
 from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
-from identifier.estimate.roads import _cheapest
 from identifier.motion.parameters import INDEX, NAMES
 from models.vehicle import estimate, sedan
 from tests.identifier.estimate.conftest import DROP, driven
@@ -103,19 +102,6 @@ def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
     assert wet.drives.road_differs(at).tolist() == [not begins, begins]
     (note,) = (text for _, text in wet.drives.notes)
     assert f"{segment.ratio:.2f} ±" in note
-
-
-def test_the_cheapest_path_changes_where_it_gains_more_than_the_price():
-    loss = np.zeros((2, 30))
-    loss[0, 10:20], loss[1, :10], loss[1, 20:] = 1.0, 1.0, 1.0
-    assert _cheapest(loss, 4.0).tolist() == [0] * 10 + [1] * 10 + [0] * 10
-    assert not _cheapest(loss, 6.0).any()
-
-
-def test_a_log_without_a_sample_that_counts_is_refused_by_its_name():
-    slow = replace(driven(3), v_x=np.full(len(driven(3)), 0.5))
-    with pytest.raises(ValueError, match="drive3: no sample is fast enough to learn from"):
-        fit([slow], sedan())
 
 
 def test_a_steering_with_play_leaves_a_curve_that_rises(learnt):

@@ -1,7 +1,6 @@
 """A fitted model as a file, in other units and sample by sample."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -77,22 +76,6 @@ def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):
     np.testing.assert_array_equal(model.band.on_another_road().force(slip), model.force(slip))
     with pytest.raises(ValueError, match="sd_friction"):
         model.band.on_another_road(-0.1)
-
-
-def test_on_half_the_friction_its_stiffness_stays(learnt):
-    model, slip = learnt.model, np.array([0.001, 0.02, 0.05])
-    half = model.at_friction(0.5)
-    np.testing.assert_allclose(half.force(0.5 * slip), 0.5 * model.force(slip), rtol=1e-9)
-    np.testing.assert_allclose(half.stiffness, model.stiffness, rtol=1e-9)
-
-
-def test_the_band_of_a_fit_grows_with_the_load(learnt):
-    pressed = replace(sedan(), downforce_area_front=1.0, downforce_area_rear=1.2)
-    slip = np.linspace(0.01, 0.1, 5)
-    cars = pressed, sedan()
-    halves = [replace(learnt.model, vehicle=car).band.half(slip, v_x=40.0) for car in cars]
-    wider = np.broadcast_to(pressed.load_ratio(40.0), (5, 2))
-    np.testing.assert_allclose(halves[0], wider * halves[1], rtol=1e-9)
 
 
 def test_grip_is_the_top_of_the_curve_and_known_slip_ends_where_a_drive_decides_the_force():

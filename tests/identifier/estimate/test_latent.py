@@ -121,13 +121,6 @@ def test_what_a_drive_tells_counts_less_and_what_is_believed_does_not(problem, p
     assert TRUST.lasting > 1.0
 
 
-def test_more_is_left_of_a_delay_that_was_taken_out():
-    delay = LATENT_NAMES.index("a_y_delay")
-    on_time, late = (latent_priors(CAR, Priors.of(CAR), one) for one in (False, True))
-    sd = [one.information[delay, delay] ** -0.5 for one in (on_time, late)]
-    assert sd == pytest.approx([0.0007, 0.01], rel=0.05)
-
-
 def test_parameters_that_are_held_leave_their_doubt(problem, place):
     """Held parameters with the covariance of the free ones tell the same doubt of v_y."""
     z, p, _ = place
@@ -151,13 +144,6 @@ def learnt(exact):
     return fit([blind(exact)], CAR).model
 
 
-def test_a_told_stiffness_changes_nothing(exact, learnt):
-    softer = replace(
-        CAR, cornering_stiffness_front=40e3, cornering_stiffness_rear=40e3, chassis=CAR.chassis
-    )
-    np.testing.assert_array_equal(fit([blind(exact)], softer).model.p, learnt.p)
-
-
 def test_tires_that_are_known_tell_the_side_slip_of_another_drive(learnt):
     other = driven(9)
     told = learnt.estimated_v_y(blind(other, seed=4))
@@ -174,11 +160,6 @@ def test_the_estimated_side_slip_goes_on_to_the_last_sample(learnt, exact, less)
     found = learnt.estimated_v_y(blind(log)).v_y
     for end in (slice(0, 8), slice(-8, None)):
         assert np.abs(np.diff(found[end])).max() < 0.1, found[end]
-
-
-def test_what_the_accelerometer_shows_beside_tires_is_found(learnt, exact):
-    told = learnt.estimated_v_y(blind(exact))
-    assert told.beside.mean() == pytest.approx(0.05 / 9.81, abs=0.004)
 
 
 @pytest.mark.parametrize(("hertz", "late"), [(None, 0.0), (5.0, 0.045), (2.0, 0.112)])

@@ -64,30 +64,11 @@ def test_rare_and_late_values_are_found_and_brought_on_time(log, how):
     assert "every 100 ms" in found.notes[-1] and "ay" in found.notes[-1]
 
 
-def test_noise_is_smoothed(log):
-    noise = 0.1 * np.random.default_rng(1).normal(size=len(log))
-    found = on_time(replace(log, v_y=log.v_y + noise), CAR)
-    assert off(found, log) < 0.03
-
-
 def test_a_good_v_y_stays_as_it_is(log):
     for one in (log, replace(log, a_y=None), replace(log, v_y=None)):
         assert on_time(one, CAR) is one
     with_a_lateness = replace(log, v_y=np.interp(log.t - 0.1, log.t, log.v_y))
     assert on_time(with_a_lateness, CAR) is with_a_lateness  # it is the doctor's
-
-
-def test_a_y_of_another_motion_smooths_nothing(log):
-    rng = np.random.default_rng(2)
-    noisy = log.v_y + 0.1 * rng.normal(size=len(log))
-    wrong = replace(log, v_y=noisy, a_y=20.0 * rng.normal(size=len(log)))
-    assert on_time(wrong, CAR) is wrong
-
-
-def test_without_a_y_lines_are_drawn(log):
-    shown = replace(received(log, late=0.0, lost=(0, 0)), a_y=None)
-    found = on_time(shown, CAR)
-    assert off(found, log) < 0.5 * off(shown, log)
 
 
 def test_a_single_wrong_value_does_not_move_it(log):

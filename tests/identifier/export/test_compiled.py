@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from codegen import find_compiler
-from identifier.export.compiled import CompiledPackage, PackageFileError, Status, samples_of
+from identifier.export.compiled import CompiledPackage, Status, samples_of
 from identifier.export.package import build_package
 from identifier.methods import make_method
 from identifier.run import identify
 from models.vehicle import sedan
-from tests.identifier.export.conftest import BANKED
 from tests.kept import Kept
-from tests.rivals import needs_rivals
 
 CAR = sedan()
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
@@ -37,6 +35,7 @@ def test_sample_by_sample_is_the_whole_recording(packages, slalom, law):
     assert one.state == all_at_once.state
 
 
+@pytest.mark.sweep("axle")
 @pytest.mark.parametrize("law", ["integral", "axle"])
 def test_frozen_c_is_the_frozen_model(law, packages, slalom):
     method = make_method(law, CAR)
@@ -112,22 +111,6 @@ def test_a_lateral_velocity_that_no_car_has_is_none_where_it_is_told(packages, s
     assert np.ptp(found[0][1]) > 0.1  # m/s
 
 
-@pytest.mark.parametrize("law", [BANKED, "inertial"])
-def test_no_sample_is_refused_for_an_accelerometer(law, packages, slalom):
-    run = CompiledPackage.of(packages[law])
-    rows = samples_of(slalom, run.inputs)[:1000]
-    clean = run.run_samples(rows).axle_force
-    for bad in (np.nan, np.inf, -np.inf, 1e300):
-        rows[300:400, 5] = bad
-        run.init()
-        told = run.run_samples(rows)
-        assert (told.status == Status.OK).all()
-        for name, value in run.weights.items():
-            assert np.isfinite(value).all(), name
-        force = np.sqrt(np.mean((told.axle_force - clean)[500:] ** 2))
-        assert force < 0.05 * np.sqrt(np.mean(clean[500:] ** 2))
-
-
 def test_a_y_comes_last_and_is_not_read_where_it_is_no_input(packages, slalom):
     seeing, blind = (CompiledPackage.of(packages["inertial"]) for _ in range(2))
     rows = samples_of(slalom, seeing.inputs)[:300]
@@ -191,25 +174,6 @@ def test_factors_are_taken_where_no_variance_is_negative(learnt, single, rng):
     run.set_weights(weights)
 
 
-@pytest.mark.parametrize(("law", "name"), [("axle", "errors"), ("axle", "excitation")])
-def test_amounts_that_are_negative_are_refused(learnt, law, name):
-    run = learnt[law, False]
-    weights = run.weights
-    for place in range(weights[name].size):
-        spoilt = weights[name].copy()
-        spoilt.flat[place] = -1e-9
-        assert refused(run, {**weights, name: spoilt})
-
-
-@needs_rivals
-def test_a_signal_has_no_weights(packages, slalom):
-    run = CompiledPackage.of(packages["linear_kf"])
-    assert run.weights == {}
-    with pytest.raises(ValueError, match="nothing to freeze"):
-        run.set_adaptation(False)
-    assert np.abs(run.run(slalom).axle_force - slalom.axle_force)[500:].max() < 3000.0
-
-
 def test_a_folder_is_loaded_with_its_own_precision(write, slalom):
     package = build_package(make_method("integral", CAR), CAR, single=True, name="mine")
     folder = write(package)
@@ -219,23 +183,6 @@ def test_a_folder_is_loaded_with_its_own_precision(write, slalom):
     np.testing.assert_array_equal(
         from_folder.run(slalom).axle_force, CompiledPackage.of(package).run(slalom).axle_force
     )
-
-
-def test_a_folder_without_a_package_is_refused(tmp_path):
-    (tmp_path / "other.json").write_text("{}")
-    with pytest.raises(PackageFileError, match="no package"):
-        CompiledPackage.from_folder(tmp_path)
-
-
-def test_a_recording_of_another_interval_is_refused(packages, drive):
-    with pytest.raises(ValueError, match="sampled at"):
-        CompiledPackage.of(packages["integral"]).run(drive(n=100, dt=0.02))
-
-
-def test_samples_of_another_shape_are_refused(packages):
-    for law, columns in (("integral", 5), ("inertial", 6)):
-        with pytest.raises(ValueError, match=rf"\(n, {columns}\)"):
-            CompiledPackage.of(packages[law]).run_samples(np.zeros((3, columns - 1)))
 
 
 def test_an_input_on_its_limit_is_taken_and_one_beyond_is_not(packages):

@@ -91,23 +91,6 @@ def test_the_axle_identifier_and_a_network_give_property_files_too(tmp_path):
         assert np.abs(pair - force).max() <= 0.02 * np.abs(force).max(), model.kind
 
 
-def test_a_property_file_says_what_it_is_and_what_it_is_not(tmp_path):
-    model = fitted(**TIRES)
-    tire, load = read(model, "front", tmp_path), 0.5 * CAR.axle_loads[0]
-    assert pytest.approx(load) == tire.coefficients.FNOMIN
-    assert tire.valid_range.F_z[0] < load < tire.valid_range.F_z[1]
-    assert tire.valid_range.alpha[1] == pytest.approx(model.known_slip[0])
-    text = tire_properties(model, "front")
-    words = " ".join(line[2:] for line in text.splitlines() if line.startswith("$"))
-    for part in ("pure slip", "driving log", "friction of the road", "Is not", "Band of 90 %"):
-        assert part in words
-    assert f"{math.degrees(model.known_slip[0]):.3g} deg" in words
-    known = model.known_slip[:1]
-    half = 0.5 * model.band.half(known)[0, 0]
-    assert f"+- {half:.3g} N" in words
-    assert "cannot tell how sure" in tire_properties(network(), "front")
-
-
 def test_a_curve_that_is_no_magic_formula_has_no_property_file():
     bumpy = fitted(residual0_f=2.0, residual1_f=-2.2, residual2_f=0.9)
     with pytest.raises(ValueError, match=r"front axle is no Magic Formula: .* % of its peak"):
@@ -176,14 +159,6 @@ def test_the_diamond_of_planners_lies_within_the_forces_of_the_model(h, braking_
         assert ((np.min(spare, axis=0) < 0.0) | ends | (most > 0.999 * found.a_y)).all(), side
 
 
-def test_the_end_of_what_is_not_known_of_the_ellipse_is_taken():
-    model = level(load_transfer=0.0, **{**NO_ELLIPSE, "braking_r": 1.25})
-    covariance, k = model.covariance.copy(), INDEX["braking_r"]
-    covariance[k, k] = 0.2**2
-    found = limits(replace(model, covariance=covariance))
-    np.testing.assert_allclose(found.braking, GRAVITY / (1.25 + Z * 0.2), rtol=1e-3)
-
-
 def test_limits_fall_with_what_is_not_known_and_models_without_a_band_have_none():
     sure, doubtful = limits(fitted(sd=0.05)), limits(fitted(sd=0.22))
     assert (doubtful.a_y < 0.97 * sure.a_y).all()
@@ -248,14 +223,6 @@ def test_the_gradient_is_that_of_the_single_track_at_every_acceleration(car):
     assert np.isfinite(found.gradient[0]).sum() >= 7
     if car is CAR:
         assert found.gradient[0, 0] == pytest.approx(linear, abs=2e-6)
-
-
-def test_a_softer_front_axle_understeers():
-    found = understeer_gradient(
-        fitted(sd=1e-3, ln_stiffness_f=math.log(12.0), ln_stiffness_r=math.log(16.0)),
-        np.random.default_rng(0),
-    )
-    assert found.gradient[0, 0] == pytest.approx((1 / 12 - 1 / 16) / GRAVITY, rel=1e-2)
 
 
 def test_the_standard_deviation_is_that_of_linear_propagation():

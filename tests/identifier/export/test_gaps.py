@@ -1,6 +1,5 @@
 """Refused samples in the shipped C: the same rule as beside a car in Python, and its status."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -111,31 +110,6 @@ def test_the_time_that_makes_forces_stale_may_be_set(packages, rows):
     assert (run.status[509:550] == Status.STALE).all()
     assert (run.axle_force[509:550] == 0.0).all()
     assert run.status[550 + 60] == Status.OK
-
-
-def test_a_result_that_is_refused_is_a_gap_too(packages, slalom):
-    """Forces beyond what the caller allows: held, then stale, and back with the next good one."""
-    limit, place = r"(#define TIREID_MAX_FORCE )\S+", "include/tireid_config.h"
-    text, count = re.subn(limit, r"\g<1>(1000.0)", packages["integral"].files[place])
-    assert count == 1
-    files = {**packages["integral"].files, place: text}
-    run = CompiledPackage.of(packages["integral"]._replace(files=files)).run(slalom)
-    assert {Status.BAD_RESULT, Status.OK} <= set(run.status)
-    assert np.abs(run.axle_force).max() <= 1000.0
-    long = run.status == Status.STALE
-    assert (run.axle_force[long] == 0.0).all()
-
-
-@pytest.mark.parametrize("law", ["axle", "integral", "inertial"])
-def test_frozen_weights_hold_through_a_gap(law, shipped, slalom):
-    run, rows = shipped[law], with_gaps(driven(slalom, shipped[law]))
-    run.init()
-    run.run_samples(rows[:300])
-    run.set_adaptation(False)
-    before = run.weights
-    run.run_samples(rows[300:])
-    for name, value in run.weights.items():
-        np.testing.assert_array_equal(value, before[name])
 
 
 @pytest.mark.parametrize("law", LAWS)

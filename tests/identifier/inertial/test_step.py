@@ -245,6 +245,7 @@ def runs(request):
     return np.array(told), hand, identify(noisy, CAR, method)
 
 
+@pytest.mark.sweep("held")
 def test_lateral_velocity_and_its_deviation_are_those_of_the_textbook(runs):
     told, hand, history = runs
     assert min(hand.turns) > 40
@@ -253,6 +254,7 @@ def test_lateral_velocity_and_its_deviation_are_those_of_the_textbook(runs):
     np.testing.assert_allclose(history.outputs["v_y_sd"].ravel(), told[:, 1], rtol=2e-4)
 
 
+@pytest.mark.sweep("held")
 def test_what_is_learnt_is_that_of_the_textbook(runs):
     _, hand, history = runs
     last = {name: np.asarray(value[-1]).ravel() for name, value in history.state.items()}

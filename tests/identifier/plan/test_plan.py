@@ -216,6 +216,7 @@ def test_a_plan_is_worth_more_than_a_slalom_of_its_length(tires, brief):
     assert slips.shape == (2, 12) and (after < before).all()
 
 
+@pytest.mark.heavy
 def test_an_area_that_a_car_crosses_is_driven_several_times_and_each_teaches(tires, brief):
     found = make_plan(tires, space(length=40.0, width=40.0), 4.0, np.random.default_rng(0))
     assert isinstance(found, Plan) and len(found.passes) == 2
@@ -299,6 +300,7 @@ def test_the_least_rectangle_turns_with_the_way():
     assert extent(X, Y) == pytest.approx((50.0, 2.0), rel=0.03)
 
 
+@pytest.mark.heavy
 def test_a_rehearsal_on_the_plant_stays_near_the_course_that_was_planned(tires, brief):
     found = make_plan(tires, space(), 3.0, np.random.default_rng(0))
     (one,) = found.passes
@@ -316,6 +318,7 @@ def test_the_step_scales_with_the_size_of_the_car(tires):
     assert Motion._fields[-1] == "delta"
 
 
+@pytest.mark.heavy
 def test_a_car_with_downforce_is_planned_under_the_loads_of_its_speed(tires, brief):
     racer, speed = replace(CAR, downforce_area_front=1.5, downforce_area_rear=2.5), 25.0
     static = PlausibleTires.declared(racer, 0.8)

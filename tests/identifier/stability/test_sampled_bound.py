@@ -60,6 +60,7 @@ def test_without_noise_euler_has_the_bounds_of_the_closed_form(A_d, law):
     assert pytest.approx(balance + law.z * g * X / 5.0**2, rel=1e-6) == found.W
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("law", ["integral", "instantaneous", "pi_lead"])
 def test_no_drive_passes_a_bound_with_noise_resumed_weights_and_a_high_gain(law):
     design = PaperIdentifier.for_vehicle(CAR, law=law)

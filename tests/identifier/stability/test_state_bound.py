@@ -78,6 +78,7 @@ def nasty_inputs(rng, n, n_h, f_max):
     return np.repeat(f, hold, axis=0)[:n], np.repeat(s, hold, axis=0)[:n]
 
 
+@pytest.mark.sweep("integral")
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS.keys())
 def test_error_and_weights_stay_within_their_bounds_for_the_worst_inputs_that_were_tried(law):
     rng = np.random.default_rng(9)
@@ -109,6 +110,7 @@ def test_weights_that_do_not_leak_pass_the_bound_that_leaking_ones_keep():
     assert 0.9 * bounds.W < leaking <= bounds.W < planted
 
 
+@pytest.mark.heavy
 def test_the_weights_settle_at_the_capacity_where_the_residual_is_larger():
     for law in LAWS.values():
         f, s = np.tile([30.0, 0.0], (10000, 1)), np.ones((10000, 4))
@@ -257,6 +259,7 @@ def test_the_integral_law_passes_bound_14_many_times_over():
     assert error > 100.0 * tight
 
 
+@pytest.mark.heavy
 def test_the_integral_law_passes_even_the_printed_route_where_a_is_slow():
     a, lam, rho, n_h, dt = 0.1, 0.1, 1.0, 1, 0.05
     eta = 4.0 * integral_euler_limit(a, lam, dt)

@@ -65,6 +65,7 @@ def outcome(path, arrow):
     ]
 
 
+@pytest.mark.sweep("MoTeC", "UTF-16", "quoted decimal commas between commas")
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_pyarrow_changes_neither_bits_nor_messages_however_a_text_is_spoilt(
     tmp_path, monkeypatch, dialect
@@ -247,6 +248,7 @@ def test_too_little_memory_or_room_to_unpack_is_no_fault_of_the_log(tmp_path):
     assert "there is no room in" in str(caught.value) and "damaged" not in str(caught.value)
 
 
+@pytest.mark.heavy
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="counts the pages of Linux")
 def test_memory_does_not_grow_with_the_log(tmp_path):
     """Anonymous memory after reading; what is mapped from disk the system can drop."""

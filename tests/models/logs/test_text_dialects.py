@@ -178,6 +178,7 @@ def test_a_clock_that_is_told_is_taken(tmp_path):
         replace(words, clock_name="word").listed()
 
 
+@pytest.mark.sweep("rint*")
 @pytest.mark.parametrize(
     ("tick", "dt"), [(0.1, 0.01), (0.01, 0.0025), (0.001, 0.0025), (0.001, 1 / 60), (1.0, 0.02)]
 )
@@ -298,6 +299,7 @@ WRONG = {
 }  # fmt: skip
 
 
+@pytest.mark.sweep("[!N]*")
 @pytest.mark.parametrize("wrong", WRONG)
 def test_a_wrong_file_is_refused_in_one_line_that_says_where_and_why(tmp_path, wrong):
     data, said = WRONG[wrong]

@@ -36,26 +36,6 @@ def test_the_step_is_halved_until_the_plan_does_not_jump(tire, gain):
     assert step.share == 1.0 or gain * 2.0 * step.share > 0.1  # no smaller than it must be
 
 
-def test_weights_stay_where_every_step_would_jump(tire):
-    target = at_friction(tire, 0.5)
-
-    def planned(one):
-        return 0.0 if np.array_equal(one.weights, tire.weights) else 1.0
-
-    step = blended(tire, target, 1.0, planned=planned, most=0.1)
-    assert step.tire is tire
-    assert step.share == 0.0
-
-
-def test_a_plan_that_is_no_number_is_a_jump(tire):
-    target = at_friction(tire, 0.5)
-
-    def planned(one):
-        return 0.0 if one is tire else np.nan
-
-    assert blended(tire, target, 1.0, planned=planned, most=0.1).share == 0.0
-
-
 def test_there_is_no_way_to_another_structure_and_none_to_go_at_the_target(car, tire):
     with pytest.raises(ValueError, match="cannot move to"):
         blended(tire, prediction_tire(car), 1.0, planned=lambda _: 0.0, most=0.1)

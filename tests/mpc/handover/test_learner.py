@@ -81,17 +81,3 @@ def test_a_preview_changes_nothing_and_tells_the_plan(car, learnt):
     assert asked.tire is tire
     with pytest.raises(ValueError, match="the tracker is built for"):
         asked.previewed_rate(prediction_tire(car))
-
-
-def test_a_preview_writes_no_memory_of_what_steers(learnt):
-    """Neither what is carried nor what was prepared for the next measurement."""
-    tire = prediction_tire(learnt)
-    tracker = Tracker(tire, period=0.01, delay=0.02)
-    kappa, v_x = (np.full(tracker.times.size, value) for value in (0.01, 20.0))
-    tracker.step(Measurement(0.1, 0.0, -0.1, 0.2, kappa, v_x))
-    tracker.prepare(kappa, v_x)
-    instance = tracker.instance
-    every = (*instance.numbers, instance._work, instance.start, instance.steering)
-    before = [one.tobytes() for one in every]
-    tracker.previewed_rate(at_friction(tire, 0.4))
-    assert [one.tobytes() for one in every] == before

@@ -7,13 +7,11 @@ import pytest
 
 from identifier.axle import AxleIdentifier
 from identifier.methods import make_method
-from identifier.paper.network import Network
 from identifier.run import OnlineIdentifier
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
 from mpc.handover import supervisor as supervisor_module
 from mpc.handover.judge import ChiSquare, Judge
-from mpc.handover.road import at_friction
 from mpc.handover.rules import Rules, Verdict
 from mpc.handover.supervisor import Supervisor
 from mpc.tires import prediction_tire
@@ -40,22 +38,6 @@ def test_a_friction_drop_is_believed_within_the_first_bend(car, learnt, dropped)
     assert first.candidate < 0.5 * first.in_use
     before = [d for d in supervisor.decisions if d.t < DROP]
     assert all(d.verdict is Verdict.LEARNT for d in before)
-
-
-def test_after_a_drop_the_named_tire_explains_it_and_the_dry_one_does_not(car, learnt, dropped):
-    supervisor = watched(supervisor_of(car, learnt), dropped[1])
-    late = samples_of(dropped[1])[-200:]
-    judge = Judge(0.01)
-    named, dry = (
-        judge.chi_square(tire, late).mean for tire in (supervisor.target, prediction_tire(learnt))
-    )
-    assert named < 1.5
-    assert dry > 4.0 * named
-
-
-def test_without_a_drop_no_friction_is_lost(car, learnt, dry):
-    supervisor = watched(supervisor_of(car, learnt), dry[1])
-    assert all(d.verdict is Verdict.LEARNT for d in supervisor.decisions)
 
 
 def test_from_nothing_the_learnt_tire_takes_over_and_is_better(car, dry):
@@ -102,15 +84,6 @@ def test_what_was_not_excited_is_not_handed_over(car, learnt):
         supervisor.observe(*row)
     assert supervisor.decisions == []
     assert "axle was identified for" in supervisor.last.reason
-
-
-@pytest.mark.parametrize("broken", [np.full(4, np.nan), np.zeros(4)])
-def test_many_lost_samples_and_standing_still_decide_nothing(car, learnt, dropped, broken):
-    supervisor = supervisor_of(car, learnt)
-    for k, row in enumerate(samples_of(dropped[1])):
-        supervisor.observe(*(broken if k % 30 < 10 else row))
-    assert supervisor.decisions == []
-    assert supervisor.last.reason == "too few samples"
 
 
 @pytest.mark.parametrize("broken", [np.nan, np.inf, 1e308])
@@ -173,6 +146,9 @@ def test_the_baseline_follows_what_is_seen_slowly_and_not_a_change(
     np.testing.assert_allclose(baseline, wanted[mean], rtol=1e-9)
 
 
+@pytest.mark.sweep(
+    "40.0-2.2-False-3.0", "40.0-1.8-True-1.0", "3.6-0.0-False-1.0", "4.4-0.0-True-3.0"
+)
 @pytest.mark.parametrize("baseline", [1.0, 3.0])
 @pytest.mark.parametrize(
     ("better", "worse_lately", "taken"),
@@ -215,18 +191,6 @@ def test_another_structure_and_an_unproven_law_are_refused_at_the_start(car, lea
         Supervisor(identifier, prediction_tire(identifier.model()))
 
 
-def test_a_tire_that_cannot_be_told_for_a_friction_still_learns(car, dry):
-    """A network that reads the speed: no friction is looked for, nothing breaks."""
-    design = make_method("integral", car)
-    inputs = ("v_y", "r", "delta_f", "v_x")
-    design = replace(design, network=Network(hidden=6, inputs=inputs, scale=(1.0, 0.5, 0.1, 20.0)))
-    identifier = OnlineIdentifier(design, car, 0.01)
-    supervisor = watched(Supervisor(identifier, prediction_tire(identifier.model())), dry[1])
-    assert all(d.verdict is Verdict.LEARNT for d in supervisor.decisions)
-    with pytest.raises(ValueError, match="another friction"):
-        at_friction(supervisor.target, 0.5)
-
-
 def test_a_fault_takes_back_what_was_handed_over_just_before_and_teaches_nothing(
     car, learnt, dropped
 ):
@@ -249,20 +213,7 @@ def test_a_fault_takes_back_what_was_handed_over_just_before_and_teaches_nothing
     assert supervisor.t == pytest.approx(0.01 * (k + 60))
 
 
-def test_after_a_fault_learning_goes_on_from_what_was_known_before_it(car, learnt, dry):
-    supervisor, rows = supervisor_of(car, learnt), samples_of(dry[1])
-    for row in rows[:600]:
-        supervisor.observe(*row)
-    known = next(
-        model for t, model in reversed(supervisor._models) if t <= 6.0 - supervisor.rules.revoke
-    )
-    supervisor.observe(*rows[600], fault="sensors disagree")
-    assert supervisor.identifier.model().to_dict() == known.to_dict()
-    for row in rows[700:900]:
-        supervisor.observe(*row)
-    assert supervisor.identifier.model().to_dict() != known.to_dict()
-
-
+@pytest.mark.sweep("2.0")
 @pytest.mark.parametrize("relapse", [6.0, 2.0])
 def test_a_fault_that_comes_back_soon_takes_back_what_was_learnt_between(car, learnt, dry, relapse):
     rules, calm = Rules(relapse=relapse), 4.0
@@ -278,9 +229,3 @@ def test_a_fault_that_comes_back_soon_takes_back_what_was_learnt_between(car, le
     assert (supervisor.identifier.model().to_dict() == known) is (calm < relapse)
     most = relapse / rules.learnt_every + 3
     assert len(supervisor._models) <= most
-
-
-def test_what_is_kept_to_go_back_to_does_not_grow(car, learnt, dry):
-    supervisor = watched(supervisor_of(car, learnt), dry[1])
-    rules = supervisor.rules
-    assert len(supervisor._models) <= rules.revoke / rules.learnt_every + 3

@@ -1,20 +1,12 @@
 import numpy as np
 import pytest
 
-from mpc.path import BUILT_IN, PathError, constant_radius, handling_course
+from mpc.path import constant_radius, handling_course
 
 
 @pytest.fixture(scope="module")
 def course():
     return handling_course()
-
-
-def test_other_legs_of_the_course_keep_a_width_of_the_road(course):
-    X, Y, s = course.X[:-1:4], course.Y[:-1:4], course.s[:-1:4]
-    along = np.abs(s[:, None] - s)
-    along = np.minimum(along, course.length - along)
-    apart = np.hypot(X[:, None] - X, Y[:, None] - Y)
-    assert apart[along > 60.0].min() > 8.0
 
 
 def test_the_course_has_turns_of_many_radii_to_both_sides(course):
@@ -46,17 +38,3 @@ def test_cones_stand_beside_the_path(course):
     half = len(cones) // 2
     assert near == pytest.approx([2.5] * half + [-2.5] * half, abs=1e-6)
     assert len(cones) == 2 * round(course.length / 8.0)
-
-
-def test_the_names_of_the_command_line_build_paths():
-    assert set(BUILT_IN) == {"iso-3888-1", "iso-3888-2", "slalom", "circle", "course"}
-    with pytest.raises(TypeError):
-        BUILT_IN["mine"] = handling_course
-
-
-@pytest.mark.parametrize(
-    "numbers", [{"radius": -1.0}, {"turns": 0.0}, {"radius": np.nan}, {"radius": np.inf}]
-)
-def test_circles_that_are_none_are_refused(numbers):
-    with pytest.raises(PathError, match="radius must be positive"):
-        constant_radius(**{"radius": 30.0, **numbers})

@@ -62,11 +62,3 @@ def test_bad_files_are_named_with_the_place(tmp_path, text, message):
         Path.from_csv(file)
     assert str(file) in str(caught.value)
     assert "\n" not in str(caught.value)
-
-
-def test_files_that_are_none_are_named(tmp_path):
-    with pytest.raises(PathError, match="no such file"):
-        Path.from_csv(tmp_path / "absent.csv")
-    (tmp_path / "binary.csv").write_bytes(b"x,y\n\xff\xfe\n")
-    with pytest.raises(PathError, match="UTF-8"):
-        Path.from_csv(tmp_path / "binary.csv")

@@ -58,22 +58,6 @@ def test_a_set_finds_what_a_dense_solver_finds(linear, problem, seed):
     np.testing.assert_allclose(command.plan_u, by_highs(tracker, *at), atol=1e-5)
 
 
-def test_a_set_finds_what_the_interior_point_finds(tire, problem):
-    by_sets = Tracker(tire, problem)
-    alone = Tracker(tire, problem, tolerance=1e-12, max_active_sets=0)
-    at_limit, few = [], 0
-    for seed in range(30):
-        at = near_a_plan(by_sets, seed)
-        alone.instance.state[...] = by_sets.instance.state
-        found, best = solved(by_sets, at), solved(alone, at)
-        assert (found.status, best.status) == (Status.OK, Status.OK)
-        np.testing.assert_allclose(found.plan_u, best.plan_u, atol=1e-5)
-        few += found.iterations <= 3 < best.iterations
-        at_limit.append(np.abs(found.plan_u).max() / problem.limits.steering_rate)
-    assert few > 20
-    assert np.mean(np.array(at_limit) > 0.999) > 0.5  # the cases press against a hard limit
-
-
 def test_angle_and_rate_are_reached_and_kept_at_once(tire, problem):
     tracker = Tracker(tire, problem)
     x0 = np.zeros(tracker.instance.start.size)
@@ -83,17 +67,6 @@ def test_angle_and_rate_are_reached_and_kept_at_once(tire, problem):
     assert (again.status, again.iterations) == (Status.OK, 1)
     assert np.sum(again.plan_x[1:, 4] >= problem.limits.steering * (1.0 - 1e-9)) > 5
     assert np.sum(again.plan_u >= problem.limits.steering_rate * (1.0 - 1e-9)) > 2
-
-
-def test_a_step_says_how_many_rows_it_switched(tire, problem):
-    tracker = Tracker(tire, problem)
-    at = near_a_plan(tracker, 3)
-    iterated(tracker, *at)
-    assert tracker.instance.state["switched"] == 0
-    thrown = at[0].copy()
-    thrown[0] -= 3.0 * np.sign(thrown[0])
-    solve(tracker, thrown, *at[1:])
-    assert tracker.instance.state["switched"] > problem.horizon // 5
 
 
 def test_no_set_is_tried_after_many_rows_switched_or_without_a_plan(tire, problem):
@@ -124,15 +97,6 @@ def factorized(tracker, at, *, switched=0):
     return count.value, command
 
 
-def test_the_interior_point_alone_factorizes_once_an_iteration(counting):
-    alone, by_sets = counting(max_active_sets=0), counting()
-    for seed in range(6):
-        at = near_a_plan(by_sets, seed)
-        alone.instance.state[...] = by_sets.instance.state
-        times, command = factorized(alone, at)
-        assert times == command.iterations > 1
-
-
 def test_no_set_is_tried_where_the_car_is_thrown_off_its_plan(counting):
     tracker = counting()
     x0 = np.zeros(tracker.instance.start.size)
@@ -147,6 +111,7 @@ def test_no_set_is_tried_where_the_car_is_thrown_off_its_plan(counting):
     np.testing.assert_array_equal(first.plan_u, again.plan_u)
 
 
+@pytest.mark.sweep("pull*")
 @pytest.mark.parametrize(
     ("pattern", "mistake"),
     [

@@ -24,6 +24,7 @@ def lagging_files(lagging):
     return c_sources(lagging.structure, horizon=5, name=NAME, about=ABOUT)
 
 
+@pytest.mark.sweep("1")
 @needs_compiler
 @pytest.mark.parametrize("single", [0, 1])
 def test_it_compiles_without_a_warning_in_both_precisions(lagging_files, single, tmp_path):

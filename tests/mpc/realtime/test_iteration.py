@@ -131,6 +131,7 @@ def test_what_is_not_finite_fails_and_leaves_the_plan(tire, problem):
     assert solve(tracker, x0, 0.001, 20.0).status == Status.OK  # nothing of it stays
 
 
+@pytest.mark.sweep("linear")
 def test_float_finds_nearly_the_same(tire, problem):
     x0 = np.zeros(7 if tire.structure.lagged else 5)
     x0[:2] = 0.4, 0.05
