@@ -24,10 +24,10 @@ from itertools import chain, permutations
 from typing import NamedTuple
 
 import numpy as np
+from benchmarks.extrapolate_recorded import SLOW, TILES
 from numpy.typing import NDArray
 
 from benchmarks.answers import blind, drawn
-from benchmarks.extrapolate_recorded import SLOW, TILES
 from benchmarks.random_cars import CLASSES, FIRST_SEED, LEAD
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Targets, keeps

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.extrapolate_recorded import outside_known
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.model import BESIDE
 from identifier.frozen import FrozenModelError
@@ -37,6 +36,10 @@ def test_frozen_and_online_forces_are_one_where_nothing_is_learnt(car, drive):
     np.testing.assert_allclose(
         history.freeze(0.0).predict(recording), history.axle_force, rtol=1e-12, atol=1e-9
     )
+
+
+def outside_known(model, recording):
+    return np.abs(model.lagged_slip(recording)) > model.known_slip
 
 
 def test_it_knows_where_it_has_been(car, drive):

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.floor import share_of_force
 from identifier.baselines import LaggedEkf, LinearBaseline, magic_formula_ekf
 from identifier.run import identify
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.recordings import Recording
 from models.vehicle import Vehicle, sedan
+from tests.identifier.conftest import missed
 
 LEARNING = pytest.mark.parametrize("make", [magic_formula_ekf, LaggedEkf.for_vehicle])
 
@@ -56,4 +56,4 @@ def test_learning_baselines_beat_the_linear_tire_where_it_is_wrong(make, slalom)
     wrong = replace(car, cornering_stiffness_front=2e5, cornering_stiffness_rear=2.4e5)
     linear = identify(recording, wrong, LinearBaseline.for_vehicle(car)).freeze(99.0)
     model = identify(recording, wrong, make(wrong)).freeze(99.0)
-    assert (share_of_force(model, recording) < 0.7 * share_of_force(linear, recording)).all()
+    assert (missed(model, recording) < 0.7 * missed(linear, recording)).all()

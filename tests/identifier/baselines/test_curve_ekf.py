@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.floor import share_of_force
 from identifier.baselines import magic_formula_ekf
 from identifier.baselines.ports import LAG_PORTS
 from identifier.run import identify
 from tests.identifier.baselines.conftest import MAGIC, magic
+from tests.identifier.conftest import missed
 
 
 def test_magic_formula_is_found_on_data_that_it_made(car, curve_drive, rng):
@@ -56,8 +56,8 @@ def test_lag_and_offsets_are_found_on_a_car_that_has_them(car, curve_drive, rng)
     np.testing.assert_allclose(found.relaxation_length, LAG, rtol=0.15)
     assert (np.abs(found.offset - OFFSET) < [0.001, 0.02]).all()
     plain = identify(read, car, magic_formula_ekf(car, textbook=True)).freeze()
-    assert (share_of_force(found, read) < 0.03).all()
-    assert (share_of_force(plain, read) > 3.0 * share_of_force(found, read)).all()
+    assert (missed(found, read) < 0.03).all()
+    assert (missed(plain, read) > 3.0 * missed(found, read)).all()
 
 
 def test_it_begins_afresh_and_with_no_stored_curve(car, drive):

@@ -5,10 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.monte_carlo import Beginning, bound_rows, monte_carlo
-from identifier.driving import natural_driving
 from identifier.methods import certify
-from identifier.paper.design import PaperIdentifier, with_keeping
+from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import DrivingError
 from identifier.stability.loop import INTEGRAL
 from identifier.stability.sampled_bound import Learning
@@ -100,45 +98,6 @@ def test_no_error_drives_the_weights_beyond_their_bound(staged, law, rng):
 def test_more_than_one_whole_sample_of_leakage_is_not_covered():
     assert learning(INTEGRAL, staged=False, free=3.0, rho=60.0).kept(2.0) == np.inf
     assert learning(INTEGRAL, staged=False, free=3.0, rho=0.0).kept(2.0) == np.inf
-
-
-@pytest.mark.parametrize("keeping", ["dead_zone", "projection"])
-@pytest.mark.parametrize("integrator", ["euler", "rk4"])
-def test_drives_keep_the_bounds_of_the_certificate(keeping, integrator):
-    design = replace(
-        PaperIdentifier.for_vehicle(CAR), integrator=integrator, driving=natural_driving(CAR)
-    )
-    design = with_keeping(design, design.operation(CAR), keeping)
-    certificate = certify(design, CAR)
-    known = {entry.name: entry.value for entry in certificate.properties}
-    W = min(known.get("weight_bound", np.inf), design.gains.W_max)
-    seen = monte_carlo(
-        design,
-        CAR,
-        natural_driving(CAR),
-        64,
-        beginning=Beginning(W, known["V_bound"]),
-        rng=np.random.default_rng(4),
-    )
-    rows = bound_rows(certificate, seen)
-    assert {row.name for row in rows} >= {"V_bound"} and len(rows) >= 2
-    assert seen.diverged == 0 and [row.passed for row in rows] == [0] * len(rows)
-
-
-def test_a_certificate_of_a_smaller_dead_zone_than_the_one_that_runs_is_found_out():
-    design = replace(PaperIdentifier.for_vehicle(CAR), driving=natural_driving(CAR))
-    design = with_keeping(design, design.operation(CAR), "dead_zone")
-    certificate = certify(design, CAR)
-    gains = replace(design.gains, V_free=1e3, W_free=1e3, eta_W=3e5)
-    seen = monte_carlo(
-        replace(design, gains=gains),
-        CAR,
-        natural_driving(CAR),
-        64,
-        beginning=Beginning(0.0, 12.0),
-        rng=np.random.default_rng(4),
-    )
-    assert any(row.passed for row in bound_rows(certificate, seen))
 
 
 def test_the_force_that_a_dead_zone_lets_w_hold_is_the_one_at_which_learning_rests():

@@ -2,8 +2,6 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from benchmarks.steady_cornering import jacobian_feedback
-from identifier.paper.network import hidden_layer
 from identifier.stability.loop import INTEGRAL, Loop
 from identifier.stability.margins import gain_margin
 from identifier.stability.operation import estimated_input_feedback, minimal_decay
@@ -51,19 +49,6 @@ def test_below_the_minimal_decay_no_learning_rate_saves_the_loop_that_reads_the_
             A_d=-a * np.eye(2), forgetting=a, law=INTEGRAL, G=np.eye(2), input_feedback=feedback
         )
         assert (gain_margin(loop).factor > 0.0) is stable
-
-
-def test_the_feedback_of_a_network_is_its_jacobian():
-    rng = np.random.default_rng(0)
-    W, V = rng.standard_normal((2, 6)), rng.standard_normal((6, 4))
-    scale, K = np.array([1.0, 0.5, 0.1, 0.1]), rng.standard_normal((2, 2))
-    x = ca.SX.sym("x", 2)
-    s = hidden_layer(V, ca.vertcat(x, ca.DM([0.1, 0.0])) / scale)
-    at = np.array([0.3, -0.2])
-    J, s_at = ca.Function("J", [x], [ca.jacobian(W @ s, x), s])(at)
-    V_x = V[:, :2] / scale[:2]
-    found = jacobian_feedback(W=W, V_x=V_x, s=np.array(s_at).ravel(), K=K)
-    np.testing.assert_allclose(found, np.array(J) @ K, rtol=1e-10)
 
 
 def test_a_speed_that_is_not_positive_is_refused():
