@@ -11,7 +11,7 @@ from identifier.axle.model import BESIDE
 from identifier.frozen import FrozenModelError
 from identifier.run import identify
 from identifier.tire_model import load_model, stored_verdict
-from tests.identifier.conftest import learnt, missed, saturating
+from tests.identifier.conftest import learnt, missed, outside_known, saturating
 
 
 def test_told_another_stiffness_it_reads_off_the_true_one(car, drive):
@@ -36,10 +36,6 @@ def test_frozen_and_online_forces_are_one_where_nothing_is_learnt(car, drive):
     np.testing.assert_allclose(
         history.freeze(0.0).predict(recording), history.axle_force, rtol=1e-12, atol=1e-9
     )
-
-
-def outside_known(model, recording):
-    return np.abs(model.lagged_slip(recording)) > model.known_slip
 
 
 def test_it_knows_where_it_has_been(car, drive):
