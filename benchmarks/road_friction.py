@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 
 import tireid as ti
-from benchmarks.answers import blind, drawn
+from benchmarks.answers import blind
 from benchmarks.inertial import own_sensors
 from benchmarks.random_cars import CLASSES, FIRST_SEED, RandomCar, random_steering
 from benchmarks.recorded_cars import DART, DATA

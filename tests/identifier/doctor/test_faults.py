@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.answers import drawn
+from benchmarks.random_cars import drawn
 from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
 from benchmarks.faults import Lagging, Late, Misaligned, Together
