@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.random_cars import drawn
 from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
 from benchmarks.faults import Lagging, Late, Misaligned, Together
+from benchmarks.random_cars import drawn
 from identifier.doctor import Finding, diagnose, examine
 from identifier.doctor.faults import Candidate, Search, _all_move, prepared
 from identifier.doctor.pieces import segments_of
