@@ -24,10 +24,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from benchmarks.inertial import own_sensors
 
 import tireid as ti
-from benchmarks.answers import blind, drawn
-from benchmarks.inertial import own_sensors
+from benchmarks.answers import blind
 from benchmarks.random_cars import CLASSES, FIRST_SEED, RandomCar, random_steering
 from benchmarks.recorded_cars import DART, DATA
 from benchmarks.targets import Targets, keeps

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.answers import blind, drawn
+from benchmarks.answers import blind
 from benchmarks.fault_cases import Scale
 from benchmarks.random_cars import CLASSES, FIRST_SEED, LEAD
 from benchmarks.targets import Targets, keeps, show

@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.extrapolate_recorded import outside_known
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.model import BESIDE
 from identifier.frozen import FrozenModelError
 from identifier.run import identify
 from identifier.tire_model import load_model, stored_verdict
-from tests.identifier.conftest import learnt, missed, saturating
+from tests.identifier.conftest import learnt, missed, outside_known, saturating
 
 
 def test_told_another_stiffness_it_reads_off_the_true_one(car, drive):

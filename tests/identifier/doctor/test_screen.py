@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.doctor_gross import drawn
+from benchmarks.everyday_drives import everyday_log
 from benchmarks.fault_cases import StraightOnly
 from benchmarks.faults import (
     Held,
@@ -92,7 +92,7 @@ def test_a_drive_that_is_right_is_left_alone(driven):
 )
 def test_a_v_y_that_hardly_stands_out_of_its_noise_has_no_unit_of_its_own(kind, seed, half):
     """Half a minute of gentle bends: read in mm/s, or as an angle, v_y would be next to nothing."""
-    log, car = drawn(kind, seed)
+    log, car, _ = everyday_log(kind, seed)
     n = len(log) // 2
     calm = log.taken(slice(half * n, (half + 1) * n))
     found = screen(calm, car)
@@ -160,7 +160,7 @@ def elsewhere(log, x):
 @pytest.mark.parametrize("seed", [1500, 1501])
 def test_a_velocity_sensor_at_an_axle_is_no_gross_fault(kind, seed):
     """Gentle bends and one maneuver, with an accelerometer and without one."""
-    log, car = drawn(kind, seed)
+    log, car, _ = everyday_log(kind, seed)
     for x in (car.l_f, -car.l_r):
         assert screen(elsewhere(log, x), car).findings == ()
 

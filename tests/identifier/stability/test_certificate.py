@@ -5,12 +5,16 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
-from benchmarks.limits import instantaneous_damping, integral_euler_limit, integral_limit
 from identifier.certificate import Property, at_least, at_most
 from identifier.paper.gains import gains_for
 from identifier.paper.laws import LAWS, Gains, diagonal
 from identifier.stability import Certificate, Operation, certify
 from identifier.stability.sampled_bound import Disturbance
+from tests.identifier.stability.limits import (
+    instantaneous_damping,
+    integral_euler_limit,
+    integral_limit,
+)
 
 integral, instantaneous, lead_law = (
     LAWS[name] for name in ("integral", "instantaneous", "pi_lead")

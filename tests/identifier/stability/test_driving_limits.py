@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.monte_carlo import Drives, measured, random_drives, within
 from identifier.driving import Driving
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import LAWS
@@ -54,36 +53,6 @@ def test_a_smooth_tire_misses_force_long_before_it_slides(car):
     late = expected_residual(car, slip=0.12, friction=0.9)
     slid = 0.12 * np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear])
     assert late == pytest.approx(np.linalg.norm(slid - 0.9 * np.array(car.axle_loads)), rel=0.05)
-
-
-def test_the_samples_of_drives_show_no_more_than_the_disturbance(car):
-    """Residual and noise of drives within the conditions."""
-    noisy = replace(
-        DRIVING, noise_v_x=0.1, noise_v_y=0.1, noise_r=0.01, noise_delta=0.002, bandwidth=1.2
-    )
-    acting = disturbance(car, noisy, dt=0.02, unit=1000.0)
-    rng = np.random.default_rng(2)
-    drives = random_drives(car, rng, 64, driving=noisy, duration=8.0, dt=0.02)
-    kept = within(car, drives, noisy, 0.02)
-    assert kept.sum() > 10
-    drives = Drives(*(values[kept] for values in drives))
-    seen = measured(drives, noisy, rng)
-    K_inv = np.array([[1500.0 * 1.55, 2500.0], [1500.0 * 1.15, -2500.0]]) / 2.7 / 1000.0
-    xi = drives.x @ K_inv.T
-    rate = np.diff(xi, axis=1) / 0.02
-    lever = np.array([car.l_f, -car.l_r])
-    C = np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear]) / 1000.0
-
-    def known(of):
-        alpha = of.u - (of.x[..., :1] + lever * of.x[..., 1:]) / of.v_x[..., None]
-        return alpha * C - np.stack([of.v_x * of.x[..., 1], 0 * of.v_x], axis=-1) @ K_inv.T
-
-    def largest(values):
-        return float(np.linalg.norm(values, axis=2).max())
-
-    assert 0.3 * acting.residual < largest(rate - known(seen)[:, :-1]) <= acting.residual
-    noise = largest((seen.x - drives.x) @ K_inv.T)
-    assert 0.9 * acting.noise < noise <= acting.noise * (1 + 1e-12)
 
 
 def test_what_each_sensor_adds_is_the_force_of_the_slip_and_of_the_turn_that_it_feigns(car):

@@ -1,16 +1,16 @@
 import numpy as np
 import pytest
 
-from benchmarks.limits import (
+from identifier.stability.checks import _worst_damping
+from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, growth_rate
+from identifier.stability.margins import gain_margin
+from tests.identifier.stability.limits import (
     critical_frequency,
     instantaneous_damping,
     instantaneous_euler_limit,
     integral_euler_limit,
     integral_limit,
 )
-from identifier.stability.checks import _worst_damping
-from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, growth_rate
-from identifier.stability.margins import gain_margin
 
 
 def scalar(a, lam, g, leakage, law=INTEGRAL):

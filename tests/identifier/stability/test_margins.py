@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvals
 
-from benchmarks.limits import integral_limit
 from identifier.paper.laws import DrivingError
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, growth_rate
 from identifier.stability.margins import gain_margin, phase_margin
+from tests.identifier.stability.limits import integral_limit
 
 
 def scalar_loop(

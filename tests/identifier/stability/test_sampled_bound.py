@@ -5,14 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.monte_carlo import (
-    Beginning,
-    largest_norms,
-    measured,
-    monte_carlo,
-    random_drives,
-    within,
-)
 from identifier.driving import natural_driving
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import LAWS, DrivingError, Gains
@@ -60,61 +52,15 @@ def test_without_noise_euler_has_the_bounds_of_the_closed_form(A_d, law):
     assert pytest.approx(balance + law.z * g * X / 5.0**2, rel=1e-6) == found.W
 
 
-@pytest.mark.heavy
-@pytest.mark.parametrize("law", ["integral", "instantaneous", "pi_lead"])
-def test_no_drive_passes_a_bound_with_noise_resumed_weights_and_a_high_gain(law):
-    design = PaperIdentifier.for_vehicle(CAR, law=law)
-    gains = replace(design.gains, eta_W=1.5 * design.gains.eta_W, rho_W=1.5 * design.gains.rho_W)
-    coupled = replace(gains, A_d=((gains.A_d[0][0], 3.0), (-1.0, gains.A_d[1][1])))
-    for numbers in (gains, coupled):
-        wild = replace(design, gains=numbers)
-        found = bounds_of(wild)
-        assert np.isfinite([found.leakage.xi_tilde, found.W, found.V]).all()
-        seen = monte_carlo(
-            wild, CAR, DRIVING, 64, beginning=Beginning(W=found.W, V=9.0),
-            rng=np.random.default_rng(5),
-        )  # fmt: skip
-        for values, bound in (
-            (seen.xi_tilde, found.leakage.xi_tilde),
-            (seen.W, found.W),
-            (seen.V, found.V),
-        ):
-            assert 0.02 * bound < values.max() <= bound * (1.0 + 1e-9)
-
-
-def test_a_V_layer_that_leaks_more_than_itself_in_a_sample_fails_and_diverges():
+def test_a_V_layer_that_leaks_more_than_itself_in_a_sample_fails():
     design = PaperIdentifier.for_vehicle(CAR)
     planted = replace(design, gains=replace(design.gains, rho_V=3000.0))
     certificate = judged(planted)
     assert certificate["leakage_step_V"].status == "fail"
     assert judged(design).verdict == "pass"
-    seen = monte_carlo(
-        planted, CAR, DRIVING, 40, beginning=Beginning(0.0, 12.0), rng=np.random.default_rng(1)
-    )
-    assert not (seen.V < 1e6).all()
     factor = float(certificate["leakage_step_V"].advice.split()[2].rstrip(","))
     mended = replace(design, gains=replace(design.gains, rho_V=0.99 * factor))
     assert judged(mended)["leakage_step_V"].status == "pass"
-
-
-def test_a_smooth_tire_short_of_sliding_keeps_the_bound_and_passes_that_of_a_sliding_one():
-    """At 0.06 rad the sedan hardly slides: what slides is no bound on what the tire misses."""
-    gentle = replace(DRIVING, v_x=20.0, slip=0.07, bandwidth=0.5)
-    design = PaperIdentifier.for_vehicle(CAR)
-    C = np.array([CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear])
-    sliding = np.linalg.norm(np.maximum(C * 0.07 - CAR.axle_loads, 0.0)) / 1000.0
-    D, gains = np.eye(2) / -design.gains.A_d[0][0], design.gains
-    learning = output_layer(gains, INTEGRAL, D, n_h=10, dt=0.01)
-    error = error_gains(gains.matrix, 0.01)
-    found = bounds_of(design, gentle)
-    small = Disturbance(residual=max(sliding, 1e-3))
-    claimed = error.force * small.residual
-    seen = monte_carlo(
-        design, CAR, gentle, 64, beginning=Beginning(0.0, 12.0), rng=np.random.default_rng(2)
-    )
-    assert by_leakage(error, learning, gains.matrix, small, 10).W < found.W
-    assert seen.residual.max() > 3.0 * sliding
-    assert claimed < seen.xi_tilde.max() <= found.leakage.xi_tilde
 
 
 def test_nothing_that_is_unbounded_passes():
@@ -122,23 +68,6 @@ def test_nothing_that_is_unbounded_passes():
     for changed in ({"rho_W": 0.0, "eta_V": 0.0}, {"rho_V": 0.0}, {"rho_W": 0.0, "rho_V": 0.0}):
         design = replace(PaperIdentifier.for_vehicle(CAR), gains=replace(gains, **changed))
         assert judged(design).verdict != "pass"
-
-
-def test_sensors_that_err_more_than_declared_pass_the_bound_and_those_as_declared_do_not():
-    exact = replace(DRIVING, slip=0.01, noise_v_x=0.0, noise_v_y=0.0, noise_r=0.0, noise_delta=0.0)
-    poor = replace(exact, noise_v_y=1.0, noise_r=0.1)
-    design = PaperIdentifier.for_vehicle(CAR)
-    gains = replace(design.gains, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0)
-    quiet = replace(design, gains=gains)
-    rng = np.random.default_rng(3)
-    drives = random_drives(CAR, rng, 64, driving=exact, duration=5.0, dt=0.01)
-    drives = type(drives)(*(values[within(CAR, drives, exact, 0.01)] for values in drives))
-    weights = quiet.network.initial_weights(rng)
-    count = len(drives.v_x)
-    begun = weights._replace(W=np.zeros((count, 2, 10)), V=np.repeat(weights.V[None], count, 0))
-    error = largest_norms(quiet, CAR, measured(drives, poor, rng), begun)[0].max()
-    declared, wrong = (bounds_of(quiet, one).leakage.xi_tilde for one in (exact, poor))
-    assert declared < error <= wrong
 
 
 def test_the_tight_route_claims_no_less_than_an_identifier_without_a_network():

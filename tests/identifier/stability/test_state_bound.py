@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from benchmarks.limits import integral_euler_limit
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import DrivingError, Gains, diagonal
 from identifier.paper.network import Network
@@ -23,6 +22,7 @@ from identifier.stability.sampled_bound import (
     error_gains,
     output_layer,
 )
+from tests.identifier.stability.limits import integral_euler_limit
 
 SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])
 LAWS = {"integral": INTEGRAL, "instantaneous": INSTANTANEOUS, "pi_lead": DrivingError(1.0, 0.3)}
