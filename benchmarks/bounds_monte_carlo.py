@@ -153,7 +153,7 @@ def with_leakage(
     needed = blank.operation(vehicle).needed_force
     capacity = needed * np.exp(rng.uniform(np.log(0.3), np.log(10.0)))
     rho = steady_capacity(
-        A_d, law=law, forgetting=forgetting, eta_W=eta_W, rho_W=capacity, n_h=n_h, direction=D
+        D, law=law, forgetting=forgetting, eta_W=eta_W, rho_W=capacity, n_h=n_h
     )  # the capacity is inverse to rho
     eta_V = eta_W * rng.choice([0.0, rng.uniform(0.0, 0.3)])
     return replace(blank, gains=replace(gains, eta_W=eta_W, eta_V=eta_V, rho_W=rho, rho_V=rho))
