@@ -128,6 +128,7 @@ class PaperIdentifier(Method):
         vehicle: Vehicle,
         *,
         law: str = "integral",
+        network: Network | None = None,
         dt: float = 0.01,
         seed: int = 0,
     ) -> "PaperIdentifier":
@@ -139,6 +140,7 @@ class PaperIdentifier(Method):
         Parameters
         ----------
         law : one of `VARIANTS`.
+        network : structure; None takes `natural_network`.
         dt : sampling interval [s].
         """
         if law not in VARIANTS:
@@ -148,7 +150,7 @@ class PaperIdentifier(Method):
             gains=Gains(  # until the design around them is known
                 A_d=diagonal(1.0), forgetting=1.0, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0
             ),
-            network=natural_network(vehicle),
+            network=network or natural_network(vehicle),
             law=gains_of,
             dt=dt,
             force_unit=_natural_force_unit(vehicle.mass),
