@@ -51,25 +51,20 @@ class Design(Protocol):
         """Slip scales of the units [rad]."""
 
     @property
-    def rising_until(self) -> float | None:
-        """Slip at which force curves do not fall yet [rad]; None bounds no slope."""
-
-    @property
     def dt(self) -> float:
         """Sampling interval [s]."""
 
 
 @cache
-def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | None) -> Array:
+def corners(bounds: Bounds, ladder: tuple[float, ...]) -> Array:
     """Return the corners of the set that weights are kept in, (k, n) [static axle loads].
     ladder : slip scales of the units [rad].
-    rising_until : as of `AxleIdentifier`; None bounds no slope.
     """
     n, most = len(ladder), bounds.weight
-    slabs = [(np.ones(n), (bounds.least_grip, bounds.most_grip))]
-    if rising_until is not None:
-        least = 0.0 if rising_until else bounds.least_stiffness
-        slabs.append((unit_slopes(rising_until, ladder), (least, bounds.most_stiffness)))
+    slabs = [
+        (np.ones(n), (bounds.least_grip, bounds.most_grip)),
+        (1.0 / np.array(ladder), (bounds.least_stiffness, bounds.most_stiffness)),
+    ]
     found = []
     for active in range(len(slabs) + 1):
         for chosen in combinations(slabs, active):
@@ -215,7 +210,7 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
     Of a car with downforce without the time that a drop of friction takes.
     """
     b, dt = design.bounds, design.dt
-    set_ = corners(b, design.ladder, design.rising_until)
+    set_ = corners(b, design.ladder)
     facts = curve_facts(set_, design.ladder, CHOSEN.largest_slip)
     apart = _widest_range(set_, design.ladder, CHOSEN.largest_slip)
     jump = jump_by_learning(design)
@@ -304,8 +299,6 @@ def jump_by_learning(design: Design) -> float:
 def _lean_over_rounding(design: Design) -> float:
     """Return how far a limited step leans inwards, over what rounding in float may do to it."""
     n, b = len(design.ladder), design.bounds
-    numbers = b.of_ladder(design.ladder, design.rising_until)
-    per_distance = [numbers.per_grip, numbers.per_weight]
-    if design.rising_until is not None:
-        per_distance += [numbers.per_falling, numbers.per_rising]
-    return float(CHOSEN.lean / max(per_distance) / (8.0 * n * FLOAT * b.weight))
+    inside = b.of_ladder(design.ladder)
+    nearest = max(inside.per_grip, inside.per_weight, inside.per_falling, inside.per_rising)
+    return float(CHOSEN.lean / nearest / (8.0 * n * FLOAT * b.weight))

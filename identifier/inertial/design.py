@@ -169,7 +169,7 @@ class InertialIdentifier(Method):
 
     @property
     def limits(self) -> Limits:
-        boxes = curve_boxes(self.bounds, stiffness=True) | {
+        boxes = curve_boxes(self.bounds) | {
             "roll_rad_per_g": [0.0, MOST["roll"]],
             "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
             "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
@@ -219,8 +219,8 @@ class InertialIdentifier(Method):
                 "trust": np.array(trust),
                 "learning_speed": np.array(self.plausibility.learning_speed),
                 "limits": np.array(self._limits()),
-                "bounds": np.array(self.bounds.of_ladder(self.ladder, CHOSEN.rising_until)),
-                "rising": rising_shares(self.ladder, CHOSEN.rising_until),
+                "bounds": np.array(self.bounds.of_ladder(self.ladder)),
+                "rising": rising_shares(self.ladder),
                 "curves": curves,
                 "compliance": compliance,
                 "doubt": np.array(self.doubt),

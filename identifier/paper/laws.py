@@ -66,11 +66,6 @@ class Law:
     lead: float = 0.0
     direction: _Direction = _static_direction
 
-    def __post_init__(self) -> None:
-        shares = (self.z, self.xi, self.lead)
-        if not (min(shares) >= 0.0 and 0.0 < sum(shares) < np.inf):
-            raise ValueError(f"a law must weigh z and xi_tilde positively, it has {shares}")
-
     def error(self, lead: Any = 0.0) -> DrivingError:
         """Return the coefficients of the driving error.
         lead : lead time τ of the gains [s], a number or a symbol.

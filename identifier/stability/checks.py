@@ -10,7 +10,7 @@ from identifier.certificate import Property, Status, at_least, statement
 from identifier.paper.laws import DrivingError, Gains
 from identifier.stability.bounds import small_gain, steady_capacity
 from identifier.stability.chosen import CHOSEN
-from identifier.stability.loop import ComplexArray, Loop, eigenvalues
+from identifier.stability.loop import Loop, eigenvalues
 from identifier.stability.lyapunov import lyapunov
 from identifier.stability.margins import drift_frequency, gain_margin, phase_margin
 from identifier.stability.operation import Operation, Proven
@@ -21,12 +21,15 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     """A_d and λ: stable as they are sampled, resolved by the step, faster than the x_hat loop.
     gains : of (8) to (12).
     """
-    A_d, dt = gains.matrix, operation.dt
-    poles = _state_space_poles(A_d)
+    import control  # takes a second to import, so only where it is needed
+
+    A_d, dt, eye = gains.matrix, operation.dt, np.eye(2)
+    # of ξ̃' = A_d ξ̃ + (f - f_hat)
+    poles = np.asarray(control.poles(control.ss(A_d, eye, eye, np.zeros((2, 2)))))
     step = float(np.abs(poles).max()) * dt
     sampled = np.abs(1.0 + poles * dt)
     slowest = -math.log(float(sampled.max())) / dt
-    lyapunov(A_d, np.eye(2))  # raises where P does not solve its equation
+    lyapunov(A_d, eye)  # raises where P does not solve its equation
     finer = f"slow A_d down or sample every {1e3 * dt * CHOSEN.largest_step / step:.3g} ms"
     title = "fastest pole of A_d times the sampling interval"
     sampling = Property.judged(
@@ -119,17 +122,6 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
         unit="U",
         advice="" if holds else advice,
     )
-
-
-def _state_space_poles(A_d: Array) -> ComplexArray:
-    """Poles of ξ̃' = A_d ξ̃ + (f - f_hat), by python-control (2,) [1/s].
-    A_d : (2, 2) error dynamics [1/s].
-    """
-    import control  # takes a second to import, so only where it is needed
-
-    eye = np.eye(2)
-    error_dynamics = control.ss(A_d, eye, eye, np.zeros((2, 2)))
-    return np.asarray(control.poles(error_dynamics), dtype=np.complex128)
 
 
 def drift_check(
@@ -271,8 +263,8 @@ def _leakage(name: str, layer: str, step: float, rho: float) -> Property:
 def _capacity(gains: Gains, law: DrivingError, operation: Operation, direction: Array) -> Property:
     """Judge the force that leakage lets W hold."""
     capacity = steady_capacity(
-        gains.matrix, law=law, forgetting=gains.forgetting, eta_W=gains.eta_W, rho_W=gains.rho_W,
-        n_h=operation.n_h, direction=direction,
+        direction, law=law, forgetting=gains.forgetting, eta_W=gains.eta_W, rho_W=gains.rho_W,
+        n_h=operation.n_h,
     )  # fmt: skip
     need = operation.needed_force
     advice = f"rho_W below {gains.rho_W * capacity / need:.3g}" if capacity < need else ""

@@ -13,7 +13,6 @@ A step dt of explicit Euler acts on the eigenvalues μ of this matrix as 1 + μ 
 time and the sampled loop share one eigenvalue computation.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -24,7 +23,6 @@ from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
 from identifier.paper.laws import DrivingError, Law
-from identifier.stability.lyapunov import require_square
 
 ComplexArray = npt.NDArray[np.complex128]
 INTEGRAL = DrivingError(1.0, 0.0)
@@ -35,7 +33,7 @@ def direction_matrix(law: Law, A_d: ArrayLike) -> Array:
     """Return D of the law, (2, 2) [s]: -A_d⁻ᵀ as printed, P for the PI-lead law.
     law : of `identifier.paper.laws.LAWS`.   A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
-    found: Array = -np.array(ca.DM(law.direction(ca.DM(require_square(A_d)), ca.DM.eye(2))))
+    found: Array = -np.array(ca.DM(law.direction(ca.DM(np.asarray(A_d)), ca.DM.eye(2))))
     return found
 
 
@@ -57,22 +55,13 @@ class Loop:
     input_feedback: Array | None = None
     direction: Array | None = None
 
-    def __post_init__(self) -> None:
-        """Check shapes and signs once, here."""
-        object.__setattr__(self, "A_d", require_square(self.A_d))
-        object.__setattr__(self, "G", require_square(self.G))
-        if not self.forgetting > 0.0:
-            raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
-        if not self.leakage >= 0.0:
-            raise ValueError(f"leakage must not be negative, it is {self.leakage}")
-
     def matrix(self) -> Array:
         """Return the (6, 6) matrix of the states (ξ̃, z, p)."""
         eye, zero = np.eye(2), np.zeros((2, 2))
         c_z, c_xi = self.law
         printed = -np.linalg.inv(self.A_d).T  # (zᵀ A_d⁻¹)ᵀ = A_d⁻ᵀ z
-        drive = self.G @ (printed if self.direction is None else require_square(self.direction))
-        feedback = zero if self.input_feedback is None else require_square(self.input_feedback)
+        drive = self.G @ (printed if self.direction is None else self.direction)
+        feedback = zero if self.input_feedback is None else self.input_feedback
         return np.block(
             [
                 [self.A_d + feedback, zero, -eye],
@@ -140,13 +129,7 @@ def worst_gain(
     eta_W : learning rate of (11).   eta_V : learning rate of (12).
     n_h : hidden units; |s|² <= n_h.   W_max : bound on |W| (Frobenius) [U]; needed where V learns.
     """
-    if not (eta_W >= 0.0 and eta_V >= 0.0 and n_h >= 1):
-        raise ValueError(f"eta_W, eta_V >= 0 and n_h >= 1, they are {(eta_W, eta_V, n_h)}")
-    through_V = 0.0
-    if eta_V > 0.0:
-        through_V = eta_V * x_bar_max**2 * W_max**2
-        if not (x_bar_max > 0.0 and W_max > 0.0 and math.isfinite(through_V)):
-            raise ValueError(f"where V learns, give x_bar_max and W_max: {(x_bar_max, W_max)}")
+    through_V = eta_V * x_bar_max**2 * W_max**2 if eta_V > 0.0 else 0.0
     return (n_h - 1) * eta_W + max(eta_W, through_V)
 
 

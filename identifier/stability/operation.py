@@ -26,7 +26,6 @@ from identifier.stability.sampled_bound import (
     output_layer,
 )
 from models.bicycle import bicycle
-from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
 
@@ -54,17 +53,6 @@ class Operation:
     V_start: float = 0.0
     W_large: float = math.inf
     input_per_error: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_positive(
-            ValueError, n_h=self.n_h, dt=self.dt, bandwidth=self.bandwidth,
-            needed_force=self.needed_force, x_bar_max=self.x_bar_max,
-        )  # fmt: skip
-        if not self.W_large > 0.0:
-            raise ValueError(f"W_large must be positive, it is {self.W_large}")
-        for name in ("V_start", "input_per_error"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f"{name} must not be negative, it is {getattr(self, name)}")
 
     def resolves(self, A_d: Array) -> bool:
         """Whether the step keeps the error dynamics stable.   A_d : (2, 2) error dynamics [1/s]."""
@@ -159,7 +147,6 @@ def estimated_input_feedback(
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
     stiffness_lost : (2,) C - F' of front and rear axle [N/rad]; C itself at full saturation.
     """
-    require_positive(ValueError, m=m, I_z=I_z, l_f=l_f, l_r=l_r, v_x=v_x)
     lost = np.asarray(stiffness_lost, dtype=np.float64)
     if lost.shape != (2,) or not np.all(np.isfinite(lost)):
         raise ValueError(f"stiffness_lost must be two numbers, it is {lost.tolist()}")
@@ -186,7 +173,6 @@ def _largest_signals(
     vehicle: Vehicle, *, v_x: float, slip: float, friction: float
 ) -> dict[str, float]:
     """Bound of every signal that a network may read, SI."""
-    require_positive(ValueError, v_x=v_x, slip=slip, friction=friction)
     r = YAW_OVERSHOOT * friction * GRAVITY / v_x
     v_y = vehicle.l_r * r + v_x * slip
     return {
@@ -214,7 +200,6 @@ def _residual_bound(vehicle: Vehicle, *, slip: float) -> float:
     """Force that the linear tire can miss at most at any instant, |f| <= hypot(C_f, C_r) slip [N].
     vehicle : the car; its stiffness is at least half that of the tires.
     """
-    require_positive(ValueError, slip=slip)
     return slip * math.hypot(vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear)
 
 
@@ -223,7 +208,6 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
 
     No bound, but what the network must be able to hold where both axles are at the slip [N].
     """
-    require_positive(ValueError, slip=slip, friction=friction)
     peak = friction * np.array(vehicle.axle_loads)
     linear = slip * _stiffness(vehicle)
     state = peak * np.sin(1.5 * np.arctan(linear / (1.5 * peak)))

@@ -20,7 +20,6 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.paper.laws import DrivingError, Gains
 from identifier.stability.lyapunov import power_norms
-from models.rules import require_positive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,11 +32,6 @@ class Disturbance:
 
     residual: float
     noise: float = 0.0
-
-    def __post_init__(self) -> None:
-        require_positive(ValueError, residual=self.residual)
-        if not 0.0 <= self.noise < math.inf:
-            raise ValueError(f"noise must not be negative, it is {self.noise}")
 
 
 _NEWTON_STEPS = 100

@@ -107,18 +107,12 @@ def judge_identification(
     return _verdict(asked, [*_findings(asked), *map(_at_bound, bounds), *notes], recording)
 
 
-def judge_prediction(
-    model: TireModel, recording: Recording, *, another_road: bool = True
-) -> Verdict:
-    """Return the verdict on a stored model over a drive: does it give back the drive's motion?
-    another_road : whether the road may be another one than that which taught, and its friction is
-        reported; of a drive that taught the model it is not.
-    """
+def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
+    """Return the verdict on a stored model over a drive: does it give back the drive's motion?"""
     asked = _asked(model, recording, own=False)
     if asked is None:
         return _too_short(model, CHOSEN.fewest)
-    road = _road(asked.recording, model)
-    friction = road_friction(model, recording, road) if another_road else None
+    friction = road_friction(model, recording, _road(asked.recording, model))
     verdict = _verdict(asked, [*_findings(asked), *_roads(friction)], recording)
     return replace(verdict, friction=friction)
 

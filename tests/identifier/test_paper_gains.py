@@ -31,7 +31,7 @@ def test_gains_keep_their_rules(law):
     assert phase_margin(loop, 0.01) == pytest.approx(60.0, abs=1e-6)
     assert loop.G[0, 0] == pytest.approx(10.0 * gains.eta_W) and gains.eta_V > 0.0
     capacity = steady_capacity(
-        gains.matrix, law=error, forgetting=lam, eta_W=gains.eta_W, rho_W=gains.rho_W, n_h=10
+        D, law=error, forgetting=lam, eta_W=gains.eta_W, rho_W=gains.rho_W, n_h=10
     )
     assert capacity == pytest.approx(4.0 * 4.0)
     drive = gains.eta_V / a * proven.leakage.W * 2.5  # of V, at the bounds

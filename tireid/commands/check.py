@@ -45,17 +45,12 @@ def draw_check(
     D = direction_matrix(chosen, design.gains.matrix)
     kept = proven_bounds(design.gains, law, operation, D).W
     _, loop, _ = judged_loop(design.gains, law, operation, D, kept)
-    figures = {
-        "locus": locus_figure(loop, design.dt),
-        "bounds": error_figure(history, _error_bounds(certificate)),
-    }
-    save_figures(folder, figures)
-
-
-def _error_bounds(certificate: Certificate) -> dict[str, float]:
-    """Return the bounds of the error norm [U s] in a certificate, by the name in a legend."""
     known = {entry.name: entry.value for entry in certificate.properties}
-    return {title: known[name] for name, title in _BOUNDS.items() if name in known}
+    bounds = {title: known[name] for name, title in _BOUNDS.items() if name in known}  # [U s]
+    save_figures(
+        folder,
+        {"locus": locus_figure(loop, design.dt), "bounds": error_figure(history, bounds)},
+    )
 
 
 _CONDITIONS = {"v_x": "speed"} | {  # field of the declared driving, and the option of it

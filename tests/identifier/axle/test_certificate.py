@@ -35,7 +35,7 @@ def a_run(car, drive):
 
 def test_forces_of_the_corners_are_those_of_linear_programs(design):
     """Each most and each least force of the set, by HiGHS."""
-    W = corners(design.bounds, design.ladder, design.rising_until)
+    W = corners(design.bounds, design.ladder)
     rows = np.array([np.ones(4), -np.ones(4), 1 / A, -1 / A])
     limits = [3.0, -0.1, 80.0, -2.0]
     widest = 0.0
@@ -50,9 +50,9 @@ def test_forces_of_the_corners_are_those_of_linear_programs(design):
     assert widest <= _widest_range(W, LADDER, 1.5) < 1.2 * widest
 
 
-def test_a_ladder_of_three_and_a_free_slope_have_their_corners_too(design):
-    for ladder, rising in (((0.02, 0.08, 0.16), 0.0), (LADDER, None), (LADDER, 0.03)):
-        W = corners(design.bounds, ladder, rising)
+def test_a_ladder_of_three_has_its_corners_too(design):
+    for ladder in ((0.02, 0.08, 0.16), LADDER):
+        W = corners(design.bounds, ladder)
         grip = W.sum(axis=1)
         assert W.shape[1] == len(ladder) and np.abs(W).max() <= 3.0 + 1e-9
         assert 0.1 - 1e-9 <= grip.min() < grip.max() <= 3.0 + 1e-9
@@ -79,8 +79,8 @@ def test_facts_of_curves_are_those_of_a_fine_grid_from_the_safe_side(rng):
 
 
 def test_a_limited_step_is_cut_to_the_rate_and_another_is_not_moved(design, rng):
-    numbers = design.bounds.of_ladder(LADDER, 0.0)
-    W = corners(design.bounds, LADDER, 0.0)
+    numbers = design.bounds.of_ladder(LADDER)
+    W = corners(design.bounds, LADDER)
     slips = np.tanh(np.geomspace(1e-4, 2.0, 300)[:, None] / A)
     for _ in range(60):
         last, w = (rng.dirichlet(np.ones(len(W))) @ W for _ in range(2))

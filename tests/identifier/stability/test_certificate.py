@@ -161,15 +161,6 @@ def test_the_worst_status_is_the_verdict_and_nan_never_passes():
     assert at_least(np.nan, good=1.0, bad=0.5) == "fail"
 
 
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [("dt", 0.0), ("bandwidth", np.nan), ("V_start", -1.0)],
-)
-def test_an_operation_that_makes_no_sense_is_refused(name, value):
-    with pytest.raises(ValueError, match=name):
-        replace(CITY, **{name: value})
-
-
 def test_where_V_learns_the_margins_hold_up_to_the_weights_that_are_kept():
     design = gains_for(integral, CITY)
     kept = certify(design, integral, CITY)["weight_range"].value

@@ -1,6 +1,5 @@
 import casadi as ca
 import numpy as np
-import pytest
 
 from identifier.stability.loop import INTEGRAL, Loop
 from identifier.stability.margins import gain_margin
@@ -49,8 +48,3 @@ def test_below_the_decay_that_it_takes_no_learning_rate_saves_the_loop_that_read
             A_d=-a * np.eye(2), forgetting=a, law=INTEGRAL, G=np.eye(2), input_feedback=feedback
         )
         assert (gain_margin(loop).factor > 0.0) is stable
-
-
-def test_a_speed_that_is_not_positive_is_refused():
-    with pytest.raises(ValueError, match="v_x must be positive"):
-        saturated_car_feedback(0.0)

@@ -29,24 +29,3 @@ def test_no_random_regressor_exceeds_the_worst_gain_and_the_corners_reach_it():
         corner = np.array([first, 1.0, 1.0, 1.0])
         found = loop_gain(1.3, eta_V, corner, x_bar[0], corner_W)
         assert found == pytest.approx(worst, rel=1e-12)
-
-
-def test_a_learning_V_without_bounds_is_refused():
-    with pytest.raises(ValueError, match="x_bar_max and W_max"):
-        worst_gain(eta_W=1.0, eta_V=1.0, n_h=5, x_bar_max=1.0, W_max=np.inf)
-
-
-@pytest.mark.parametrize("wrong", [0.0, -2.0, np.nan, np.inf])
-@pytest.mark.parametrize("name", ["x_bar_max", "W_max"])
-def test_where_V_learns_its_bounds_must_be_positive_and_finite(name, wrong):
-    good = {"x_bar_max": 2.0, "W_max": 3.0}
-    assert worst_gain(eta_W=1.0, eta_V=0.5, n_h=4, **good) == pytest.approx(3.0 + 0.5 * 36.0)
-    with pytest.raises(ValueError, match="where V learns, give x_bar_max and W_max"):
-        worst_gain(eta_W=1.0, eta_V=0.5, n_h=4, **{**good, name: wrong})
-    assert worst_gain(eta_W=1.0, eta_V=0.0, n_h=4, **{**good, name: wrong}) == 4.0
-
-
-@pytest.mark.parametrize(("eta_W", "eta_V", "n_h"), [(-1.0, 0.0, 4), (1.0, -1.0, 4), (1.0, 0.0, 0)])
-def test_rates_and_sizes_that_are_negative_are_refused(eta_W, eta_V, n_h):
-    with pytest.raises(ValueError, match="n_h >= 1"):
-        worst_gain(eta_W=eta_W, eta_V=eta_V, n_h=n_h, x_bar_max=1.0, W_max=1.0)

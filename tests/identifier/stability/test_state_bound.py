@@ -86,10 +86,11 @@ def test_error_and_weights_stay_within_their_bounds_for_the_worst_inputs_that_we
     for k in range(8):
         A_d = SKEWED if k % 2 else -rng.uniform(2, 8) * np.eye(2)
         lam, n_h, f_max = rng.uniform(1, 8), 4, 2.0
-        unit = small_gain(A_d, law=law, forgetting=lam, eta_W=1.0, n_h=n_h, dt=2e-3)
+        D = -np.linalg.inv(A_d).T
+        unit = small_gain(A_d, law=law, forgetting=lam, eta_W=1.0, n_h=n_h, dt=2e-3, direction=D)
         eta = 0.6 / unit if unit > 0 else 20.0
         capacity = f_max * rng.uniform(0.5, 3.0)
-        rho = steady_capacity(A_d, law=law, forgetting=lam, eta_W=eta, rho_W=capacity, n_h=n_h)
+        rho = steady_capacity(D, law=law, forgetting=lam, eta_W=eta, rho_W=capacity, n_h=n_h)
         bounds = leakage_bounds(A_d, law, f_max, lam=lam, eta_W=eta, rho_W=rho, n_h=n_h)
         f, s = nasty_inputs(rng, 5000, n_h, f_max)
         resumed = rng.choice([0.0, 1.0]) * bounds.W
@@ -115,7 +116,7 @@ def test_the_weights_settle_at_the_capacity_where_the_residual_is_larger():
     for law in LAWS.values():
         f, s = np.tile([30.0, 0.0], (10000, 1)), np.ones((10000, 4))
         numbers = {"forgetting": 3.0, "eta_W": 2.0, "rho_W": 0.5, "n_h": 4}
-        capacity = steady_capacity(-4 * np.eye(2), law=law, **numbers)
+        capacity = steady_capacity(np.eye(2) / 4.0, law=law, **numbers)
         _, W = simulated(-4 * np.eye(2), law, 3.0, 2.0, 0.5, f, s)
         assert pytest.approx(capacity, rel=0.15) == 2.0 * W  # |f_hat| = √n_h |W|
 
@@ -123,7 +124,7 @@ def test_the_weights_settle_at_the_capacity_where_the_residual_is_larger():
 def test_the_bound_is_refused_where_the_circle_does_not_close():
     A_d, numbers = -3 * np.eye(2), {"lam": 2.0, "rho_W": 1.0, "n_h": 4, "dt": 1e-6}
     assert small_gain(
-        -3 * np.eye(2), law=INTEGRAL, forgetting=2.0, eta_W=9.0, n_h=4, dt=1e-6
+        A_d, law=INTEGRAL, forgetting=2.0, eta_W=9.0, n_h=4, dt=1e-6, direction=np.eye(2) / 3.0
     ) == pytest.approx(1.0)  # η n_h = a² λ²
     assert leakage_bounds(A_d, INTEGRAL, 1.0, **numbers, eta_W=9.01) is None
     assert leakage_bounds(A_d, INTEGRAL, 1.0, **numbers, eta_W=8.99).W > 0
@@ -185,7 +186,8 @@ def test_sampled_bounds_hold_the_gain_of_the_sampled_error_dynamics():
     A_d, dt = np.array([[-4.0, 30.0], [-6.0, -9.0]]), 0.04  # it swings: sampled it swings further
     gamma, size = sum_of_powers(A_d, dt), np.linalg.norm(np.linalg.inv(A_d), 2)
     assert gamma > 1.3 * sum_of_powers(A_d, 4e-3)
-    theta = small_gain(A_d, law=INTEGRAL, forgetting=3.0, eta_W=0.4, n_h=4, dt=dt)
+    D = -np.linalg.inv(A_d).T
+    theta = small_gain(A_d, law=INTEGRAL, forgetting=3.0, eta_W=0.4, n_h=4, dt=dt, direction=D)
     assert theta == pytest.approx(gamma * 0.4 * size * 4 / 9.0, rel=1e-9)
     assert error_gains(A_d, dt).force == pytest.approx(gamma, rel=1e-9)
     numbers = {"lam": 3.0, "eta_W": 0.05, "rho_W": 0.5, "n_h": 4, "dt": dt}
