@@ -90,7 +90,6 @@ def test_an_angle_that_no_wheel_has_is_refused(tracker, angle):
     before = tracker.instance.state.copy()
     with pytest.raises(ValueError, match="finite and at most"):
         tracker.reset(angle)
-    tracker.instance.late(angle)
     assert tracker.instance.state == before
 
 
