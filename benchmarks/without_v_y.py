@@ -2,9 +2,10 @@
 
     python -m benchmarks.without_v_y [--record] [--only PART ...] [--cars N]
 
-A linear Kalman filter on the vehicle's tires and a naive joint filter of state and tires, those of
-benchmarks/rivals, on recordings of CarMaker, the own sensors of the real 1:10 car, and random cars
-on banked roads with what inertial sensors add; all in one run. Nobody is shown v_y; the true one scores, from the first sample. Numbers of the baselines
+A linear Kalman filter on the vehicle's tires, a naive joint filter of state and tires, a washout,
+and moving-horizon estimation, those of benchmarks/rivals, on recordings of CarMaker, the own
+sensors of the real 1:10 car, and random cars on banked roads with what inertial sensors add; all in
+one run. Nobody is shown v_y; the true one scores, from the first sample. Numbers of the baselines
 were chosen on random cars with seeds below `FIRST_SEED`, and on no recording. Where the
 accelerometer sits is told to all: the inertial identifier takes it, for the others a_y is moved to
 the center of gravity. Then the inertial identifier as a car with logs runs it, on tires that an

@@ -60,9 +60,9 @@ PORTS = (
 
 
 class _Numbers(NamedTuple):
-    """What the filter is given, in the order of its constant; chosen on 24 random cars of our plant.
+    """What the filter is given, in the order of its constant.
 
-    Standard deviations of v_y [m/s], r [rad/s] and a_y [m/s²]; disturbances of v_y [m/s/√s] and
+    Chosen on 24 random cars of our plant. Standard deviations of v_y [m/s], r [rad/s] and a_y [m/s²]; disturbances of v_y [m/s/√s] and
     r [rad/s/√s]; walk of ln C and ln μ [1/√s]; relaxation length of both axles [m]; learning
     speed [m/s].
     """
