@@ -62,9 +62,9 @@ PORTS = (
 class _Numbers(NamedTuple):
     """What the filter is given, in the order of its constant.
 
-    Chosen on 24 random cars of our plant. Standard deviations of v_y [m/s], r [rad/s] and a_y [m/s²]; disturbances of v_y [m/s/√s] and
+    Standard deviations of v_y [m/s], r [rad/s] and a_y [m/s²]; disturbances of v_y [m/s/√s] and
     r [rad/s/√s]; walk of ln C and ln μ [1/√s]; relaxation length of both axles [m]; learning
-    speed [m/s].
+    speed [m/s]. All were chosen on 24 random cars of our plant.
     """
 
     v_y_noise: Any
