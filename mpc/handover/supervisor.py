@@ -92,7 +92,6 @@ class Supervisor:
 
     Attributes: target; decisions, those that changed it, and the last one.
     in_use : the tire to begin with, one of this car: what it does not explain is the road.
-    judge : of chi-squares; None expects the usual errors.
     """
 
     def __init__(
@@ -100,11 +99,10 @@ class Supervisor:
         identifier: OnlineIdentifier,
         in_use: PredictionTire,
         rules: Rules | None = None,
-        judge: Judge | None = None,
     ) -> None:
         dt = identifier.method.dt
         self.identifier, self.target = identifier, in_use
-        self.rules, self.judge = rules or Rules(), judge or Judge(dt)
+        self.rules, self.judge = rules or Rules(), Judge(dt)
         complaint = law_complaint(identifier.method, identifier.vehicle)
         if complaint is not None:
             raise ValueError(complaint)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mpc.handover.judge import ErrorModel, Judge, Window, axle_forces
+from mpc.handover.judge import Judge, Window, axle_forces
 from mpc.tires import prediction_tire
 from tests.mpc.handover.conftest import samples_of
 
@@ -103,8 +103,6 @@ def test_a_judge_wants_samples_and_a_stretch(tire):
         Judge(0.01).chi_square(tire, np.ones((22, 6)))
     with pytest.raises(ValueError, match="three samples"):
         Judge(0.1)
-    with pytest.raises(ValueError, match="error must be positive"):
-        ErrorModel(error=0.0)
 
 
 @pytest.mark.parametrize("count", [3, 10, 11, 37, 60])
