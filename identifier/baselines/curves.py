@@ -252,12 +252,6 @@ class CurveModel(TireModel):
             vehicle=vehicle_from(table.value("vehicle")),
             parameters=np.array(axles),
             min_speed=table.number("min_speed_m_s"),
-            **{  # files of earlier versions have neither
-                name: table.array(key)
-                for name, key in (
-                    ("relaxation_length", "relaxation_length_m"),
-                    ("offset", "offset_rad_m_s"),
-                )
-                if key in table
-            },
+            relaxation_length=table.array("relaxation_length_m"),
+            offset=table.array("offset_rad_m_s"),
         )

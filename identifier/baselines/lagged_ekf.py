@@ -36,12 +36,14 @@ from identifier.method import Method
 from identifier.setup import AXLE_FORCE, COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters, bicycle
-from models.rules import require_positive
+from models.rules import require_positive_fields
 from models.vehicle import GRAVITY, Vehicle
 
 SHAPE = 1.4  # C of a passenger tire, Pacejka, Tyre and Vehicle Dynamics, figure 4.9
-STIFFNESS = 14.0  # at first, in static axle loads/rad
-FRICTION = 0.85  # at first, in static axle loads
+# At first: ln C and ln μ, of 14 static axle loads/rad and of 0.85 static axle loads.
+BEGINNING = [math.log(14.0)] * 2 + [math.log(0.85)] * 2
+# Standard deviations at first: ln C and ln μ [-], δ₀ [rad] and b_a [m/s²].
+SPREADS = (0.6, 0.6, 0.25, 0.25, 0.01, 0.3)
 BOUNDS = np.log([[2.0, 60.0], [0.2, 1.6]])  # of ln C and ln μ
 TIRE = slice(4, 8)  # of the state
 _STATES = 10
@@ -55,11 +57,24 @@ PORTS = (
     Port("before", "rad; rad; m/s", "delta_f, delta_r and v_x of the last sample"),
     Port("running", "-", "1 after a sample in motion"),
 )
-# What the filter is given, in the order of its constant.
-_NUMBERS = (
-    *("v_y_noise", "r_noise", "a_y_noise", "v_y_disturbance", "r_disturbance"),
-    *("walk", "relaxation_length", "learning_speed"),
-)
+
+
+class _Numbers(NamedTuple):
+    """What the filter is given, in the order of its constant.
+
+    Standard deviations of v_y [m/s], r [rad/s] and a_y [m/s²]; disturbances of v_y [m/s/√s] and
+    r [rad/s/√s]; walk of ln C and ln μ [1/√s]; relaxation length of both axles [m]; learning
+    speed [m/s]. All were chosen on 24 random cars of our plant.
+    """
+
+    v_y_noise: Any
+    r_noise: Any
+    a_y_noise: Any
+    v_y_disturbance: Any
+    r_disturbance: Any
+    walk: Any
+    relaxation_length: Any
+    learning_speed: Any
 
 
 def axle_loads(p: BicycleParameters) -> Any:
@@ -120,10 +135,10 @@ def _build_step() -> ca.Function:
     p, dt, loads = s.parameters, s.sampling[0], axle_loads(s.parameters)
     z, P = ca.SX.sym("estimate", _STATES), ca.SX.sym("P", _STATES, _STATES)
     before, running = ca.SX.sym("before", 3), ca.SX.sym("running")
-    numbers = ca.SX.sym("numbers", len(_NUMBERS))
-    *noise, v_y_disturbance, r_disturbance, walk, length, learning_speed = ca.vertsplit(numbers)
-    sigma = ca.vertcat(length, length)
-    learning = s.v_x >= learning_speed
+    numbers = ca.SX.sym("numbers", len(_Numbers._fields))
+    given = _Numbers(*ca.vertsplit(numbers))
+    sigma = ca.vertcat(given.relaxation_length, given.relaxation_length)
+    learning = s.v_x >= given.learning_speed
     going = ca.logic_and(learning, running > 0.5)
 
     def force(z: Any, slip: Any, u: Any) -> Any:
@@ -132,20 +147,21 @@ def _build_step() -> ca.Function:
     def slip_of(v_x: Any, x: Any, u: Any) -> Any:
         return measured_slip(p, ca.vertcat(z[8], 0), v_x, x, u)
 
-    v_mean = ca.fmax((before[2] + s.v_x) / 2, learning_speed)
+    v_mean = ca.fmax((before[2] + s.v_x) / 2, given.learning_speed)
     u_mean = (before[:2] + s.u) / 2
     motion = motion_rate(p, v_mean, z[:2], force(z, z[2:4], u_mean))
     rate = ca.vertcat(motion, v_mean / sigma * (slip_of(v_mean, z[:2], u_mean) - z[2:4]))
     ahead = ca.vertcat(midpoint(z, rate, dt), z[4:])
     F = ca.jacobian(ahead, z)
-    walks = ca.vertcat(v_y_disturbance, r_disturbance, 0, 0, *[walk] * 4, ca.SX(2, 1))
+    disturbed = (given.v_y_disturbance, given.r_disturbance, 0, 0)
+    walks = ca.vertcat(*disturbed, *[given.walk] * 4, ca.SX(2, 1))
     at = ca.SX.sym("at", _STATES)
     shows = ca.vertcat(at[:2], ca.sum1(force(at, at[2:4], s.u)) / p.m + at[9])
     shows, H = ca.substitute([shows, ca.jacobian(shows, at)], [at], [ahead])
     H[2, :] *= s.has_a_y
     a_y = ca.if_else(s.has_a_y, s.a_y, 0)
     innovation = ca.vertcat(s.x - shows[:2], s.has_a_y * (a_y - shows[2]))
-    R = ca.diag(ca.vertcat(*noise) ** 2)
+    R = ca.diag(ca.vertcat(*given[:3]) ** 2)
     found = corrected(F @ P @ F.T + ca.diag(walks**2 * dt), H, R, innovation)
 
     after = ahead + found.move
@@ -153,7 +169,7 @@ def _build_step() -> ca.Function:
     after[TIRE] = ca.fmin(ca.fmax(after[TIRE], low), high)
     alpha_now = slip_of(s.speed, s.x, s.u)
     afresh = ca.vertcat(s.x, alpha_now, z[4:])
-    unsure = ca.vertcat(*noise[:2], *[noise[0] / s.speed] * 2)
+    unsure = ca.vertcat(*given[:2], *[given.v_y_noise / s.speed] * 2)
     P_next = ca.if_else(going, found.P, ca.diagcat(ca.diag(unsure**2), P[4:, 4:]))
     lagged = lagged_slip(last, alpha_now, s.speed * dt, sigma)
     return ca.Function(
@@ -181,77 +197,65 @@ def _scan() -> Scan:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LaggedEkf(Method):
     """Stiffness and friction of each axle behind a fixed lag, with a_y where there is one.
-    v_y_noise, r_noise : standard deviations of what is measured [m/s], [rad/s].
-    v_y_disturbance, r_disturbance : what the tires miss, as random change [m/s/√s], [rad/s/√s].
-    relaxation_length : of both axles [m].
-    a_y_noise : standard deviation of the accelerometer [m/s²].   walk : of ln C and ln μ [1/√s].
-    stiffness_spread, friction_spread : standard deviations of ln C and ln μ at first [-].
-    steering_spread : standard deviation of the zero of the front steering at first [rad].
-    a_y_spread : standard deviation of the bias of a_y at first [m/s²].
-    dt : sampling interval [s].   learning_speed : below this speed [m/s] learning rests.
-    min_speed : below this speed [m/s] forces read zero.
+
+    The size of the car alone sets its numbers.
+    time : sqrt(L/g) of the car [s].   speed : sqrt(g L) [m/s].   wheelbase : L [m].
+    dt : sampling interval [s].   min_speed : below this speed [m/s] forces read zero.
     """
 
     ports = (*PORTS, *LAG_PORTS)
     remark = "two numbers an axle, one relaxation length for all cars of a size"
 
-    v_y_noise: float
-    r_noise: float
-    v_y_disturbance: float
-    r_disturbance: float
-    relaxation_length: float
-    a_y_noise: float = 0.4
-    walk: float = 1e-4
-    stiffness_spread: float = 0.6
-    friction_spread: float = 0.25
-    steering_spread: float = 0.01
-    a_y_spread: float = 0.3
+    time: float
+    speed: float
+    wheelbase: float
     dt: float = 0.01
-    learning_speed: float = 3.0
     min_speed: float = 1.0
 
     def __post_init__(self) -> None:
-        spreads = ("stiffness_spread", "friction_spread", "steering_spread", "a_y_spread")
-        names = (*_NUMBERS, *spreads, "dt", "min_speed")
-        require_positive(ValueError, **{name: getattr(self, name) for name in names})
+        require_positive_fields(self)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:
-        """Return the filter for a car: its size alone sets the numbers.
-
-        Noise, disturbances and spreads were chosen on 24 random cars of our plant.
-        """
-        time, speed = vehicle.froude_time, vehicle.froude_speed
         return cls(
-            v_y_noise=0.02 * speed,
-            r_noise=0.002 / time,
-            v_y_disturbance=0.05 * speed / math.sqrt(time),
-            r_disturbance=0.03 / time**1.5,
-            relaxation_length=0.12 * vehicle.wheelbase,
+            time=vehicle.froude_time,
+            speed=vehicle.froude_speed,
+            wheelbase=vehicle.wheelbase,
             dt=dt,
-            learning_speed=0.6 * speed,
             min_speed=vehicle.lowest_speed,
+        )
+
+    @property
+    def _numbers(self) -> _Numbers:
+        return _Numbers(
+            v_y_noise=0.02 * self.speed,
+            r_noise=0.002 / self.time,
+            a_y_noise=0.4,
+            v_y_disturbance=0.05 * self.speed / math.sqrt(self.time),
+            r_disturbance=0.03 / self.time**1.5,
+            walk=1e-4,
+            relaxation_length=0.12 * self.wheelbase,
+            learning_speed=0.6 * self.speed,
         )
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs; it begins afresh, with no stored model."""
         if start is not None:
             raise ValueError("the lagged filter begins afresh: it goes on from no stored model")
-        theta = np.repeat(np.log([STIFFNESS, FRICTION]), 2)
-        spread = [self.stiffness_spread] * 2 + [self.friction_spread] * 2
-        slip = self.v_y_noise / self.learning_speed
-        sd = [self.v_y_noise, self.r_noise, slip, slip, *spread]
+        numbers = self._numbers
+        slip = numbers.v_y_noise / numbers.learning_speed
+        sd = [numbers.v_y_noise, numbers.r_noise, slip, slip, *SPREADS]
         return Setup(
             scan=_scan(),
             carry={
-                "estimate": np.concatenate([np.zeros(4), theta, np.zeros(2)]),
-                "P": np.diag([*sd, self.steering_spread, self.a_y_spread]) ** 2,
+                "estimate": np.array([0.0] * 4 + BEGINNING + [0.0] * 2),
+                "P": np.diag(sd) ** 2,
                 "before": np.zeros(3),
                 "running": np.zeros(1),
                 **unlagged(),
             },
             constants={
-                "numbers": np.array([getattr(self, name) for name in _NUMBERS]),
+                "numbers": np.array(numbers),
                 "vehicle": np.array(vehicle.bicycle),
                 "sampling": np.array([self.dt, self.min_speed]),
             },
@@ -267,6 +271,6 @@ class LaggedEkf(Method):
             vehicle=vehicle,
             parameters=np.array(ca.DM(values)),
             min_speed=self.min_speed,
-            relaxation_length=np.full(2, self.relaxation_length),
+            relaxation_length=np.full(2, self._numbers.relaxation_length),
             offset=np.array([z[8], 0.0]),
         )

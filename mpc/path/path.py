@@ -184,13 +184,13 @@ class Path:
 
     @classmethod
     def from_csv(cls, file: FilePath | str, *, closed: bool | None = None) -> Self:
-        """Read way-points from a CSV with columns X_m, Y_m or x, y [m]; others are ignored.
+        """Read way-points from a table with columns X_m, Y_m or x, y [m]; others are ignored.
 
         The name of the path is that of the file without folder and ending.
 
         Parameters
         ----------
-        file : CSV with a header, which may start with "#".
+        file : CSV with a header, or another format of logs.
         closed : as for way-points; None: closed where the last point is no farther from the first
             than 1.5 median gaps between neighbors.
 

@@ -4,8 +4,6 @@ The spline runs over its own arc length, found by fitting again over the length 
 that way-points need no equal gaps. Open ends are natural: κ = 0, as on the straight beyond them.
 """
 
-import csv
-import io
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,8 +12,9 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from codegen.arrays import Array
-from codegen.escape import shown
-from models.schema import limits, read_text, require_few
+from models.logs.door import open_log
+from models.logs.log import RecordingError
+from models.schema import require_few
 from mpc.path.chosen import CHOSEN
 from mpc.path.line import Line, PathError, uniform_grid
 
@@ -164,89 +163,30 @@ def _fit(points: Array, closed: bool) -> Any:
     return spline
 
 
-_X_NAMES, _Y_NAMES = ("x_m", "x", "x [m]"), ("y_m", "y", "y [m]")
-# Read way-points from a CSV with a header: X_m, Y_m or x, y, in meters.
-
-_ON_THE_GLOBE = {"lat", "latitude", "lon", "lng", "longitude"}
-
-
 def read_waypoints(file: Path) -> _Waypoints:
-    """Read X and Y [m]; other columns, and lines that start with "#" below the header, are ignored.
-    file : the CSV; names in its header may be of either case, and the header may start with "#".
+    """Read X and Y [m] from the columns X_m, Y_m or x, y of a table; other columns are ignored.
+    file : in any format of logs; a row is a way-point, and the time is not looked at.
     """
-    rows = _rows(file)
-    header = [cell.strip().lstrip("#").strip() for cell in rows[0][1]]
-    require_few(PathError, str(file), len(header), "columns", "columns")
-    points = [(line, cells) for line, cells in rows[1:] if not cells[0].lstrip().startswith("#")]
-    if not points:
-        raise PathError(f"{file}: there is a header but no way-point")
-    columns = []
-    for axis, names in (("X", _X_NAMES), ("Y", _Y_NAMES)):
-        column = _find(file, axis, names, header)
-        columns.append(_numbers(file, header[column], column, points))
-    return _Waypoints(*columns)
-
-
-def _rows(file: Path) -> list[tuple[int, list[str]]]:
-    """Return the cells of every line that has some, with its number."""
-    if not file.exists():
-        raise PathError(f"{file}: there is no such file")
     try:
-        text = read_text(file, PathError, encoding="utf-8-sig")
-    except OSError as error:
-        raise PathError(f"{file}: cannot be read ({error.strerror})") from None
-    reader = csv.reader(io.StringIO(text, newline=""))
-    rows, most = [], limits().path
-    try:
-        for cells in reader:
-            if any(map(str.strip, cells)):
-                rows.append((reader.line_num, cells))
-            if len(rows) > most:
-                require_few(PathError, str(file), len(rows), "path", "rows")
-    except csv.Error as error:
-        raise PathError(f"{file}: line {reader.line_num} is not CSV ({error})") from None
-    if not rows:
-        raise PathError(f"{file}: is empty")
-    return rows
+        log = open_log(file, rate=1.0)
+        names = [one.name for one in log.listed()]
+        columns = log.read([_column(file, axis, names) for axis in ("x", "y")])
+    except RecordingError as error:
+        raise PathError(str(error)) from None
+    for one in columns:
+        require_few(PathError, str(file), one.values.size, "path", "rows")
+        if (bad := np.flatnonzero(~np.isfinite(one.values))).size:
+            place = f"{one.place} {one.rows[bad[0]]}"
+            raise PathError(f"{file}: {one.name} must be a finite number, {place} has none")
+    return _Waypoints(*(one.values for one in columns))
 
 
-def _find(file: Path, axis: str, names: tuple[str, ...], header: list[str]) -> int:
-    found = [k for k, name in enumerate(header) if name.lower() in names]
-    if len(found) == 1:
-        return found[0]
-    listing = ", ".join(header)[:120]
-    if found:
-        raise PathError(f"{file}: column {axis} must be there once, found {listing!r}")
-    if len(header) == 1 and (";" in listing or "\t" in listing):
-        raise PathError(f"{file}: cells must be separated by commas, found {listing!r}")
-    lower = {name.lower() for name in header}
-    hint = ""
-    if lower & _ON_THE_GLOBE:
-        hint = "; convert latitude and longitude to meters in a plane"
-    elif unit := [name for name in header if name.lower().startswith(f"{axis.lower()}_")]:
-        hint = f"; {unit[0]} is not in meters, convert and rename it"
-    elif all(_is_number(name) for name in header):
-        hint = "; the first line must name the columns"
-    raise PathError(
-        f"{file}: column {axis}_m (or {axis.lower()}) is missing, found {listing!r}{hint}"
-    )
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return "_" not in cell  # which Python takes for a mark between digits
-
-
-def _numbers(file: Path, name: str, column: int, points: list[tuple[int, list[str]]]) -> Array:
-    values = []
-    for line, cells in points:
-        cell = cells[column].strip() if column < len(cells) else ""
-        if not (_is_number(cell) and np.isfinite(float(cell))):
-            raise PathError(
-                f"{file}: {name} must be a finite number, line {line} has {shown(cell)}"
-            )
-        values.append(float(cell))
-    return np.array(values)
+def _column(file: Path, axis: str, names: list[str]) -> str:
+    """Return the one column of an axis."""
+    found = [name for name in names if name.lower() in (f"{axis}_m", axis, f"{axis} [m]")]
+    if len(found) != 1:
+        listing = ", ".join(names)[:120]
+        raise PathError(
+            f"{file}: one column must be {axis.upper()}_m or {axis}, in meters, found {listing!r}"
+        )
+    return found[0]

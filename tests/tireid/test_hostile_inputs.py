@@ -218,7 +218,7 @@ def test_a_log_without_end_is_refused(capsys, tmp_path):
         (["0,0", "10000000,0", "20000000,0"], "steps of 0.25 m must be at most 400000"),
         (["0,0", "1e308,0", "2,0"], "way-points must lie within +-1e+08 m"),
         (["0,0", "10,1e400", "2,0"], "must be a finite number, line 3"),
-        (["0,0", "1_0,0", "20,0"], "must be a finite number, line 3 has '1_0'"),
+        (["0,0", "1_0,0", "20,0"], "must be numeric, line 3 has '1_0'"),
         ([f"{200 * k},0" for k in range(200)], "hours of driving must be at most 1"),
     ],
 )

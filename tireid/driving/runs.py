@@ -214,9 +214,7 @@ def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> Prediction
     return prediction_tire(learnt.in_units(LADDER) if label == LEARNING else learnt, setup.vehicle)
 
 
-def run_drive(
-    label: str, conditions: Conditions, learnt: TireModel | None, *, linearizations: int = 1
-) -> Run:
+def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> Run:
     """Drive the path once with the tracker on a tire."""
     setup, problem = conditions.setup, Problem()
     model = given_tire(label, setup, learnt)
@@ -227,7 +225,6 @@ def run_drive(
             problem,
             period=CHOSEN.period,
             delay=conditions.delay * CHOSEN.period + lag,
-            linearizations=linearizations,
             caution=conditions.caution,
         )
     except NoCompilerError as error:

@@ -22,7 +22,7 @@ def a_log(car, curve_drive, rng):
         D = FRICTION[axle] * car.axle_loads[axle]
         return D * np.sin(SHAPE * np.arctan(B * alpha))
 
-    lag = LaggedEkf.for_vehicle(car).relaxation_length
+    lag = 0.12 * car.wheelbase
     log = curve_drive(car, curve, n=4000, rng=rng, lag=lag)
     a_y = log.axle_force.sum(axis=1) / car.mass + 0.2 + 0.3 * rng.standard_normal(4000)
     return replace(log, delta_f=log.delta_f - 0.005, a_y=a_y)

@@ -183,20 +183,6 @@ def test_a_reset_forgets_all_but_the_faults(tracker, measure):
         tracker.reset(np.nan)
 
 
-def test_a_late_step_is_steered_by_the_plan_before(tire, problem, measure):
-    clock = iter([0.0, 0.001, 0.0, 0.5, 0.0, 0.001]).__next__
-    tracker = Tracker(tire, problem, period=PERIOD, budget=0.01, clock=clock)
-    good = tracker.step(measure(e_y=0.3))
-    late = tracker.step(measure(e_y=0.3))
-    share = PERIOD / problem.dt
-    rate = good.plan_u[0] + share * (good.plan_u[1] - good.plan_u[0])
-    assert late.status == Status.LATE
-    assert late.steering == pytest.approx(good.steering + PERIOD * rate, abs=1e-12)
-    assert tracker.faults[Status.LATE] == 1
-    after = tracker.step(measure(e_y=0.3))
-    assert abs(after.steering - late.steering) <= PERIOD * problem.limits.steering_rate + 1e-12
-
-
 def test_the_road_is_asked_for_where_the_plan_will_be(tracker, problem):
     ahead = tracker.delay - 0.5 * PERIOD
     assert tracker.times[0] == 0.0
