@@ -62,8 +62,8 @@ class _Writer(PillowWriter):
     _frames: list[Any]
 
     def finish(self) -> None:
-        more: Any = {"save_all": True, "duration": 1000 // RATE, "loop": 0, "quality": 45}
-        self._frames[0].save(self.outfile, append_images=self._frames[1:], **more)
+        more: Any = {"append_images": self._frames[1:], "duration": 1000 // RATE, "loop": 0}
+        self._frames[0].save(self.outfile, save_all=True, quality=40, minimize_size=True, **more)
 
 
 def write_film(file: Path, film: Film) -> None:
@@ -143,15 +143,8 @@ def _draw_ground(axes: Axes, film: Film, t: float) -> None:
     axles += lead.X[k], lead.Y[k]
     push = np.outer(lead.axle_force[k] / car.axle_loads, [-np.sin(psi), np.cos(psi)])
     start, end = view.transform(axles), view.transform(axles + 4.0 * push)  # [m]
-    look: Any = {
-        "units": "xy",
-        "scale_units": "xy",
-        "scale": 1.0,
-        "width": 0.25,
-        "headlength": 3,
-        "headaxislength": 3,
-    }
-    axes.quiver(*start.T, *(end - start).T, color=PURPLE, zorder=6.0, label="axle force", **look)
+    look: Any = {"units": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.2, "zorder": 6.0}
+    axes.quiver(*start.T, *(end - start).T, color=PURPLE, label="axle force", **look)
 
 
 def _draw_car(axes: Axes, label: str, drive: Drive, t: float, *, lead: bool, **on: Any) -> None:
