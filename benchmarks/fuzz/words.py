@@ -112,7 +112,7 @@ MORE = (
         "--out",
         "--tires all linear",
         "--tires",
-        "--film mp4",
+        "--film gif",
         "--scheduler tcp://[",
     ),
 )

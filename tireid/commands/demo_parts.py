@@ -12,12 +12,12 @@ from codegen.processor import CROSS_COMPILER, EMULATOR, missing_tools
 from identifier.export.compiled import CompiledPackage
 from identifier.run import identify
 from mpc.path import BUILT_IN
-from tireid.animation import FORMATS
 from tireid.commands.demo_story import Story
 from tireid.driving.results import SCORES, Drives, headline, known_blocks, score_rows
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.exporting import Exported, Verdict, export, self_test
+from tireid.figures.film import FORMATS
 from tireid.report import Block, Headline, Paragraph, Picture, Section, Table
 from tireid.reports.common import READ, drawing
 

@@ -17,9 +17,8 @@ from models.vehicle import Vehicle
 from mpc.handover.rules import Verdict
 from mpc.loop.record import Drive, estimate_scores
 from mpc.tires import CurveFitError, prediction_tire
+from mpc.tires.tire import curves_at
 from tireid import __version__
-from tireid.animation import write_film
-from tireid.animation.known import known_over_time, steady_curve
 from tireid.driving.chosen import CHOSEN
 from tireid.driving.runs import (
     FROZEN,
@@ -40,6 +39,7 @@ from tireid.figures.drive import (
     drive_solve_figure,
     drive_steering_figure,
 )
+from tireid.figures.film import Film, write_film
 from tireid.figures.side_slip import drive_lateral_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
@@ -138,7 +138,7 @@ class Drives(NamedTuple):
     def write(self, folder: Path, film: str) -> dict[str, Figure]:
         """Write everything about the drives; return the figures by the name of their file.
 
-        film : webp, gif, mp4 or none.
+        film : webp, gif or none.
         """
         first, setup, faults = self.runs[0], self.conditions.setup, self.conditions.faults
         curves = _known_curves(self.runs, setup, self.learnt)
@@ -163,10 +163,9 @@ class Drives(NamedTuple):
             figures["lateral"] = drive_lateral_figure(first.drive)
         save_figures(folder, figures)
         if film != NO_FILM:
-            title, v_x = f"{first.drive.path.name}: {first.label} tires", first.drive.v_x.mean()
-            known = known_over_time(first.known, first.model, float(v_x))
-            path = folder / f"drive.{film}"
-            write_film(path, drives, curves, drops=setup.drops, title=title, known=known)
+            title = f"{first.drive.path.name}: {first.label} tires"
+            shown = Film(title, drives, curves, setup.drops, first.known, first.model)
+            write_film(folder / f"drive.{film}", shown)
         return figures
 
     def text(self) -> str:
@@ -263,8 +262,11 @@ def _known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -
         models[ORACLE] = setup.oracle()
         if setup.drops:
             models[ORACLE + AT_THE_END] = setup.oracle(setup.drops[-1][1])
-    v_x = float(setup.speeds().mean())
-    return [steady_curve(label, model, v_x) for label, model in models.items()]
+    v_x, slip = float(setup.speeds().mean()), np.linspace(-0.35, 0.35, 281)
+    return [
+        TireCurve(label=label, alpha=slip, force=curves_at(model, slip, v_x).T)
+        for label, model in models.items()
+    ]
 
 
 def _estimate_words(run: Run) -> str:

@@ -110,10 +110,10 @@ def matrix_figure(comparison: Comparison) -> Figure:
     for axes, (label, frozen) in zip(grid.flat, maps.items(), strict=False):
         _draw_map(axes, comparison, frozen, norm, colors)
         axes.set_title(label, fontsize=7.2)
-    for number, axes in enumerate(grid.flat):
-        axes.set_visible(number < len(maps))
-        if number % columns:
-            axes.set_yticklabels([])
+    for axes in grid.flat[len(maps) :]:
+        axes.set_visible(False)
+    for axes in grid[:, 1:].flat:
+        axes.set_yticklabels([])
     figure.supylabel("learnt on", fontsize=8.0)
     figure.supxlabel("frozen, replayed on", fontsize=8.0)
     figure.suptitle(f"{comparison.course.measure}, both axles [% of rms force]", fontsize=8.0)
@@ -142,14 +142,9 @@ def _draw_map(
         axes.text(j, i, text, ha="center", va="center", color="white" if dark else "black")
     labels = short_names(names).values()
     cut = [one if len(one) <= CHOSEN.longest else f"{one[: CHOSEN.longest - 1]}…" for one in labels]
-    letters = [_letter(number) for number in range(len(names))]
+    letters = [chr(ord("A") + k) if k < 26 else str(k + 1) for k in range(len(names))]
     axes.set_xticks(range(len(names)), letters)
     both = [f"{label}  {letter}" for label, letter in zip(cut, letters, strict=True)]
     axes.set_yticks(range(len(names)), both)
     axes.tick_params(length=0.0)
     axes.grid(visible=False)
-
-
-def _letter(number: int) -> str:
-    """A to Z, then numbers: what stands for a recording below a map."""
-    return chr(ord("A") + number) if number < 26 else str(number + 1)

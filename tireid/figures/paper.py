@@ -98,8 +98,10 @@ def weights_figure(history: History, freeze_times: Sequence[float] = ()) -> Figu
     lower.set(ylabel=r"weights $\hat{V}$ [-]")
     style.label_time(lower, recording.t)
     for axes, values in ((upper, W), (lower, V)):
-        settled = values if history.diverged_at is None else _settled(values)
-        axes.set_ylim(style.force_range(settled))
+        if history.diverged_at is not None:  # before the law runs away
+            peak = np.abs(values).max(axis=(1, 2))
+            values = values[peak <= 10.0 * np.median(peak[np.isfinite(peak)])]
+        axes.set_ylim(style.force_range(values))
         for t_freeze in freeze_times:
             style.mark_freeze(axes, t_freeze, prediction=False)
         style.legend_beside(axes)
@@ -113,26 +115,18 @@ def _lines(axes: Axes, t: Array, values: Array, color: str, label: str) -> None:
     axes.plot(t, drawn, color=color, linewidth=0.7)[0].set_label(label)
 
 
-def _settled(values: Array) -> Array:
-    """Return the samples of `values` (n, i, k) before a law that diverges runs away."""
-    peak = np.abs(values).max(axis=(1, 2))
-    kept: Array = values[peak <= 10.0 * np.median(peak[np.isfinite(peak)])]
-    return kept
-
-
 _Quartiles = tuple[float, float, float]  # median, lower and upper quartile
 _MARKS: Mapping[str, tuple[str, str]] = {  # color, marker
     "instantaneous": (style.ORANGE, "s"),
     "integral": (style.BLUE, "o"),
     "instantaneous_scaled": (style.GREEN, "D"),
 }
-_FURTHER = ((style.PURPLE, "^"), (style.AMBER, "v"))
 
 
 @style.styled
 def comparison_figure(
     results: Mapping[str, Mapping[str, _Quartiles]],
-    paper: Mapping[str, Mapping[str, float]] | None = None,
+    paper: Mapping[str, Mapping[str, float]],
 ) -> Figure:
     """Draw medians of the force RMSE with whiskers from quartile to quartile, the paper's hollow.
 
@@ -141,8 +135,6 @@ def comparison_figure(
     paper : by law, by column: the value that the paper prints [kN].
     """
     columns = list(dict.fromkeys(name for row in results.values() for name in row))
-    if not columns:
-        raise ValueError("a comparison needs at least one law with one column")
     figure = style.new_figure(CHOSEN.page, 2.9)
     axes = figure.subplots()
     drawn: list[float] = []
@@ -151,7 +143,7 @@ def comparison_figure(
         if not row:
             continue
         label = VARIANTS[law].title.replace("eta/lambda", "η/λ")
-        color, marker = _MARKS.get(law, _FURTHER[number % len(_FURTHER)])
+        color, marker = _MARKS[law]
         order += [label, f"{label} (paper)"]
         shift = CHOSEN.offset * (number - (len(results) - 1) / 2)
         middle, low, high = np.array(list(row.values()), dtype=np.float64).T
@@ -160,7 +152,7 @@ def comparison_figure(
         at = [columns.index(name) + shift for name in row]
         look: Mapping[str, Any] = {"color": color, "ms": 4.5, "elinewidth": 1.2, "capsize": 3.0}
         axes.errorbar(at, middle, yerr=whiskers, fmt=marker, label=label, **look)
-        printed = {name: value for name, value in (paper or {}).get(law, {}).items() if name in row}
+        printed = {name: value for name, value in paper.get(law, {}).items() if name in row}
         if printed:
             at = [columns.index(name) + shift + 0.07 for name in printed]
             look = {"ms": 5.0, "mfc": "white", "mec": color, "mew": 1.1}
