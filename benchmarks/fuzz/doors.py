@@ -96,6 +96,7 @@ DOORS = (
     _door("export axle", 6, "export --out out --weights axle.json", "axle.json"),
     _door("export network", 4, "export --out out --weights network.json", "network.json"),
     _door("identify axle", 6, f"{IDENTIFY} --weights axle.json", "axle.json"),
+    _door("identify fit", 1, f"{IDENTIFY} --weights fit.json", "fit.json"),
     _door("identify network", 4, f"{IDENTIFY} --paper --weights network.json", "network.json"),
     _door("identify curve", 2, f"{IDENTIFY} {FILTER} --weights curve.json", CURVE),
     _door("drive axle", 4, f"{DRIVE} --weights axle.json", "axle.json"),
@@ -111,7 +112,6 @@ DOORS = (
     _door("emit network", 1, "emit network.json --tir out.tir", "network.json"),
     # fleets
     _door("fleet learn", 3, FLEET, "log.csv car.toml"),
-    _door("fleet learn, begun", 1, f"{FLEET} --weights fit.json", "fit.json"),
     # networks of the user's own
     _door("identify onnx", 8, f"{IDENTIFY} --network slip.onnx", "slip.onnx"),
     _door("identify onnx, exported", 3, f"{IDENTIFY} --network exported.onnx", "exported.onnx"),
@@ -148,6 +148,6 @@ DOORS = (
     _door("words of init", 2, "init out.toml"),
     _door("words of channels", 3, "channels log.csv --columns r=r --write out.toml"),
     _door("words of doctor", 2, "doctor log.csv --vehicle car.toml --columns r=r"),
-    _door("words of fleet learn", 3, f"{FLEET} --tags {{vehicle}}.* --part 60 --judge none"),
+    _door("words of fleet learn", 3, f"{FLEET} --tags {{vehicle}}.*"),
     _door("words of paper", 0.5, "paper --seeds 0 --out out"),
 )

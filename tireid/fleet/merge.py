@@ -138,19 +138,14 @@ def merge(rows: Callable[[], Iterable[LogRow]], by: Sequence[str]) -> list[Merge
 
 
 class _Sum:
-    """The information of the logs of a group.
-
-    at : u and its slopes at the optimum of all on one road, about which roads differ.
-    ln_m : friction of each log over that, ln.
-    road : median of these, the road of the curves.
-    """
+    """The information of the logs of a group."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle, self.beliefs = vehicle, Priors.of(vehicle)
         self.errors = errors_of(self.beliefs)
-        self.at: tuple[Array, Array] | None = None
-        self.ln_m: list[float] = []
-        self.road: float | None = None
+        self.at: tuple[Array, Array] | None = None  # u and its slopes at the optimum of one road
+        self.ln_m: list[float] = []  # friction of each log over that, ln
+        self.road: float | None = None  # median of these, the road of the curves
         self.begin()
 
     def begin(self) -> None:
