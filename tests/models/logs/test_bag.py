@@ -7,7 +7,7 @@ import pytest
 
 from models.logs.bag import _KNOWN
 from models.logs.door import open_log
-from models.logs.log import RecordingError
+from tests.models.logs.conftest import refusal
 from tests.models.logs.drive_in_every_format import FIRST_NS, write_bag
 
 rosbag2 = pytest.importorskip("rosbags.rosbag2")
@@ -42,14 +42,6 @@ def write(path, store, topics, storage="sqlite3", mode=None):
         for time, connection, raw in sorted(rows, key=lambda row: row[0]):
             bag.write(connection, time, raw)
     return path
-
-
-def refusal(path):
-    with pytest.raises(RecordingError) as caught:
-        log = open_log(path)
-        log.read([one.name for one in log.listed()])
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
 
 
 def car_topics(store, count=50):
@@ -373,13 +365,6 @@ def test_a_bag_of_ros_1_is_refused_with_what_converts_it(tmp_path):
     path = tmp_path / "log.bag"
     path.write_bytes(b"#ROSBAG V2.0\n" + b"\0" * 100)
     assert "is a bag of ROS 1; convert it: rosbags-convert" in refusal(path)
-
-
-def test_a_bag_without_numbers_is_refused(tmp_path):
-    store = store_of()
-    text = store.types["std_msgs/msg/String"]("hello")
-    path = write(tmp_path / "bag", store, {"/chatter": ("std_msgs/msg/String", [(FIRST_NS, text)])})
-    assert refusal(path).endswith("holds no message with numbers")
 
 
 def test_a_type_that_holds_itself_is_refused(tmp_path):
