@@ -17,8 +17,8 @@ from identifier.motion.parameters import INDEX
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.fleet.learn import DT, learn_recording
-from tireid.fleet.merge import APART, CHANGES, MergeError, errors_of, merge, usable
-from tireid.fleet.store import OBSERVABLE, LogRow, Store, information_columns
+from tireid.fleet.merge import APART, CHANGES, errors_of, merge, usable
+from tireid.fleet.store import OBSERVABLE, LogRow, Store, StoreError, information_columns
 from tireid.fleet.watch import LARGEST, USUAL, watch
 
 for name in ("pyarrow", "fsspec"):
@@ -158,17 +158,17 @@ def test_rows_are_grouped_by_what_they_say_and_a_log_counts_once():
     (year_end,) = merged([row_of(0, told, date="2024-12-30T10:00")], ["week", "date"])
     assert year_end.key == (("week", "2025-W01"), ("date", "2024-12-30T10:00"))
     for again in (replace(rows[3], setting="other"), replace(rows[3], content="other")):
-        with pytest.raises(MergeError, match=r"^003 would count twice, by told/0.*3.parquet and "):
+        with pytest.raises(StoreError, match=r"^003 would count twice, by told/0.*3.parquet and "):
             merged([*rows, again])
-    with pytest.raises(MergeError, match=r"^copy would count twice"):
+    with pytest.raises(StoreError, match=r"^copy would count twice"):
         merged([*rows, replace(rows[3], log="copy", setting="other")])
     assert len(merged([*rows, replace(rows[3], setting="other")], ["setting"])) == 2
     assert merged([*rows, replace(rows[3], run="2")])[0].logs == 41
     other = row_of(50, told, car=replace(CAR, mass=1600.0))
     for ask in (merged, lambda rows: watch(rows, [])):
-        with pytest.raises(MergeError, match=r"^000 and 050 are of cars whose files differ"):
+        with pytest.raises(StoreError, match=r"^000 and 050 are of cars whose files differ"):
             ask([*rows, other])
-    with pytest.raises(MergeError, match="must begin with year-month-day"):
+    with pytest.raises(StoreError, match="must begin with year-month-day"):
         merged([replace(rows[0], date="yesterday")], ["week"])
 
 
