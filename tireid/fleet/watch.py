@@ -125,7 +125,8 @@ def _change_from(given: Information, p: Array, beliefs: Priors) -> tuple[Array, 
     sensors[[PLACE[name] for name in SENSORS], np.arange(len(SENSORS))] = 1.0
     along = np.hstack([slopes[:, CHANGED], sensors])
     sd = np.array([LARGEST] * 3 + [beliefs.sd[INDEX[name]] for name in SENSORS])
-    P: Array = np.linalg.inv(along.T @ given.matrix @ along + np.diag(sd**-2.0))
+    known = along.T @ given.matrix @ along + np.diag(sd**-2.0)
+    P = np.asarray(np.linalg.inv(known), dtype=np.float64)
     value = P @ (along.T @ (given.vector - given.matrix @ u))
     return value[:3], P[:3, :3]
 
