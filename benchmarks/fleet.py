@@ -44,10 +44,11 @@ def write_logs(folder: Path, count: int) -> None:
     while len(texts) < min(count, DISTINCT):
         with suppress(PlantError):
             log = everyday_drive(car, KINDS[len(texts) % 2], rng).log(rng)
-            texts.append(write_recording(log, folder / "one.txt").read_bytes())
+            texts.append(write_recording(log, folder / "one.csv").read_bytes())
+    (folder / "logs").mkdir()
     for k in range(count):
         text = texts[k % DISTINCT] + b"\n" * (k // DISTINCT)
-        (folder / f"{k:05d}.csv").write_bytes(text)
+        (folder / "logs" / f"{k:05d}.csv").write_bytes(text)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -61,8 +62,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory(prefix="tireid-fleet-") as name:
         folder = Path(name)
         write_logs(folder, options.logs)
-        words = ["fleet", "learn", str(folder / "*.csv"), "--vehicle", str(folder / "car.toml")]
-        words += ["--out", str(folder / "store"), "--jobs", str(options.jobs)]
+        words = ["fleet", "learn", str(folder / "logs" / "*.csv")]
+        words += ["--vehicle", str(folder / "car.toml"), "--out", str(folder / "store")]
+        words += ["--jobs", str(options.jobs)]
         began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run([sys.executable, "-m", "tireid", *words], check=True)
         seconds, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)

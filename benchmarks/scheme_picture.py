@@ -18,7 +18,7 @@ from matplotlib.patches import Circle, FancyBboxPatch
 from tireid.figures import style
 from tireid.figures.chosen import CHOSEN as FIGURES_CHOSEN
 from tireid.figures.paper import SCHEME
-from tireid.figures.style import BLACK, GREY, ORANGE, new_figure, styled
+from tireid.figures.style import BLACK, GREY, ORANGE, new_figure
 
 WIDTH, _HEIGHT = 100.0, 46.0  # of the drawing, in its own unit
 _JOINT, SUM = 0.45, 1.6  # radii of a joint of two lines and of the sum
@@ -57,7 +57,7 @@ NOTES: Mapping[str, tuple[Point, str]] = {
 CUT: Point = (66.0, 6.0)
 
 
-@styled
+@style.styled
 def scheme_figure() -> Figure:
     """Draw the identifier as blocks and signals."""
     figure = new_figure(FIGURES_CHOSEN.page, FIGURES_CHOSEN.page * _HEIGHT / WIDTH)

@@ -42,7 +42,6 @@ def cluster(address: str) -> Iterator[Map]:
         raise ClusterError(f"{address}: no Dask scheduler answers there") from error
     try:
         _require_workers(client, address)
-        _tell_of_idle_threads(client, address)
         yield partial(_map, dask, client)
     finally:
         client.close()
@@ -60,14 +59,6 @@ def _require_workers(client: Any, address: str) -> None:
     other = sorted(worker for worker, digest in versions.items() if digest != source_digest())
     if other:
         raise ClusterError(f"{address}: worker {other[0]} has another version of tireid")
-
-
-def _digest() -> str:
-    """Return the digest by a function of tireid, which finds its own packages on a worker."""
-    return source_digest()
-
-
-def _tell_of_idle_threads(client: Any, address: str) -> None:
     threads = {worker: count for worker, count in client.nthreads().items() if count > 1}
     if threads:
         worker, count = next(iter(threads.items()))
@@ -75,6 +66,11 @@ def _tell_of_idle_threads(client: Any, address: str) -> None:
             f"worker {worker} has {count} threads, of which one works; start it as processes: "
             f"dask worker {address} --nworkers -1 --nthreads 1"
         )
+
+
+def _digest() -> str:
+    """Return the digest by a function of tireid, which finds its own packages on a worker."""
+    return source_digest()
 
 
 def _map(

@@ -107,7 +107,6 @@ DOORS = (
     _door("emit network", 1, "emit network.json --tir out.tir", "network.json"),
     # fleets
     _door("fleet learn", 3, FLEET, "log.csv car.toml"),
-    _door("fleet learn, begun", 1, f"{FLEET} --weights fit.json", "fit.json"),
     # paths
     _door("drive path", 10, f"{DRIVE} --tires linear", "path.csv"),
     # words
@@ -134,6 +133,6 @@ DOORS = (
     _door("words of init", 2, "init out.toml"),
     _door("words of channels", 3, "channels log.csv --columns r=r --write out.toml"),
     _door("words of doctor", 2, "doctor log.csv --vehicle car.toml --columns r=r"),
-    _door("words of fleet learn", 3, f"{FLEET} --tags {{vehicle}}.* --part 60 --judge none"),
+    _door("words of fleet learn", 3, f"{FLEET} --tags {{vehicle}}.*"),
     _door("words of paper", 0.5, "paper --seeds 0 --out out"),
 )

@@ -63,12 +63,12 @@ class FitMethod(Method):
     ) -> FittedModel:
         """Return the tires of a log.
 
-        start : a fit, or the prior of a fleet, that is believed before; None believes the table.
+        start : a fit that is believed before; None believes the table.
         """
         if start is not None and not isinstance(start, FittedModel):
             raise ValueError(
-                "--method fit begins with a fit or a fleet's prior: give it all logs, in place of "
-                "a model of another method"
+                "--method fit begins with a fit: give it all logs, in place of a model of another "
+                "method"
             )
         priors = None if start is None else start.as_prior(vehicle)
         return fit([recording], vehicle, priors, progress=progress).model

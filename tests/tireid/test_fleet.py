@@ -140,7 +140,7 @@ def test_a_car_file_that_changed_is_another_setting_and_never_counts_twice(
     monkeypatch.chdir(garage)
     words = ["fleet", "learn", "*.csv", "--vehicle", "car.toml", "--jobs", "1", "--out", "store"]
     assert main(words) == 0
-    replace(sedan(), mass=1510.0, chassis=None).to_toml("car.toml")
+    replace(sedan(), mass=1510.0, chassis=None).to_toml("car.toml", overwrite=True)
     assert main(words) == 0
     assert "2 identified now, 0 before" in capsys.readouterr().out
     assert main(["fleet", "merge", "store", "--all", "--out", "merged"]) == 2
@@ -196,7 +196,7 @@ def test_a_setting_is_what_files_hold_and_not_where_they_lie(tmp_path):
     assert setting() == setting("b") and setting(dbc=a) == setting(dbc=b)
     before = setting(dbc=a)
     Path(a).write_text("VERSION 2")
-    replace(sedan(), mass=1501.0).to_toml(tmp_path / "b.toml")
+    replace(sedan(), mass=1501.0).to_toml(tmp_path / "b.toml", overwrite=True)
     others = [setting(), before, setting(dbc=a), setting("b"), setting(axes="SAE")]
     assert len({*others, setting(check=False)}) == 6
 

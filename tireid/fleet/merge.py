@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from codegen.errors import TireidError
 from identifier.estimate.chosen import CHOSEN as ESTIMATE_CHOSEN
 from identifier.estimate.fit import Reach
 from identifier.estimate.information import PLACE, SIZE, Information, coordinates
@@ -23,7 +22,7 @@ from identifier.estimate.solve import settled
 from identifier.motion.parameters import INDEX
 from models.vehicle import Vehicle
 from tireid.fleet.store import INDEX as WHICH
-from tireid.fleet.store import LogRow
+from tireid.fleet.store import LogRow, StoreError
 
 _TAGGED = ("vehicle", "tires", "date")
 BY = (*_TAGGED, "week", "month", "log", "setting")
@@ -32,10 +31,6 @@ CHANGES = ("steering_zero", "v_y_bias", "v_y_angle")  # of sensors, from log to 
 APART = 0.1  # standard deviation of these, of that of their prior
 _ROAD = INDEX["ln_road"]
 _Key = tuple[tuple[str, str], ...]
-
-
-class MergeError(TireidError, ValueError):
-    """Rows do not make a model together; the message says which, and what to do."""
 
 
 class Merged(NamedTuple):
@@ -65,7 +60,7 @@ def day_of(row: LogRow) -> date:
     try:
         return date.fromisoformat(row.date[:10])
     except ValueError:
-        raise MergeError(
+        raise StoreError(
             f"{row.name}: its date {row.date!r} must begin with year-month-day, as in 2026-03-31"
         ) from None
 
@@ -82,7 +77,7 @@ def _value(row: LogRow, name: str) -> str:
     tags = json.loads(row.tags)
     if name not in tags:
         known = ", ".join(dict.fromkeys((*BY, *sorted(tags))))
-        raise MergeError(f"{row.name}: {name!r} is none of what is known of it: {known}")
+        raise StoreError(f"{row.name}: {name!r} is none of what is known of it: {known}")
     return str(tags[name])
 
 
@@ -105,14 +100,14 @@ def grouped(rows: Iterable[LogRow], by: Sequence[str]) -> Iterator[tuple[_Key, L
         key = tuple((name, _value(row, name)) for name in by)
         car, first = cars.setdefault(key, (row.car, row.name))
         if car != row.car:
-            raise MergeError(
+            raise StoreError(
                 f"{first} and {row.name} are of cars whose files differ: merge --by vehicle (or "
                 "declare it by --tags), or --by setting"
             )
         for same in (row.content, row.log):
             file = files.setdefault((key, same, row.run), row.file)
             if file != row.file:
-                raise MergeError(
+                raise StoreError(
                     f"{row.name} would count twice, by {file} and {row.file}: merge --by setting, "
                     "or delete one of these"
                 )
@@ -138,19 +133,14 @@ def merge(rows: Callable[[], Iterable[LogRow]], by: Sequence[str]) -> list[Merge
 
 
 class _Sum:
-    """The information of the logs of a group.
-
-    at : u and its slopes at the optimum of all on one road, about which roads differ.
-    ln_m : friction of each log over that, ln.
-    road : median of these, the road of the curves.
-    """
+    """The information of the logs of a group."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle, self.beliefs = vehicle, Priors.of(vehicle)
         self.errors = errors_of(self.beliefs)
-        self.at: tuple[Array, Array] | None = None
-        self.ln_m: list[float] = []
-        self.road: float | None = None
+        self.at: tuple[Array, Array] | None = None  # u and its slopes at the optimum of one road
+        self.ln_m: list[float] = []  # friction of each log over that, ln
+        self.road: float | None = None  # median of these, the road of the curves
         self.begin()
 
     def begin(self) -> None:

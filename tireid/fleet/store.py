@@ -14,6 +14,7 @@ import json
 import posixpath
 import uuid
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
@@ -38,7 +39,7 @@ _TRIANGLE = tuple(OBSERVABLE[np.array(np.triu_indices(len(OBSERVABLE)))])
 
 
 class StoreError(TireidError, ValueError):
-    """The store cannot be used; the message names it, and says why and what to do."""
+    """A store or its rows cannot be used; the message says which, why and what to do."""
 
 
 def needed(name: str) -> Any:
@@ -228,7 +229,8 @@ class Store:
     def drop(self, file: str) -> None:
         """Remove a file of rows."""
         fs, folder = self._place
-        fs.rm(posixpath.join(folder, file))
+        with suppress(FileNotFoundError):  # another run removed it
+            fs.rm(posixpath.join(folder, file))
 
 
 def protocols(fs: Any) -> set[str]:

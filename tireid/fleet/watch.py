@@ -4,12 +4,13 @@ The first days of a car, until they hold `baseline` of driving, are its referenc
 estimate. z = [ln C front, ln C rear, ln of the friction] of a later day says how its tires differ
 from that, errors of the day's sensors left out (`_change_from`). The number of the day is
 
-    x² = z' (S_day + S_reference + T)⁻¹ z,   p = P(χ²(3) > x²),   alarm where p < `alarm`
+    x² = z' (S_day + S_reference + T + T/m)⁻¹ z,   p = P(χ²(3) > x²),   alarm where p < `alarm`
 
-S are the covariances of both estimates. T, diagonal, is how days of an unchanged car differ (roads,
-speeds, curves that are not the tire's): half the median square of the steps from a day to the next
-of all cars, where `USUAL` counts as ten such steps. A change of the tires is one step of many, a
-slow loss makes each step small: neither hides in T.
+S are the covariances of both estimates, m is how many days the reference has. T, diagonal, is how
+days of an unchanged car differ (roads, speeds, curves that are not the tire's): half the median
+square of the steps from a day to the next of all cars, less S_day, where `USUAL` counts as ten such
+steps. A change of the tires is one step of many, a slow loss makes each step small: neither hides
+in T.
 """
 
 import math
@@ -89,27 +90,28 @@ def watch(
     compared = {car: _compared(driven[car], beliefs[car], baseline) for car in sorted(driven)}
     T = _scatter(list(compared.values()))
     days = [
-        _judged(car, day, driven[car][day].seconds, z, S + T, alarm)
+        _judged(car, day, driven[car][day].seconds, z, S_day + S_reference + T + T / m, alarm)
         for car, some in compared.items()
-        for day, z, S in some
+        for day, z, S_day, S_reference, m in some
     ]
     return days, [car for car, some in compared.items() if not some]
 
 
-_Compared = list[tuple[str, Array, Array]]  # days after the reference, with z and S
+_Compared = list[tuple[str, Array, Array, Array, int]]  # days with z, S_day, S_reference and m
 
 
 def _compared(days: Mapping[str, Information], beliefs: Priors, baseline: float) -> _Compared:
+    """Return the days after the reference."""
     reference, later = Information.nothing(), _Compared()
-    p, open_ = beliefs.mean, np.zeros((3, 3))
+    p, S_reference, m = beliefs.mean, np.zeros((3, 3)), 0
     for day, information in sorted(days.items()):
         if reference.seconds < baseline:
-            reference += information
+            reference, m = reference + information, m + 1
             p = settled(beliefs.after(reference), beliefs.mean)[0]
-            open_ = _change_from(reference, p, beliefs)[1]
+            S_reference = _change_from(reference, p, beliefs)[1]
         elif information.seconds >= SHORTEST:
-            z, S = _change_from(information, p, beliefs)
-            later.append((day, z, S + open_))
+            z, S_day = _change_from(information, p, beliefs)
+            later.append((day, z, S_day, S_reference, m))
     return later
 
 
@@ -123,7 +125,8 @@ def _change_from(given: Information, p: Array, beliefs: Priors) -> tuple[Array, 
     sensors[[PLACE[name] for name in SENSORS], np.arange(len(SENSORS))] = 1.0
     along = np.hstack([slopes[:, CHANGED], sensors])
     sd = np.array([LARGEST] * 3 + [beliefs.sd[INDEX[name]] for name in SENSORS])
-    P: Array = np.linalg.inv(along.T @ given.matrix @ along + np.diag(sd**-2.0))
+    known = along.T @ given.matrix @ along + np.diag(sd**-2.0)
+    P = np.asarray(np.linalg.inv(known), dtype=np.float64)
     value = P @ (along.T @ (given.vector - given.matrix @ u))
     return value[:3], P[:3, :3]
 
@@ -131,7 +134,10 @@ def _change_from(given: Information, p: Array, beliefs: Priors) -> tuple[Array, 
 def _scatter(cars: Sequence[_Compared]) -> Array:
     """Return T (3, 3)."""
     steps = [(late[1] - early[1]) ** 2 for days in cars for early, late in pairwise(days)]
-    found = np.median(steps, axis=0) / MEDIAN / 2.0 if steps else np.zeros(3)
+    known = [np.diag(day[2]) for days in cars for day in days]
+    found = np.zeros(3)
+    if steps:
+        found = np.maximum(np.median(steps, axis=0) / MEDIAN / 2.0 - np.median(known, axis=0), 0.0)
     total = USUAL_STEPS * USUAL**2 + len(steps) * found
     return np.diag(total / (USUAL_STEPS + len(steps)))
 
