@@ -37,7 +37,6 @@ BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
     "verdicts": [],
     "verdicts_without_v_y": [],
     "bands": [],
-    "plan": [],
     "fleet": [],
     "guaranteed": [],
     "guaranteed_faster": [],

@@ -13,10 +13,6 @@ class Chosen(NamedTuple):
     # demo_story
     speed: float = 20.0  # m/s
     freeze: float = 30.0  # s, the end of the first drive
-    # plan
-    period: float = 0.01  # s, of steering.csv
-    run_up: float = 1.0  # s straight ahead, before each pass
-    pull: float = 3.0  # m/s², of a car that comes to speed, and of one that stops
 
 
 CHOSEN = Chosen()

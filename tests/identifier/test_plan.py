@@ -1,0 +1,112 @@
+"""Plans: the car moves as a bicycle, the covariance is that of a fit, and the rank holds."""
+
+from dataclasses import replace
+
+import control
+import numpy as np
+import pytest
+
+import tireid as ti
+from benchmarks.answers import force_error
+from benchmarks.random_cars import good_sensors, random_car, random_drive
+from identifier.estimate.fit import fit
+from identifier.estimate.priors import Priors
+from identifier.motion.parameters import INDEX
+from identifier.plan import PlanError, _extent, _Likely, _steerings, plan
+from models.bicycle import BicycleParameters, bicycle
+from models.maneuvers import Slalom
+
+CAR, SPEED = ti.sedan(), 15.0
+
+
+@pytest.fixture(scope="module")
+def likely():
+    priors = Priors.of(CAR)
+    return _Likely(CAR, priors, priors.mean, 0.9)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return plan(CAR, speeds=[SPEED], time=6.0)
+
+
+def test_small_angles_move_the_likely_car_as_the_linear_bicycle(likely):
+    stiff = [np.exp(likely.p[INDEX[f"ln_stiffness_{k}"]]) for k in "fr"] * np.array(CAR.axle_loads)
+    linear = bicycle(
+        BicycleParameters(CAR.mass, CAR.yaw_inertia, CAR.l_f, CAR.l_r, *map(float, stiff)), SPEED
+    )
+    slow = Slalom(amplitude=2e-3, frequency=0.3, onset=0.5, rate_limit=0.1, duration=8.0)
+    t = np.arange(0.0, 8.0, 0.01)
+    system = control.ss(np.array(linear.A), np.array(linear.B)[:, :1], np.eye(2), np.zeros((2, 1)))
+    expected = control.forced_response(system, t, slow.steering(t)[:, 0]).outputs.T
+    driven = likely.driven(slow, SPEED, 0.01)[:, :2]
+    # What is left is the lag of the tires, some 10 ms.
+    missed, size = (np.abs(one).max(axis=0) for one in (driven - expected, expected))
+    assert (missed < 0.06 * size).all()
+
+
+def test_the_covariance_is_that_of_a_fit_of_the_log(likely, found):
+    one = next(one for one in found if one.name == "random steer")
+    noisy = good_sensors(CAR).apply(one.log, np.random.default_rng(3))
+    taught = fit([noisy], CAR).model.estimates()[:6]
+    for promised, got in zip(one.tire.estimates()[:6], taught, strict=True):
+        assert 0.5 < promised.sd / got.sd < 2.0, promised.title
+        assert abs(got.value - promised.value) < 4.0 * promised.sd, promised.title
+
+
+def test_a_maneuver_is_as_hard_as_the_share_of_the_grip_allows(likely):
+    half = likely._replace(share=0.5)
+    of = _steerings(CAR, 4.0, 0)["slalom"]
+    hard, gentle = (
+        np.abs(one.driven(one.hardest(of, SPEED), SPEED, 0.01)[:, 2:]).max()
+        for one in (likely, half)
+    )
+    assert 2.0 * gentle < hard
+
+
+@pytest.mark.parametrize(
+    ("kind", "seed", "friction"), [("sedan", 0, 0.9), ("race", 0, 1.5), ("tenth", 2, 0.7)]
+)
+def test_a_car_of_other_tires_learns_more_from_the_first_than_from_the_last(kind, seed, friction):
+    rng = np.random.default_rng([seed, 31])
+    car = random_car(kind, rng)
+    asked = random_drive(car, rng).exact
+    ranked = plan(car.told, friction=friction, speeds=[4.0 * car.told.froude_speed])
+    errors = []
+    for one in (ranked[0], ranked[-1]):
+        run = car.plant.simulate(one.maneuver, speed=one.speed)
+        log = car.sensors.apply(run.recording(), np.random.default_rng(1))
+        tire = fit([replace(log, axle_force=None)], car.told).model
+        errors.append(np.mean(force_error(tire, asked)) / 100.0)
+    assert errors[1] > 1.5 * errors[0]
+    assert errors[0] < 2.0 * ranked[0].error
+
+
+def test_what_does_not_fit_into_the_area_comes_last(found):
+    area = (1e3, found[0].width - 1.0)
+    ranked = plan(CAR, speeds=[SPEED], time=6.0, area=area)
+    fits = [one.fits(area) for one in ranked]
+    assert not all(fits) and fits == sorted(fits, reverse=True)
+    assert {one.name for one in ranked} == {one.name for one in found}
+
+
+def test_the_room_is_that_of_the_least_rectangle():
+    along = np.linspace(0.0, 100.0, 200)
+    length, width = _extent(0.8 * along, 0.6 * along + 1e-3)
+    assert length == pytest.approx(100.0, rel=1e-3) and width < 0.5
+
+
+def test_a_plan_goes_on_from_a_fit_and_from_nothing_else(found):
+    again = plan(CAR, speeds=[SPEED], time=6.0, start=found[0].tire)
+    assert again[0].error < 0.9 * found[0].error
+    axle = ti.identify(ti.sample_recording(), CAR, "axle").tire
+    with pytest.raises(PlanError, match="goes on from a fit"):
+        plan(CAR, start=axle)
+
+
+@pytest.mark.parametrize(
+    "others", [{"speeds": [1.0]}, {"time": np.nan}, {"share": 1.0}, {"friction": 9.0}]
+)
+def test_numbers_that_make_no_plan_are_refused(others):
+    with pytest.raises(PlanError):
+        plan(CAR, **others)
