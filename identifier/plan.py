@@ -132,6 +132,7 @@ def plan(
     if start is None:
         for name, ratio in UNDERSTEER.items():
             p[INDEX[f"{name}_r"]] += math.log(ratio)
+    p[[INDEX["sway_share_f"], INDEX["sway_share_r"]]] = 0.0  # the body does not roll here
     likely, middle = _Likely(vehicle, priors, p, share), float(np.mean(speeds))
     other = likely.hardest(_steerings(vehicle, time, seed + 1)["random steer"], middle)
     forces = likely.forces(likely.log(other, middle)[0])

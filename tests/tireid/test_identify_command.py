@@ -458,39 +458,6 @@ def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path, capsy
     assert errors["stored"] < 0.9 * errors["afresh"]
 
 
-@pytest.mark.parametrize("layer", ["W", "V"])
-def test_resumed_weights_beyond_what_is_proven_are_told(logs, tmp_path, capsys, layer, unmade):
-    """On either side of the bound that `tireid check` states of the same gains."""
-    check = ["check", "--paper", "--vehicle", str(logs / "car.toml"), "--json"]
-    assert main(check) == 0
-    name = {"W": "weight_bound", "V": "V_bound"}[layer]
-    bound = json.loads(capsys.readouterr().out)["properties"][name]["value"]
-    design = make_method("integral", sedan(), 0)
-    drawn = design.network.initial_weights(np.random.default_rng(0))
-    state = {"W": np.ones_like(drawn.W), "V": drawn.V}
-    words = ["identify", logs / "quick.csv", "--vehicle", logs / "car.toml", "--paper"]
-    words += ["--accept"]
-    told = {}
-    for share in (0.99, 1.01):
-        size = np.linalg.norm(state[layer])
-        weights = tmp_path / f"{share}.json"
-        design.frozen(sedan(), {**state, layer: share * bound / size * state[layer]}).save(weights)
-        more = ["--weights", weights, "--out", tmp_path / f"out{share}"]
-        assert main([str(word) for word in [*words, *more]]) == 0
-        lines = capsys.readouterr().out.splitlines()
-        told[share] = [line for line in lines if "does not cover" in line]
-    assert told[0.99] == []
-    (line,) = told[1.01]
-    assert f"these resumed weights: |{layer}| is {1.01 * bound:.4g}" in line
-    assert f"proven up to {bound:.4g}" in line
-
-
-def test_drawn_weights_are_no_resumed_ones(ended):
-    _, printed = ended
-    assert "verdict: " in printed
-    assert "does not cover" not in printed
-
-
 def test_weights_of_another_structure_are_refused(logs, tmp_path, capsys, result, law):
     words = ["identify", logs / "quick.csv", "--vehicle", logs / "car.toml"]
     words += ["--out", tmp_path / "out"]

@@ -11,7 +11,6 @@ from identifier.axle.guarantee import ForceBound
 from identifier.doctor import diagnose
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
-from identifier.paper.network import Weights
 from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import History, check_recording
 from identifier.tire_model import TireModel
@@ -20,9 +19,8 @@ from models.recordings import Recording, Repair, check_against_vehicle, check_ph
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
-from tireid.commands.certificate_table import resumed_line, verdict_line
+from tireid.commands.certificate_table import verdict_line
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
-from tireid.figures.style import paper_design
 from tireid.identified import Results, file_name
 from tireid.learning import identify, with_v_y
 from tireid.output import output_folder, require_curves, require_free, write_json
@@ -154,7 +152,7 @@ def run(options: argparse.Namespace) -> int:
             if options.bound is not None:
                 tire = guaranteed(learnt, bound, last, tire)
             found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
-            closing = _closing_line(learnt, last, vehicle, resumed=start is not None)
+            closing = _closing_line(learnt, last, vehicle)
         figures = found.write(folder, curves=options.curves, progress=progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(folder, found, figures, diagnosis, options.words)
@@ -215,13 +213,11 @@ def _require_tires(learnt: History, t: float) -> None:
         ) from None
 
 
-def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool) -> str:
+def _closing_line(learnt: History, t: float, vehicle: Vehicle) -> str:
     """Return the certificate of the paper's identifier, or what the axle identifier knows."""
     model, certificate = learnt.freeze(t), learnt.design.certify(vehicle)
     if model.known_slip is None and certificate.properties:
-        first = Weights(W=learnt.state["W"][0], V=learnt.state["V"][0])
-        beyond = resumed_line(certificate, paper_design(learnt), first) if resumed else ""
-        return "\n".join(line for line in (verdict_line(certificate), beyond) if line)
+        return verdict_line(certificate)
     if model.known_slip is None:
         return "frozen; `tireid compare` sets it beside the other methods"
     known = np.degrees(model.known_slip)
