@@ -5,10 +5,10 @@ A maneuver is steered as hard as a share of the grip of the likely tires allows.
 
 moves(z_k, z_k+1) = 0,   z = [v_y, r, x_f, x_r]
 
-for z_k+1, without roll and bank. The log that usual sensors take of it is read as by `estimate`,
-whose covariance P at the true parameters is what one drive leaves. The rank is the error of the
-forces to be expected on another drive, random steering up to the same share of the grip:
-sqrt(mean(J P J'))/rms(F), J the slopes of these forces over tires and body (I-optimal; V. V.
+for z_k+1, without roll and bank. The log is read as by `estimate`; its covariance P at the true
+parameters is what one drive leaves where the model misses `ERROR` for `LASTS`. The rank is the
+error of the forces to be expected on another drive, random steering up to the same share of the
+grip: sqrt(mean(J P J'))/rms(F), J the slopes of these forces over tires and body (I-optimal; V. V.
 Fedorov, Theory of Optimal Experiments, 1972).
 """
 
@@ -25,10 +25,9 @@ from codegen.arrays import Array
 from codegen.errors import TireidError
 from identifier.estimate.chosen import CHOSEN as ESTIMATE
 from identifier.estimate.drive import Drive
-from identifier.estimate.fit import Reach
 from identifier.estimate.model import FittedModel
-from identifier.estimate.priors import SEDAN, SENSORS, Priors
-from identifier.estimate.solve import Problem, car_numbers, descend
+from identifier.estimate.priors import SENSORS, Priors
+from identifier.estimate.solve import Problem, around_beliefs, car_numbers, normal
 from identifier.motion.model import curve_function, curve_index
 from identifier.motion.nodes import GIVEN, node_scan
 from identifier.motion.parameters import INDEX, NAMES
@@ -37,7 +36,6 @@ from models import maneuvers
 from models.maneuvers import Maneuver
 from models.recordings import Recording
 from models.rules import require_within
-from models.sensors import Sensor, Sensors
 from models.vehicle import Vehicle
 
 SPEEDS = (2.5, 4.0)  # sqrt(g L), 13 and 21 m/s of a sedan
@@ -49,7 +47,8 @@ DT = 0.01  # [s] of the simulation and of the log
 UNDERSTEER = {"ln_stiffness": 1.2, "ln_grip": 1.05}  # rear over front per load, of cars sold
 MOST_ANGLE = math.radians(30.0)  # of the front wheels
 HALVINGS = 9  # of the search for the amplitude
-NOISE = {"v_x": 0.03, "v_y": 0.03, "r": 0.003, "delta": 5e-4}  # SI, of good sensors of a sedan
+ERROR = 0.5  # S of the estimate: what a model misses, over what a good one does
+LASTS = 0.5  # T of the estimate [s], for which that is alike
 
 
 class PlanError(TireidError, ValueError):
@@ -76,10 +75,6 @@ class Planned:
     error: float
     tire: FittedModel
 
-    def fits(self, area: tuple[float, float] | None) -> bool:
-        """Return whether a field of that length and width [m] has the room; None has no limits."""
-        return area is None or (self.length <= max(area) and self.width <= min(area))
-
 
 def plan(
     vehicle: Vehicle,
@@ -89,10 +84,9 @@ def plan(
     start: TireModel | None = None,
     friction: float | None = None,
     share: float = SHARE,
-    area: tuple[float, float] | None = None,
     seed: int = 0,
 ) -> tuple[Planned, ...]:
-    """Return maneuvers, best first; those that fit into the area before all others.
+    """Return maneuvers, best first.
 
     Parameters
     ----------
@@ -102,13 +96,12 @@ def plan(
     start : a fit whose doubts are to be narrowed; None begins with the priors.
     friction : of the road, a guess [-]; None takes that of the priors, or of `start`.
     share : of the grip that the likely tires use at most [-].
-    area : length and width of the field [m]; None is without limits.
     seed : of random steering.
 
     Raises
     ------
     PlanError
-        Where a speed is too low for the estimate, or no maneuver fits into the area.
+        Where a number is not that of a maneuver, or `start` is no fit.
 
     Examples
     --------
@@ -135,19 +128,13 @@ def plan(
     p[[INDEX["sway_share_f"], INDEX["sway_share_r"]]] = 0.0  # the body does not roll here
     likely, middle = _Likely(vehicle, priors, p, share), float(np.mean(speeds))
     other = likely.hardest(_steerings(vehicle, time, seed + 1)["random steer"], middle)
-    forces = likely.forces(likely.log(other, middle)[0])
+    forces = likely.forces(other, middle)
     found = [
         likely.planned(name, of, speed, forces)
         for speed in speeds
         for name, of in _steerings(vehicle, time, seed).items()
     ]
-    if not any(one.fits(area) for one in found):
-        least = min(found, key=lambda one: one.length * one.width)
-        raise PlanError(
-            f"no maneuver fits into the area: {least.name} at {least.speed:.3g} m/s needs "
-            f"{least.length:.0f} x {least.width:.0f} m; give more room, less time or less speed"
-        )
-    return tuple(sorted(found, key=lambda one: (not one.fits(area), one.error)))
+    return tuple(sorted(found, key=lambda one: one.error))
 
 
 Steering = Callable[[float], Maneuver]  # of an amplitude [rad]
@@ -198,9 +185,10 @@ class _Likely(NamedTuple):
         other : slopes of the forces there, of `forces`, (k, p).
         """
         maneuver = self.hardest(of, speed)
-        log, X, Y = self.log(maneuver, speed)
+        z = self.driven(maneuver, speed, DT)
+        log, X, Y = self.log(maneuver, speed, z)
         length, width = (side + 2.0 * self.vehicle.wheelbase for side in _extent(X, Y))
-        tire = self.after(log)
+        tire = self.after(log, np.abs(z[:, 2:]).max(axis=0))
         variance = np.einsum("ki,ij,kj->k", other, tire.covariance, other)
         return Planned(
             name=name, maneuver=maneuver, speed=speed, log=log, X=X, Y=Y, length=length,
@@ -220,9 +208,9 @@ class _Likely(NamedTuple):
             low, high = (middle, high) if (slip <= most).all() else (low, middle)
         return of(low)
 
-    def log(self, maneuver: Maneuver, speed: float) -> tuple[Recording, Array, Array]:
+    def log(self, maneuver: Maneuver, speed: float, z: Array) -> tuple[Recording, Array, Array]:
         """Return what exact sensors show, and the way X, Y of the center of gravity [m], (n,)."""
-        v_y, r = self.driven(maneuver, speed, DT)[:, :2].T
+        v_y, r = z[:, :2].T
         t, psi = DT * np.arange(r.size, dtype=np.float64), np.cumsum(r) * DT
         log = Recording(
             name="plan", t=t, v_x=np.full(t.size, speed), v_y=v_y, r=r,
@@ -244,22 +232,24 @@ class _Likely(NamedTuple):
         z = _step().mapaccum(t.size)(np.zeros(4), given[:-1].T, given[1:].T, *constant)
         return np.array(z).T
 
-    def after(self, log: Recording) -> FittedModel:
-        """Return the likely tires with the covariance that the log of a drive leaves."""
-        scale = math.sqrt(self.vehicle.wheelbase / SEDAN)
-        unit = {"v_x": scale, "v_y": scale, "r": 1.0 / scale, "delta": 1.0}
-        sensors = Sensors(**{name: Sensor(noise=NOISE[name] * unit[name]) for name in NOISE})
-        drive = Drive.of(sensors.apply(log, np.random.default_rng(0)), self.vehicle)
-        # No iteration: the true parameters are known, and their covariance is what is asked.
-        found = descend(Problem([drive], self.vehicle, self.priors), self.p, iterations=0)
-        reach = Reach.of([drive], None, found, self.vehicle)
+    def after(self, log: Recording, driven: Array) -> FittedModel:
+        """Return the likely tires with the covariance that the log of a drive leaves.
+        driven : largest slip of each axle [rad], (2,).
+        """
+        problem = Problem([Drive.of(log, self.vehicle)], self.vehicle, self.priors)
+        now, both = problem.residuals(self.p), np.ones(2)
+        H, _ = normal(problem, now, ERROR**2 * both, LASTS * both)
+        covariance = np.zeros((len(NAMES), len(NAMES)))
+        where = np.ix_(problem.index, problem.index)
+        covariance[where] = np.linalg.inv(H + around_beliefs(self.priors, self.p)[1][where])
         return FittedModel(
-            vehicle=self.vehicle, p=found.p, covariance=found.covariance, driven=reach.slip,
-            speeds=reach.speeds, a_x=reach.a_x, unexplained=reach.unexplained,
+            vehicle=self.vehicle, p=self.p, covariance=covariance, driven=driven,
+            speeds=log.v_x[[0, 0]], a_x=np.zeros(2), unexplained=ERROR * both,
         )  # fmt: skip
 
-    def forces(self, log: Recording) -> Array:
+    def forces(self, maneuver: Maneuver, speed: float) -> Array:
         """Return slopes of the forces of a drive over tires and body, over their rms, (k, p)."""
+        log, _, _ = self.log(maneuver, speed, self.driven(maneuver, speed, DT))
         problem = Problem([Drive.of(log, self.vehicle)], self.vehicle, self.priors)
         slopes = np.zeros((problem.size.size, 2, len(NAMES)))
         slopes[:, :, problem.index] = problem.residuals(self.p).slopes

@@ -60,8 +60,6 @@ MORE = (
     *(
         "--freeze nan",
         "--freeze 1e308 -5",
-        "--run x",
-        "--run ",
         "--replay log.csv",
         "--replay :::",
         "--columns x",

@@ -423,7 +423,6 @@ def test_recordings_whose_files_would_be_the_same_are_refused(logs, tmp_path, ca
     [
         (["--freeze", "4", "4.00000000000001"], "--freeze 4 is given twice"),
         (["--freeze", "99"], "--freeze 99 is outside the recording: slalom lasts from 0 to 8 s"),
-        (["--run", "lap"], "holds one run without a name, so no run 'lap'"),
         (["--replay", "nowhere.csv"], "nowhere.csv: there is no such file"),
         (["--columns", "yaw_rate"], "--columns wants NAME=COLUMN"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
@@ -479,7 +478,7 @@ def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, name, 
         "cornering_stiffness_front = 110e3\ncornering_stiffness_rear = 130e3\n"
     )
     log = shared_data / "carmaker.csv.gz"
-    words = ["identify", str(log), "--run", "slalom1_14_5ms", "--vehicle", str(car)]
+    words = ["identify", f"{log}:slalom1_14_5ms", "--vehicle", str(car)]
     words += [
         "--method",
         name,

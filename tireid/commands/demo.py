@@ -15,8 +15,7 @@ from tireid import report as page
 from tireid.commands import COMMANDS, certificate_table, demo_parts
 from tireid.commands import options as shared
 from tireid.commands.check import draw_check
-from tireid.commands.chosen import CHOSEN
-from tireid.commands.demo_story import STORY, Story, run_story
+from tireid.commands.demo_story import FREEZE, SPEED, STORY, Story, run_story
 from tireid.commands.paper import (
     MEANING,
     MEASURES_MEAN,
@@ -91,7 +90,7 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
             page.Paragraph(
                 text="The car is a double-track model of a mid-size sedan: roll, load transfer, "
                 "tire relaxation and combined slip on Magic Formula tires, integrated at 1 ms. It "
-                f"drives a slalom at {CHOSEN.speed:g} m/s. The identifier gets what any log has, "
+                f"drives a slalom at {SPEED:g} m/s. The identifier gets what any log has, "
                 "speed, lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it "
                 "gets no force."
             ),
@@ -108,7 +107,7 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
             drawing(
                 figures["forces"],
                 "Axle forces: online above, and below replayed with the weights frozen at "
-                f"{CHOSEN.freeze:g} s.",
+                f"{FREEZE:g} s.",
                 READ["forces"],
             ),
         ],

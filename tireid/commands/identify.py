@@ -47,7 +47,6 @@ def add_parser(commands: Any) -> None:
         "logs", nargs="+", metavar="LOG", help="recording; LOG:RUN names one of its runs"
     )
     shared.add_vehicle(parser, required=True)
-    parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
     shared.add_method(parser)
     several: dict[str, Any] = {"nargs": "+", "action": "extend"}
     text = "freeze at these times [s] (the end)"
@@ -85,13 +84,11 @@ def run(options: argparse.Namespace) -> int:
     bound = _force_bound(options.bound or ())
     law, design = shared.chosen_method(options, vehicle, seed, online=beside)
     start = shared.stored_model(options.weights)
-    if options.run_name is not None and len(options.logs) > 1:
-        raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
     require_curves(options.curves)
     if options.repair is not None:
         require_free(options.repair, force=options.force)
-    logs = [_read(log, options.run_name, vehicle, design, options) for log in options.logs]
-    others = [_read(log, None, vehicle, design, options) for log in options.replay]
+    logs = [_read(log, vehicle, design, options) for log in options.logs]
+    others = [_read(log, vehicle, design, options) for log in options.replay]
     _require_distinct([*logs, *others])
     recording = joined(logs)
     without_v_y = any(one.v_y is None for one in (*logs, *others))
@@ -232,14 +229,11 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle) -> str:
     )
 
 
-def _read(
-    log: str, run_name: str | None, vehicle: Vehicle, design: Method, options: argparse.Namespace
-) -> Recording:
+def _read(log: str, vehicle: Vehicle, design: Method, options: argparse.Namespace) -> Recording:
     recording = shared.read_log(
         log,
         vehicle,
         shared.given_map(options),
-        run_name=run_name,
         check=not options.no_check and options.repair is None,  # else once it is repaired
         dt=design.dt,
     )

@@ -300,7 +300,6 @@ def read_log(
     vehicle: Vehicle,
     declared: LogMap,
     *,
-    run_name: str | None = None,
     check: bool = True,
     dt: float = 0.01,
 ) -> Recording:
@@ -309,11 +308,7 @@ def read_log(
     dt : sampling interval that it is brought to [s].
     """
     path, named = split_log_argument(log)
-    if named is not None and run_name is not None and named != run_name:
-        raise ValueError(f"{log} names the run {named}, --run names {run_name}: name one of them")
-    recording, _ = read_repaired(
-        path, vehicle, run=run_name or named, dt=dt, check=check, log_map=declared
-    )
+    recording, _ = read_repaired(path, vehicle, run=named, dt=dt, check=check, log_map=declared)
     say(f"read {recording.name}: {recording.t.size} samples, {recording.duration:.1f} s")
     for note in recording.notes:
         say(f"{recording.name}: {note}")

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from identifier.frozen import vehicle_numbers
-from identifier.plan import SHARE, TIME, Planned, plan
+from identifier.plan import SHARE, TIME, PlanError, Planned, plan
 from identifier.tire_model import AXLES, GRIP, RELAXATION, STIFFNESS
 from models.files import digest
 from tireid import __version__
@@ -66,17 +66,22 @@ def run(options: argparse.Namespace) -> None:
     vehicle = shared.read_vehicle(options, model, options.weights)
     numbers = {
         "speeds": speeds, "time": options.time, "friction": options.mu,
-        "share": 0.01 * options.grip, "area": area, "seed": seed,
+        "share": 0.01 * options.grip, "seed": seed,
     }  # fmt: skip
-    inputs = {"vehicle": vehicle_numbers(vehicle), "weights": str(options.weights), **numbers}
+    inputs = {"vehicle": vehicle_numbers(vehicle), "weights": str(options.weights), "area": area}
+    inputs |= numbers
     with output_folder(options.out, force=options.force) as folder:
-        best, *_ = found = plan(vehicle, start=model, **numbers)
+        found = plan(vehicle, start=model, **numbers)
+        listed = [_numbers(one, area) for one in found]
+        fit = [one for one, known in zip(found, listed, strict=True) if known["fits"]]
+        if not fit:
+            raise PlanError("no maneuver fits into --area: give more room, less --time or --speed")
+        best = fit[0]
         t, delta, v_x = best.log.t, best.log.delta_f, best.log.v_x
         columns = {"t_s": t, "delta_f_rad": delta, "v_x_m_s": v_x, "X_m": best.X, "Y_m": best.Y}
         if ratio is not None:
             columns["hand_wheel_deg"] = np.degrees(ratio * delta)
         write_csv(folder / "steering.csv", columns)
-        listed = [_numbers(one, area) for one in found]
         facts = {"inputs": inputs, "hash": digest(inputs), "version": __version__}
         write_json(folder / "summary.json", {"maneuvers": listed, **facts})
         save_figures(folder, {"maneuver": plan_figure(best, ratio)})
@@ -96,7 +101,7 @@ def _numbers(one: Planned, area: tuple[float, float] | None) -> dict[str, Any]:
         "duration_s": one.maneuver.duration,
         "length_m": one.length,
         "width_m": one.width,
-        "fits": one.fits(area),
+        "fits": area is None or (one.length <= max(area) and one.width <= min(area)),
         "peak_lateral_acceleration_m_s2": float(np.abs(one.log.needed("a_y")).max()),
         "expected_error": one.error,
         "estimates": [
