@@ -144,7 +144,7 @@ DOORS = (
     _door("words of predict", 3, f"{PREDICT} axle.json log.csv --columns r=r --vehicle car.toml"),
     _door("plan car", 2, f"{PLAN} --vehicle sedan.toml", "sedan.toml"),
     _door("plan weights", 2, f"{PLAN} --weights fit.json", "fit.json"),
-    _door("words of plan", 3, f"{PLAN} --mu 0.8 --grip 80 --area 90x30 --steering-ratio 15"),
+    _door("words of plan", 3, f"{PLAN} --mu 0.8 --grip 80 --area 90 30 --steering-ratio 15"),
     _door("words of init", 2, "init out.toml"),
     _door("words of channels", 3, "channels log.csv --columns r=r --write out.toml"),
     _door("words of doctor", 2, "doctor log.csv --vehicle car.toml --columns r=r"),

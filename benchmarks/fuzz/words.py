@@ -80,7 +80,7 @@ MORE = (
         "--speed 1e999%",
     ),
     *(
-        "--area 1e999x3",
+        "--area 1e999 3",
         "--area x",
         "--steering-ratio 0",
         "--speed 0.9",

@@ -38,6 +38,8 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> None:
     if options.out is not None and not options.understeer:
         raise ValueError("--out goes with --understeer: the other options name their files")
+    if not (options.understeer or options.tir or options.slipx or options.ggv):
+        raise ValueError(f"nothing is asked for: add one or more of {WANTED}")
     model = load_model(options.model)
     warn_of_stored(options.model)
     emitted = emit(

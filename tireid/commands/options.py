@@ -6,9 +6,7 @@ what is there is replaced, `--seed` chance, `--jobs` processes.
 """
 
 import argparse
-import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -158,16 +156,6 @@ def jobs_of(options: argparse.Namespace) -> int:
         raise ValueError(f"--jobs must be at least 1, it is {jobs}")
     require_few(ValueError, "--jobs", jobs, "processes", "processes")
     return jobs
-
-
-def number_with_unit(text: str, *units: str) -> tuple[float, str | None]:
-    """Return a number and its unit, None where it has none; NaN where the text is neither."""
-    known = "|".join(map(re.escape, units))
-    found = re.fullmatch(rf"\s*([-+.\deE]+?)\s*({known})?\s*", text, re.ASCII)
-    try:
-        return (float(found[1]), found[2]) if found else (math.nan, None)
-    except ValueError:
-        return math.nan, None
 
 
 def method_name(text: str) -> str:

@@ -1,7 +1,7 @@
 """`tireid plan --vehicle car.toml`: which maneuver tells most of the tires, and its steering."""
 
 import argparse
-import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -41,9 +41,10 @@ def add_parser(commands: Any) -> None:
     )
     shared.add_vehicle(parser, default="the sedan; with --weights that of the model")
     shared.add_weights(parser, "a fit; plan what it leaves open")
-    text = "constant, one or several: 15, 15m/s, 54km/h (2.5 and 4 times sqrt(g L))"
-    parser.add_argument("--speed", metavar="V", nargs="+", help=text)
-    shared.add_options(parser, str, {"--area LxW": "field [m], as 100x50 (without limits)"})
+    text = "constant [m/s], one or several (2.5 and 4 times sqrt(g L))"
+    parser.add_argument("--speed", metavar="V", nargs="+", type=float, help=text)
+    text = "length and width of the field [m] (without limits)"
+    parser.add_argument("--area", metavar=("L", "W"), nargs=2, type=float, help=text)
     numbers: dict[str, Any] = {
         "--time S": (TIME, "length of a maneuver (%(default)g)"),
         "--mu MU": "friction of the road, a guess (0.85, or that of --weights)",
@@ -60,12 +61,11 @@ def run(options: argparse.Namespace) -> None:
     ratio, seed = options.steering_ratio, shared.seed_of(options)
     if ratio is not None and not 1.0 <= ratio <= 100.0:
         raise ValueError(f"--steering-ratio must be 1 to 100, it is {ratio:g}")
-    area = None if options.area is None else _parse_area(options.area)
-    speeds = None if options.speed is None else [_parse_speed(one) for one in options.speed]
+    area = options.area
     model = shared.stored_model(options.weights)
     vehicle = shared.read_vehicle(options, model, options.weights)
     numbers = {
-        "speeds": speeds, "time": options.time, "friction": options.mu,
+        "speeds": options.speed, "time": options.time, "friction": options.mu,
         "share": 0.01 * options.grip, "seed": seed,
     }  # fmt: skip
     inputs = {"vehicle": vehicle_numbers(vehicle), "weights": str(options.weights), "area": area}
@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> None:
     say(f"wrote {options.out}/")
 
 
-def _numbers(one: Planned, area: tuple[float, float] | None) -> dict[str, Any]:
+def _numbers(one: Planned, area: Sequence[float] | None) -> dict[str, Any]:
     """Return what summary.json has of a maneuver."""
     return {
         "maneuver": one.name,
@@ -122,20 +122,3 @@ def _row(one: dict[str, Any]) -> list[str]:
     words = [f"{one[name]:.1f}" for name in ("speed_m_s", "duration_s")]
     a_y, error = one["peak_lateral_acceleration_m_s2"], 100.0 * one["expected_error"]
     return [one["maneuver"], *words, room, f"{a_y:.1f}", f"{error:.1f} %", *axles]
-
-
-def _parse_area(text: str) -> tuple[float, float]:
-    """Return length and width [m] of --area: 40x40 or 60x20.5m."""
-    side = r"(\d+\.?\d*)\s*m?"
-    found = re.fullmatch(rf"\s*{side}\s*[xX×*]\s*{side}\s*", text, re.ASCII)
-    if found is None:
-        raise ValueError(f"--area wants length x width in meters (40x40), not {text!r}")
-    return float(found[1]), float(found[2])
-
-
-def _parse_speed(text: str) -> float:
-    """Return the speed [m/s] of --speed: 15, 15m/s or 54km/h."""
-    value, unit = shared.number_with_unit(text, "m/s", "km/h")
-    if not value > 0.0:
-        raise ValueError(f"--speed wants a number (15, 15m/s, 54km/h), not {text!r}")
-    return value / (3.6 if unit == "km/h" else 1.0)
