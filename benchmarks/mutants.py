@@ -3,10 +3,9 @@
 `make mutants` draws 150 faults (benchmarks/mutation/draw.py) from all packages and C templates,
 plants one after the other in a copy of the tree, and runs the tests that run its function, quick
 ones first, until one fails. What none catches, and no test around it, survives. The seed is the one
-after that of the record: nobody has written tests for these faults. `--only identifier/plan` draws
-from one package. Neither mutmut nor cosmic-ray
-does this: the first leaves out C and everything outside functions and draws nothing, the second
-runs the whole suite for each fault.
+after that of the record: nobody has written tests for these faults. `--only identifier/motion`
+draws from one package. Neither mutmut nor cosmic-ray does this: the first leaves out C and
+everything outside functions and draws nothing, the second runs the whole suite for each fault.
 """
 
 import argparse

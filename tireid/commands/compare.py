@@ -10,8 +10,7 @@ from identifier.compare.study import cannot_learn, run_comparison
 from identifier.methods import DEFAULT, INSTALL, RIVALS, methods, require_method
 from identifier.run import History
 from identifier.verdict import Verdict, judge
-from models.recordings import Recording, RecordingError
-from models.vehicle import Vehicle
+from models.recordings import RecordingError
 from tireid.commands import COMMANDS, DONE
 from tireid.commands import compare_results as results
 from tireid.commands import options as shared
@@ -36,9 +35,6 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("logs", nargs="*", metavar="LOG[:RUN]", help="recordings")
     shared.add_vehicle(parser)
-    parser.add_argument(
-        "--simulate", action="store_true", help="drives of the simulated car as well as the logs"
-    )
     parser.add_argument(
         "--method",
         nargs="+",
@@ -70,7 +66,11 @@ def run(options: argparse.Namespace) -> int:
         output_folder(options.out, force=options.force) as folder,
         Progress("compare", parts, long=True) as work,
     ):
-        recordings = _recordings(options, vehicle, seed)
+        log_map, check = shared.given_map(options), not options.no_check
+        recordings = [shared.read_log(log, vehicle, log_map, check=check) for log in options.logs]
+        if not recordings:
+            say(f"driving the plant of {vehicle.name} with noisy sensors")
+            recordings = [*plant_recordings(vehicle, np.random.default_rng(seed))]
         for recording in recordings:
             recording.needed("v_y")  # of the slip at which every method is asked
         blind = [recording.name for recording in recordings if recording.axle_force is None]
@@ -107,14 +107,3 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join(tables))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
     return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
-
-
-def _recordings(options: argparse.Namespace, vehicle: Vehicle, seed: int) -> list[Recording]:
-    log_map = shared.given_map(options)
-    recordings = [
-        shared.read_log(log, vehicle, log_map, check=not options.no_check) for log in options.logs
-    ]
-    if options.simulate or not options.logs:
-        say(f"driving the plant of {vehicle.name} with noisy sensors")
-        recordings += plant_recordings(vehicle, np.random.default_rng(seed))
-    return recordings

@@ -107,11 +107,6 @@ def pair_tables(comparison: Comparison) -> str:
     return "\n".join(blocks)
 
 
-def _newton_text(value: float) -> str:
-    """Return a force [N] with three digits, more where it is above 1000 N."""
-    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
-
-
 def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:
     """Return a mean of errors as percent of the rms force and in newtons, front / rear."""
     if not pairs:
@@ -124,7 +119,8 @@ def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:
         [(e.front / sizes[name].front, e.rear / sizes[name].rear) for name, e in pairs], axis=0
     )
     front, rear = (
-        f"{100.0 * p:.1f} ({_newton_text(n)})" for p, n in zip(parts, newtons, strict=True)
+        f"{100.0 * p:.1f} ({n:{'.0f' if n >= 100.0 else '.3g'}})"  # three digits, or more
+        for p, n in zip(parts, newtons, strict=True)
     )
     return f"{front} / {rear}"
 

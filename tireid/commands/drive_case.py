@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path as FilePath
 
@@ -17,7 +18,6 @@ from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from tireid.commands.options import (
     chosen_method,
-    number_with_unit,
     read_vehicle,
     require_one,
     seed_of,
@@ -39,7 +39,11 @@ def _parse_speed(text: str) -> SpeedWish:
 
     text : 90% or 0.9 of the grip, 17m/s or 60km/h.
     """
-    value, unit = number_with_unit(text, "%", "m/s", "km/h")
+    found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(%|m/s|km/h)?\s*", text, re.ASCII)
+    try:
+        value, unit = (float(found[1]), found[2]) if found else (math.nan, None)
+    except ValueError:
+        value, unit = math.nan, None
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(f"--speed wants a share of the grip or a speed (90%, 17m/s), not {text!r}")
     if unit is None and value > _PLAIN:

@@ -9,7 +9,6 @@ import numpy as np
 from identifier.doctor import diagnose
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
-from identifier.paper.network import Weights
 from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import History, check_recording
 from identifier.tire_model import TireModel
@@ -18,12 +17,11 @@ from models.recordings import Recording, Repair, check_against_vehicle, check_ph
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
-from tireid.commands.certificate_table import resumed_line, verdict_line
+from tireid.commands.certificate_table import verdict_line
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
-from tireid.figures.style import paper_design
 from tireid.identified import Results, file_name
 from tireid.learning import identify, with_v_y
-from tireid.output import output_folder, require_curves, require_free, write_json
+from tireid.output import output_folder, require_free, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
 from tireid.verdicts import verdict_text, verdicts_text
@@ -47,7 +45,6 @@ def add_parser(commands: Any) -> None:
         "logs", nargs="+", metavar="LOG", help="recording; LOG:RUN names one of its runs"
     )
     shared.add_vehicle(parser, required=True)
-    parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
     shared.add_method(parser)
     several: dict[str, Any] = {"nargs": "+", "action": "extend"}
     text = "freeze at these times [s] (the end)"
@@ -59,8 +56,6 @@ def add_parser(commands: Any) -> None:
     shared.add_weights(parser, "begin with this model")
     shared.add_seed(parser, "the initial weights of the paper's network")
     shared.add_accept(parser)
-    text = "format of curves over time (csv); parquet is smaller and faster, with all digits"
-    parser.add_argument("--curves", choices=("csv", "parquet"), default="csv", help=text)
     shared.add_output(parser, "identify")
     parser.set_defaults(run=run)
 
@@ -71,13 +66,10 @@ def run(options: argparse.Namespace) -> int:
     seed = None if options.seed is None else shared.seed_of(options)
     law, design = shared.chosen_method(options, vehicle, seed)
     start = shared.stored_model(options.weights)
-    if options.run_name is not None and len(options.logs) > 1:
-        raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
-    require_curves(options.curves)
     if options.repair is not None:
         require_free(options.repair, force=options.force)
-    logs = [_read(log, options.run_name, vehicle, design, options) for log in options.logs]
-    others = [_read(log, None, vehicle, design, options) for log in options.replay]
+    logs = [_read(log, vehicle, design, options) for log in options.logs]
+    others = [_read(log, vehicle, design, options) for log in options.replay]
     _require_distinct([*logs, *others])
     recording = joined(logs)
     without_v_y = any(one.v_y is None for one in (*logs, *others))
@@ -127,7 +119,7 @@ def run(options: argparse.Namespace) -> int:
         asked = _asked(learnt.freeze(last), others)
         tire = calibrated(learnt, last, verdict)
         found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
-        figures = found.write(folder, curves=options.curves, progress=progress.begin(_DRAWING))
+        figures = found.write(folder, progress=progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(folder, found, figures, diagnosis, options.words)
         given = (
@@ -171,13 +163,11 @@ def _require_tires(learnt: History, t: float) -> None:
         ) from None
 
 
-def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool) -> str:
+def _closing_line(learnt: History, t: float, vehicle: Vehicle) -> str:
     """Return the certificate of the paper's identifier, or what the axle identifier knows."""
     model, certificate = learnt.freeze(t), learnt.design.certify(vehicle)
     if model.known_slip is None and certificate.properties:
-        first = Weights(W=learnt.state["W"][0], V=learnt.state["V"][0])
-        beyond = resumed_line(certificate, paper_design(learnt), first) if resumed else ""
-        return "\n".join(line for line in (verdict_line(certificate), beyond) if line)
+        return verdict_line(certificate)
     if model.known_slip is None:
         return "frozen; `tireid compare` sets it beside the other methods"
     known = np.degrees(model.known_slip)
@@ -192,14 +182,11 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
     )
 
 
-def _read(
-    log: str, run_name: str | None, vehicle: Vehicle, design: Method, options: argparse.Namespace
-) -> Recording:
+def _read(log: str, vehicle: Vehicle, design: Method, options: argparse.Namespace) -> Recording:
     recording = shared.read_log(
         log,
         vehicle,
         shared.given_map(options),
-        run_name=run_name,
         check=not options.no_check and options.repair is None,  # else once it is repaired
         dt=design.dt,
     )

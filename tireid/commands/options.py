@@ -6,9 +6,7 @@ what is there is replaced, `--seed` chance, `--jobs` processes.
 """
 
 import argparse
-import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -157,16 +155,6 @@ def jobs_of(options: argparse.Namespace) -> int:
     return jobs
 
 
-def number_with_unit(text: str, *units: str) -> tuple[float, str | None]:
-    """Return a number and its unit, None where it has none; NaN where the text is neither."""
-    known = "|".join(map(re.escape, units))
-    found = re.fullmatch(rf"\s*([-+.\deE]+?)\s*({known})?\s*", text, re.ASCII)
-    try:
-        return (float(found[1]), found[2]) if found else (math.nan, None)
-    except ValueError:
-        return math.nan, None
-
-
 def method_name(text: str) -> str:
     """Return the name of a method, for argparse.
 
@@ -293,7 +281,6 @@ def read_log(
     vehicle: Vehicle,
     declared: LogMap,
     *,
-    run_name: str | None = None,
     check: bool = True,
     dt: float = 0.01,
 ) -> Recording:
@@ -302,11 +289,7 @@ def read_log(
     dt : sampling interval that it is brought to [s].
     """
     path, named = split_log_argument(log)
-    if named is not None and run_name is not None and named != run_name:
-        raise ValueError(f"{log} names the run {named}, --run names {run_name}: name one of them")
-    recording, _ = read_repaired(
-        path, vehicle, run=run_name or named, dt=dt, check=check, log_map=declared
-    )
+    recording, _ = read_repaired(path, vehicle, run=named, dt=dt, check=check, log_map=declared)
     say(f"read {recording.name}: {recording.t.size} samples, {recording.duration:.1f} s")
     for note in recording.notes:
         say(f"{recording.name}: {note}")

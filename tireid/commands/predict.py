@@ -61,7 +61,6 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
     shared.add_vehicle(parser, default="that of the model")
-    parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
     shared.add_log_reading(parser)
     shared.add_accept(parser)
     shared.add_output(parser, "predict")
@@ -75,7 +74,6 @@ def run(options: argparse.Namespace) -> int:
         options.log,
         model.vehicle,
         shared.given_map(options),
-        run_name=options.run_name,
         check=not options.no_check,
     )
     prediction = replay(recording, model)

@@ -1,4 +1,4 @@
-"""A fit where other rooms take it: hidden units, going on learning, C, ONNX, tracker, plan."""
+"""A fit where other rooms take it: hidden units, going on learning, C, ONNX, tracker."""
 
 from dataclasses import replace
 
@@ -7,9 +7,8 @@ import pytest
 
 import tireid as ti
 from codegen import find_compiler
-from identifier.axle import AxleIdentifier, AxleModel
+from identifier.axle import AxleIdentifier
 from identifier.axle.curve import LADDER
-from identifier.estimate.chosen import CHOSEN as ESTIMATE_CHOSEN
 from identifier.estimate.fit import fit
 from identifier.estimate.method import FitMethod
 from identifier.estimate.model import FittedModel
@@ -28,7 +27,6 @@ from mpc.tires.tire import Car, Point
 from tireid import exporting
 from tireid.driving.runs import LEARNING, given_tire, make_learner
 from tireid.driving.setup import Setup, SpeedWish
-from tireid.planning import plan
 
 CAR = sedan()
 PRIORS = Priors.of(CAR)
@@ -214,12 +212,3 @@ def test_who_goes_on_learning_steers_on_what_is_learnt_in_its_units(fitted):
     handed = prediction_tire(learner.supervisor.identifier.model())
     assert told.structure == handed.structure
     np.testing.assert_allclose(told.weights, handed.weights)
-
-
-def test_a_plan_goes_on_from_a_fit(fitted):
-    found = plan(CAR, after=fitted, area=(60.0, 20.0), speed=12.0, time=1.5)
-    assert found.error_before < 0.03  # of the grip; before learning it is above a tenth
-    assert (
-        isinstance(fitted.in_units(), AxleModel)
-        and fitted.in_units().ladder == ESTIMATE_CHOSEN.units
-    )
