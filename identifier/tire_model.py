@@ -254,18 +254,6 @@ class TireModel(ABC):
         """
         raise ValueError(f"a {type(self).__name__} cannot be scaled to a friction of {ratio:g}")
 
-    def in_units(self, ladder: tuple[float, ...] | None = None) -> "TireModel":
-        """Return the model in the hidden units of the axle identifier where it projects on them.
-
-        What is in such units already, and what cannot be, is returned as it is.
-
-        Parameters
-        ----------
-        ladder : slip scales of the units [rad]; None takes those that come closest.
-        """
-        del ladder
-        return self
-
     @property
     def _loads(self) -> Array:
         return np.array(self.vehicle.axle_loads)

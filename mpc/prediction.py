@@ -12,7 +12,7 @@ import casadi as ca
 
 from codegen.tuned import tuned
 from mpc.problem import N_ERRORS, gauss_newton, tracking_errors
-from mpc.tires.tire import Car, Pair, Point, TireStructure, believed_force
+from mpc.tires.tire import Car, Point, TireStructure, believed
 
 # The car along a path as the tracker predicts it: ẋ and its Jacobian.
 #
@@ -71,7 +71,7 @@ def motion(structure: TireStructure, p: Ports) -> Motion:
     at = Point(v_y, r, delta, p.v_x, car, p.w)
     kinematic = structure.slip(at)
     slip = (lagged[0], lagged[1]) if structure.lagged else kinematic
-    force = believed_force(structure, slip, at, p.max_slip, p.rise, p.grip)
+    force, lengths = believed(structure, slip, at, p.max_slip, p.rise, p.grip)
 
     F = ca.SX.sym("F", 2)
     c, s = ca.cos(e_psi), ca.sin(e_psi)
@@ -84,7 +84,6 @@ def motion(structure: TireStructure, p: Ports) -> Motion:
         p.u,
     ]
     if structure.lagged:
-        lengths = _lag_lengths(structure, slip, at, p.grip)
         for now, behind, length in zip(kinematic, slip, lengths, strict=True):
             # A lag under half a stage cannot be seen by it, and would make the step unstable.
             rates.append((now - behind) / ca.fmax(length * (1 / p.v_x), 0.5 * p.dt))
@@ -93,15 +92,6 @@ def motion(structure: TireStructure, p: Ports) -> Motion:
     x_dot, x_dot_x = ca.substitute([x_dot, x_dot_x], [F], [force])
     angles = ca.vertcat(*kinematic)
     return Motion(x_dot, x_dot_x, ca.jacobian(x_dot, p.u), s_dot, angles, ca.jacobian(angles, p.x))
-
-
-def _lag_lengths(structure: TireStructure, slip: Pair, at: Point, grip: Any) -> Pair:
-    """Return the relaxation lengths [m] on a friction: those of the slip over it."""
-    there = structure.similar(at, grip)
-    if there is None:
-        return structure.lag_length(slip, at)
-    per_grip = 1 / grip
-    return structure.lag_length((slip[0] * per_grip, slip[1] * per_grip), there)
 
 
 _RESULTS = ("x_next", "A", "B", "H", "h", "slip", "slip_x")
@@ -175,10 +165,9 @@ def build_axles(structure: TireStructure) -> ca.Function:
     at = Point(v_y, r, delta, p.v_x, Car(*ca.vertsplit(p.car)), p.w)
     kinematic = structure.slip(at)
     slip = (lagged[0], lagged[1]) if structure.lagged else kinematic
-    force = believed_force(structure, slip, at, p.max_slip, p.rise, p.grip)
-    lengths = _lag_lengths(structure, slip, at, p.grip) if structure.lagged else (0.0, 0.0)
+    force, lengths = believed(structure, slip, at, p.max_slip, p.rise, p.grip)
     ports = {name: port for name, port in p._asdict().items() if name not in ("u", "kappa", "dt")}
-    results = [force, ca.vertcat(*kinematic), ca.SX(ca.vertcat(*lengths))]
+    results = [force, ca.vertcat(*kinematic), ca.vertcat(*lengths)]
     return _finished("axles", ports, results, ("force", "slip", "length"))
 
 

@@ -2,6 +2,7 @@
 
 import ast
 import re
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,39 @@ def test_the_rule_catches_planted_circles_of_late_and_of_typed_imports():
     assert circles(tree | {"m/c.py": "import ast"}) == []
     through = {"m/__init__.py": "from m.a import x", "m/a.py": "from m import x"}
     assert circles(through) == [["m/__init__.py", "m/a.py"]]
+
+
+def c_files_in_a_circle(texts):
+    """C files that call one another's functions in a circle, if there is one."""
+    code = {name: re.sub(r"/\*.*?\*/", "", text, flags=re.S) for name, text in texts.items()}
+    opened = re.compile(r"^(?!static)[\w *]+?(\w+)\([^;{]*\)\s*\{", re.M)
+    own = {name: {*opened.findall(text)} - {"main"} for name, text in code.items()}
+    calls = {name: {*re.findall(r"(\w+)\(", text)} - own[name] for name, text in code.items()}
+    homes = {
+        name: [other for other in code if called & own[other]] for name, called in calls.items()
+    }
+    try:
+        TopologicalSorter(homes).prepare()
+    except CycleError as error:
+        return set(error.args[1])
+    return set()
+
+
+@pytest.mark.parametrize("package", ORDER)
+def test_no_c_files_of_a_folder_call_one_another_in_a_circle(package):
+    for folder in {path.parent for path in (ROOT / package).rglob("*.c")}:
+        texts = {path.name: path.read_text(encoding="utf-8") for path in folder.glob("*.c")}
+        assert not c_files_in_a_circle(texts), folder
+
+
+def test_the_rule_catches_a_planted_circle_of_c_files():
+    folder = ROOT / "mpc/c"
+    texts = {path.name: path.read_text(encoding="utf-8") for path in folder.glob("*.c")}
+    qp, caution = "tireid_mpc_qp.c", "tireid_mpc_caution.c"
+    texts[qp] = texts[qp].replace("begin(work, ", "tireid_mpc_tighten(work, ", 1)
+    assert c_files_in_a_circle(texts) == set()  # one way
+    texts[caution] += "static void back(void)\n{\n    tireid_mpc_qp(0, 0, 0);\n}\n"
+    assert c_files_in_a_circle(texts) == {qp, caution}
 
 
 def test_commands_call_the_interface_and_nothing_calls_the_commands():

@@ -27,7 +27,7 @@ from identifier.axle.learning import (
     bounded,
     rising_shares,
 )
-from identifier.axle.model import AxleModel
+from identifier.axle.model import AxleModel, begun
 from identifier.axle.prior import Prior, friction_direction
 from identifier.axle.slip import SHORTEST, Sensors, Sway
 from identifier.axle.step import CARRY, LEARNING_OVER, PORTS, build_step
@@ -314,7 +314,7 @@ class AxleIdentifier(Method):
 
 def resumed_units(start: TireModel, ladder: tuple[float, ...]) -> AxleModel:
     """Return a stored model to begin with, in the units of a method."""
-    return resumed(start.in_units(ladder), AxleModel, OTHER_STRUCTURE, ladder=ladder)
+    return resumed(begun(start, ladder), AxleModel, OTHER_STRUCTURE, ladder=ladder)
 
 
 def curve_boxes(b: Bounds) -> dict[str, Any]:

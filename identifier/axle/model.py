@@ -21,7 +21,7 @@ from identifier.axle.band import (
 )
 from identifier.axle.car import Car, car_numbers, downforce_numbers
 from identifier.axle.chosen import CHOSEN
-from identifier.axle.curve import EDGES, doublings, unit_matrix
+from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.dynamics import curve_at_speed, lagged_force, series_compliance
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.prior import friction_direction
@@ -35,6 +35,7 @@ from identifier.band import (
     normal_quantile,
 )
 from identifier.frozen import FORMAT, FrozenModelError, vehicle_from, vehicle_numbers
+from identifier.motion.parameters import INDEX, curve_index
 from identifier.setup import Setup
 from identifier.tire_model import (
     AXLES,
@@ -517,3 +518,67 @@ def _is_covariance(P: Array) -> bool:
 @cache
 def _frozen_scan(steps: tuple[int, ...], *, pressed: bool) -> Scan:
     return Scan(build_frozen(steps, pressed=pressed), carry=FROZEN_CARRY, over=OVER)
+
+
+# How an identifier of curves begins with a fit.
+
+FOLLOWED = 0.032  # [rad] of slip that curves are followed to at least, as if it were known
+WIDEST = 0.6  # [rad], as far as they are followed
+BEYOND = 0.3  # weight of a slip that no drive reached
+LEAST_VARIANCE = 1e-10  # of weights, lag and zeros, so that no covariance is singular
+
+
+def begun(model: TireModel, ladder: tuple[float, ...] = LADDER) -> TireModel:
+    """Return what an identifier of curves begins with: of a fit its curves in hidden units.
+
+    Lag, sway and errors of the sensors are taken over; load transfer and ellipse are not. A model
+    of another kind is returned as it is.
+    ladder : slip scales of the units [rad].
+    """
+    if model.kind != "fit":
+        return model
+    fit: Any = model
+    W, P, before = zip(*(_begun_axle(fit, i, ladder) for i in range(2)), strict=True)
+    limits = Plausibility.for_vehicle(fit.vehicle)
+    most = np.array([limits.max_steering, limits.slow])
+    excitation = np.zeros((2, 1 + len(EDGES)))
+    excitation[:, 0] = fit.driven
+    return AxleModel(
+        vehicle=fit.vehicle,
+        ladder=ladder,
+        sway=fit.sway,
+        plausibility=limits,
+        W=np.stack(W),
+        compliance=np.array([fit["compliance_f"], fit["compliance_r"]]),
+        sway_share=np.array([fit["sway_share_f"], fit["sway_share_r"]]),
+        offset=np.clip([fit["steering_zero"], fit["v_y_bias"]], -most, most),
+        covariance=np.stack(P),
+        prior_covariance=np.stack(before),
+        excitation=excitation,
+        sensors=Sensors(*(fit[name] for name in Sensors._fields)),
+    )
+
+
+def _begun_axle(fit: Any, i: int, ladder: tuple[float, ...]) -> tuple[Array, Array, Array]:
+    """Return weights (n,) by least squares of a fit's curve, and the covariances of weights, lag
+    and zeros (n + 3, n + 3) that the fit has and that were believed before.
+    """
+    n, axle, reach = len(ladder), "fr"[i], max(float(fit.known_slip[i]), FOLLOWED)
+    slip = np.concatenate([np.linspace(0.0, reach, 120)[1:], np.linspace(reach, WIDEST, 60)])
+    weight = np.where(slip <= reach, 1.0, BEYOND)
+    units = np.vstack([unit_matrix(slip, ladder) * weight[:, None], 1e-4 * np.eye(n)])
+    weights_of = np.linalg.pinv(units)[:, : slip.size] * weight
+    phi, _, J = fit.curve_at(np.column_stack([slip, slip]))
+    v_x = float(fit.speeds.mean())
+    zeros = {"steering_zero": 1.0} if i == 0 else {"v_y_bias": 1.0, "v_y_angle": v_x}
+    names = (f"compliance_{axle}", f"sway_share_{axle}", *zeros)
+    index = [*curve_index(axle), *(INDEX[name] for name in names)]
+    to = np.zeros((n + 3, len(index)))
+    to[:n, :9] = weights_of @ J[i]
+    to[n, 9] = to[n + 1, 10] = 1.0
+    to[n + 2, 11:] = list(zeros.values())
+    P, before = (
+        to @ whole[np.ix_(index, index)] @ to.T + LEAST_VARIANCE * np.eye(n + 3)
+        for whole in (fit.covariance, fit.covariance_before)
+    )
+    return weights_of @ phi[:, i], P, before

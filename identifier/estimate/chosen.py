@@ -59,11 +59,7 @@ class Chosen(NamedTuple):
     looked: float = 0.25  # [s] over which what is left of a sensor is alike
     shortest: int = 50  # nodes from which noise is learnt
     # model
-    units: tuple[float, ...] = (0.008, 0.016, 0.032, 0.064, 0.128, 0.256)  # rad, of the projection
-    model_least_reach: float = 0.032  # rad, up to which it follows the curves at least
-    widest: float = 0.6  # rad, as far as it is fitted
-    least_variance: float = 1e-10  # of weights, lag and zeros, so that no covariance is singular
-    model_beyond: float = 0.3  # weight of a slip that no drive reached, in that fit
+    widest: float = 0.6  # rad, within which the largest force is looked for
     decided: float = 0.5  # standard deviation over the prior's, up to which drives decided a number
     # times what the drives that taught miss, on others; chosen on recordings of three real cars and
     # two simulated ones, since the errors of a plant that one draws are those that one thought of

@@ -21,8 +21,8 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.estimate.chosen import CHOSEN
-from identifier.motion.model import curve_function, curve_index
-from identifier.motion.parameters import INDEX, NAMES
+from identifier.motion.model import curve_function
+from identifier.motion.parameters import INDEX, NAMES, curve_index
 
 OF_CURVE = {axle: curve_index(axle)[:-1] for axle in "fr"}  # without the road
 BESIDE = tuple(

@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any, NamedTuple, Self
 
 import casadi as ca
@@ -13,11 +13,10 @@ from numpy.typing import ArrayLike
 from codegen.arrays import Array, blocks, large
 from identifier.axle.car import Car
 from identifier.axle.car import car_numbers as axle_numbers
-from identifier.axle.curve import EDGES, Curve, unit_matrix
+from identifier.axle.curve import Curve
 from identifier.axle.dynamics import lagged_force, series_compliance
 from identifier.axle.gate import GateState, Plausibility
-from identifier.axle.model import AxleModel
-from identifier.axle.slip import SHORTEST, Sensors, Sway
+from identifier.axle.slip import SHORTEST, Sway
 from identifier.band import (
     LARGEST_SD,
     Band,
@@ -29,15 +28,14 @@ from identifier.estimate.latent import TRUST, LateralVelocity, estimate_v_y
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import car_numbers, simulate
 from identifier.frozen import FORMAT, vehicle_from, vehicle_numbers
-from identifier.motion.chosen import CHOSEN as MOTION_CHOSEN
 from identifier.motion.model import (
     REPLAYED,
+    carcass_curve,
     curve_function,
-    curve_index,
-    curve_symbols,
+    pushed_function,
     replay_scan,
 )
-from identifier.motion.parameters import INDEX, NAMES, PARAMETERS
+from identifier.motion.parameters import INDEX, NAMES, PARAMETERS, curve_index
 from identifier.setup import Setup
 from identifier.tire_model import (
     AXLES,
@@ -55,7 +53,7 @@ from identifier.tire_model import (
 from models.recordings import Recording
 from models.rules import require_positive
 from models.schema import Table
-from models.vehicle import DOWNFORCE_SPEED, GRAVITY, LIGHTEST, Vehicle, load_ratio
+from models.vehicle import DOWNFORCE_SPEED, Vehicle, load_ratio
 
 BOUNDED = (("ln_stiffness", "cornering stiffness", True), ("ln_grip", "grip", True))
 _KEYS = {  # of arrays in a file
@@ -141,8 +139,8 @@ class FittedModel(TireModel):
 
     # The curve.
 
-    def _curve_numbers(self, axle: str) -> Array:
-        """Return the numbers of `curve_symbols` of an axle, (9,)."""
+    def curve_numbers(self, axle: str) -> Array:
+        """Return the numbers of the curve of an axle, ln C to ln m, (9,)."""
         return self.p[curve_index(axle)]
 
     def curve_at(self, alpha: Array) -> tuple[Array, Array, Array]:
@@ -151,7 +149,7 @@ class FittedModel(TireModel):
         """
         phi, slope, J = [], [], []
         for i, axle in enumerate("fr"):
-            numbers = np.tile(self._curve_numbers(axle)[:, None], (1, len(alpha)))
+            numbers = np.tile(self.curve_numbers(axle)[:, None], (1, len(alpha)))
             found = curve_function()(numbers, alpha[:, i][None])
             values = [np.array(one) for one in found]
             phi.append(values[0].ravel())
@@ -181,23 +179,13 @@ class FittedModel(TireModel):
             return found if found.ndim else float(found)
         speed = self._curve_speed if v_x is None else v_x
         coasting = -self.vehicle.drag * speed**2
-        moving, plain = self.ratio(np.full(2, speed), np.array([a_x, coasting]))
+        pushed, numbers = pushed_function(), car_numbers(self.vehicle)
+        moving, plain = (
+            np.array(pushed(self.p, numbers, one, speed)).ravel() for one in (a_x, coasting)
+        )
         ratio = moving / plain
         scaled: Array = found * (ratio if axle is None else ratio[AXLES.index(axle)])
         return float(scaled) if scaled.ndim == 0 else scaled
-
-    def ratio(self, v_x: Array, a_x: Array) -> Array:
-        """Return λ G, load and ellipse: force over that at static load of one that coasts, (k, 2).
-        v_x : speeds [m/s], (k,).   a_x : longitudinal accelerations [m/s²], (k,).
-        """
-        car = self.vehicle
-        f = (np.asarray(a_x) + car.drag * np.square(v_x)) / GRAVITY
-        moved = self["load_transfer"] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
-        load = 1.0 + np.outer(f, moved) + np.outer(np.square(v_x), car.downforce)
-        use = np.where(f[:, None] > 0.0, self._pair("driving"), self._pair("braking")) * f[:, None]
-        left = np.sqrt(np.maximum(1.0 - use**2, MOTION_CHOSEN.least_grip))
-        product: Array = np.maximum(load, LIGHTEST) * left
-        return product
 
     def _pair(self, name: str) -> Array:
         """Return a parameter of both axles, (2,)."""
@@ -205,11 +193,9 @@ class FittedModel(TireModel):
 
     def _curve(self, slip: Any, v_x: Any) -> Curve:
         """Return the force curve at a slip (2,) [rad] and a speed, in static axle loads."""
-        numbers = [self._curve_numbers(axle) for axle in "fr"]
-        found = [_curve_expression(slip[i], one) for i, one in enumerate(numbers)]
+        found = [carcass_curve(*self.curve_numbers(axle), slip[i]) for i, axle in enumerate("fr")]
         phi, slope = (ca.vertcat(*both) for both in zip(*found, strict=True))
-        at_least = 0.02 * ca.DM([math.exp(one[0]) for one in numbers])
-        static = Curve(ca.DM(2, 0), phi, slope, ca.fmax(slope, at_least), ca.DM(2, 1))
+        static = Curve(ca.DM(2, 0), phi, slope, slope, ca.DM(2, 1))
         if not self.vehicle.has_downforce:
             return static
         return static.under(load_ratio(ca.DM(self.vehicle.downforce), v_x))
@@ -224,11 +210,10 @@ class FittedModel(TireModel):
         x : [v_y, r] (2,), as the sensors of the drives read them.
         """
         v_y = x[0] - self["v_y_bias"] - self["v_y_angle"] * v_x - self["v_y_lever"] * x[1]
-        shares = self._pair("compliance"), self._pair("sway_share")
         return lagged_force(
             Car(*axle_numbers(self.vehicle).T),
             self._curve(slip, v_x),
-            series_compliance(*shares, self._sway.frequency),
+            self.give,
             np.zeros(2),
             slip=slip,
             x=[v_y, x[1]],
@@ -242,7 +227,13 @@ class FittedModel(TireModel):
         return True
 
     @property
-    def _sway(self) -> Sway:
+    def give(self) -> Array:
+        """Deflection of carcass and body per static axle load [m], (2,)."""
+        shares = self._pair("compliance"), self._pair("sway_share")
+        return series_compliance(*shares, self.sway.frequency)
+
+    @property
+    def sway(self) -> Sway:
         usual = Sway.for_vehicle(self.vehicle)
         return replace(usual, frequency=usual.frequency * math.exp(self["ln_sway"]))
 
@@ -380,6 +371,11 @@ class FittedModel(TireModel):
         """
         return _known_slip(self).copy()
 
+    @property
+    def covariance_before(self) -> Array:
+        """Covariance of the beliefs about its car, (p, p)."""
+        return _covariance_before(self)
+
     # What it says of itself.
 
     @property
@@ -397,7 +393,7 @@ class FittedModel(TireModel):
         return length
 
     def estimates(self) -> tuple[Estimate, ...]:
-        before = _covariance_before(self)
+        before = self.covariance_before
         given = self.vehicle.bicycle[4:]
         band, loads, lag = self.band, self._loads, self.relaxation_length
         stiff = [
@@ -468,64 +464,6 @@ class FittedModel(TireModel):
         sure = self.covariance + CHOSEN.least_doubt * np.diag(usual.sd**2)
         information[where] = np.linalg.inv(sure[where])
         return replace(usual, mean=self.p, information=information, typed=())
-
-    def in_units(self, ladder: tuple[float, ...] | None = None) -> AxleModel:
-        """Return the tires in the hidden units of the axle identifier.
-
-        Curve, lag, sway and errors of the sensors; without load transfer and ellipse.
-        ladder : slip scales of the units [rad]; None takes six, each twice the one before, from
-            0.008 to 0.256 rad, whose curves are within 0.3 % of the static load.
-        """
-        ladder = CHOSEN.units if ladder is None else ladder
-        fits = [_units_fit(ladder, float(reach)) for reach in self._reach]
-        W = np.stack(
-            [
-                pseudo @ self.curve_at(np.column_stack([slip, slip]))[0][:, i]
-                for i, (slip, pseudo) in enumerate(fits)
-            ]
-        )
-        limits = Plausibility.for_vehicle(self.vehicle)
-        zeros, most = self.p[_OFFSETS[:2]], np.array([limits.max_steering, limits.slow])
-        excitation = np.zeros((2, 1 + len(EDGES)))
-        excitation[:, 0] = self.driven
-        return AxleModel(
-            vehicle=self.vehicle,
-            ladder=ladder,
-            sway=self._sway,
-            plausibility=limits,
-            W=W,
-            compliance=self._pair("compliance"),
-            sway_share=self._pair("sway_share"),
-            offset=np.clip(zeros, -most, most),
-            covariance=self._units_covariance(fits, self.covariance),
-            prior_covariance=self._units_covariance(fits, _covariance_before(self)),
-            excitation=excitation,
-            sensors=Sensors(*(self[name] for name in Sensors._fields)),
-        )
-
-    @property
-    def _reach(self) -> Array:
-        """Slip up to which its projection follows the curves [rad], (2,)."""
-        return np.maximum(self.known_slip, CHOSEN.model_least_reach)
-
-    def _units_covariance(self, fits: list[tuple[Array, Array]], covariance: Array) -> Array:
-        """Return the covariance of weights, lag and zeros (2, n + 3, n + 3), never singular."""
-        n = len(fits[0][1])
-        found = np.empty((2, n + 3, n + 3))
-        for i, (axle, (slip, pseudo)) in enumerate(zip("fr", fits, strict=True)):
-            _, _, J = self.curve_at(np.column_stack([slip, slip]))
-            zeros = {"steering_zero": 1.0}
-            if axle == "r":
-                zeros = {"v_y_bias": 1.0, "v_y_angle": float(self.speeds.mean())}
-            names = [f"compliance_{axle}", f"sway_share_{axle}", *zeros]
-            index = [*curve_index(axle), *(INDEX[name] for name in names)]
-            to = np.zeros((n + 3, len(index)))
-            to[:n, :9] = pseudo @ J[i]
-            to[n, 9] = to[n + 1, 10] = 1.0
-            to[n + 2, 11:] = list(zeros.values())
-            P = to @ covariance[np.ix_(index, index)] @ to.T
-            found[i] = P + np.diag(np.full(n + 3, CHOSEN.least_variance))
-        return found
 
     def setup(self, dt: float) -> Setup:
         limits = Plausibility.for_vehicle(self.vehicle)
@@ -666,7 +604,7 @@ class _FittedBand(Band[FittedModel]):
         """Return the standard deviation of φ at slips (n, 2), and that before learning."""
         _, _, J = self.model.curve_at(slip)
         sd = []
-        for P in (self.model.covariance, _covariance_before(self.model)):
+        for P in (self.model.covariance, self.model.covariance_before):
             found = [
                 np.einsum("ki,ij,kj->k", J[i], P[np.ix_(index, index)], J[i])
                 for i, index in enumerate(map(curve_index, "fr"))
@@ -709,25 +647,6 @@ _LAST: deque[tuple[tuple[Any, ...], tuple[int, ...], LateralVelocity]] = deque(m
 _OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
 
 
-@cache
-def _units_fit(ladder: tuple[float, ...], reach: float) -> tuple[Array, Array]:
-    """Return slips (k,) and what makes unit weights of forces there, (n, k)."""
-    slip = np.concatenate([np.linspace(0.0, reach, 120)[1:], np.linspace(reach, CHOSEN.widest, 60)])
-    weight = np.where(slip <= reach, 1.0, CHOSEN.model_beyond)
-    T = unit_matrix(slip, ladder)
-    damped = np.vstack([T * weight[:, None], 1e-4 * np.eye(len(ladder))])
-    pseudo: Array = np.asarray(np.linalg.pinv(damped)[:, : slip.size] * weight, dtype=np.float64)
-    return slip, pseudo
-
-
-def _curve_expression(slip: Any, numbers: Array) -> tuple[Any, Any]:
-    """Return φ and dφ/dx at a slip, as expressions."""
-    symbols, x, phi, slope = curve_symbols()
-    one = ca.Function("curve", [ca.vertcat(*symbols), x], [phi, slope])
-    phi_there, slope_there = one(ca.DM(numbers), slip)
-    return phi_there, slope_there
-
-
 @lru_cache(maxsize=4)
 def _known_slip(model: FittedModel) -> Array:
     """Return `FittedModel.known_slip`, which a verdict asks for many times."""
@@ -740,5 +659,5 @@ def _known_slip(model: FittedModel) -> Array:
 
 @lru_cache(maxsize=4)
 def _covariance_before(model: FittedModel) -> Array:
-    """Return the covariance of the beliefs about a model's car, (p, p)."""
+    """Return `FittedModel.covariance_before`, which a verdict asks for many times, too."""
     return Priors.of(model.vehicle).covariance

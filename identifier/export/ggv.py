@@ -19,10 +19,12 @@ from codegen.arrays import Array
 from codegen.escape import visible
 from identifier.band import LEVEL, Band, normal_quantile
 from identifier.estimate.priors import Priors
+from identifier.estimate.solve import car_numbers
 from identifier.export.chosen import CHOSEN
+from identifier.motion.model import pushed_function
 from identifier.motion.parameters import INDEX
 from identifier.tire_model import AXLES, TireModel, brisk_speed, require_band
-from models.vehicle import GRAVITY, LIGHTEST
+from models.vehicle import GRAVITY, Vehicle
 
 NUMBERS = ("load_transfer", "braking_f", "braking_r", "driving_f", "driving_r")
 
@@ -48,15 +50,14 @@ def limits(model: TireModel) -> Limits:
     priors, index = Priors.of(car), [INDEX[name] for name in NUMBERS]
     mean, covariance = drives.lengthwise or (priors.mean, priors.covariance)
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    ends = (mean + normal_quantile(LEVEL) * sd)[index]
-    transfer = ends[0] * car.wheelbase * np.array([-1.0 / car.l_r, 1.0 / car.l_f])
+    p = mean.copy()
+    p[index] = (mean + normal_quantile(LEVEL) * sd)[index]
     top = brisk_speed(car, model.min_speed) if drives.speeds is None else float(drives.speeds[1])
     v_x = np.linspace(0.0, top, CHOSEN.speeds)
-    pressed = car.load_ratio(v_x)
-    a_y = (grip * pressed).min(axis=1)
+    a_y = (grip * car.load_ratio(v_x)).min(axis=1)
     sides = [
-        [_side(*at, sign * transfer, grip, use) for at in zip(a_y, pressed, strict=True)]
-        for sign, use in ((-1.0, ends[1:3]), (1.0, ends[3:]))
+        [_side(car, p, grip, *at, sign) for at in zip(v_x, a_y, strict=True)]
+        for sign in (-1.0, 1.0)
     ]
     return Limits(v_x, *(GRAVITY * np.array([a_y, *sides])))
 
@@ -71,17 +72,19 @@ def _lowest_grip(band: Band[Any], i: int, known: float) -> float:
     return low / float(model.vehicle.axle_loads[i])
 
 
-def _side(a_y: float, pressed: Array, transfer: Array, grip: Array, use: Array) -> float:
+def _side(car: Vehicle, p: Array, grip: Array, v_x: float, a_y: float, sign: float) -> float:
     """Return the largest push of the diamond on one side [weights].
 
-    a_y : without a push [weights].   pressed : load over the static one (2,).   transfer : what a
-    push of a weight adds to it (2,).   grip : φ_i (2,).   use : c_i (2,).
+    p : numbers of the forward model.   grip : φ_i (2,).   a_y : without a push [weights].
+    sign : 1 where the tires drive, -1 where they brake.
     """
+    use = p[[INDEX[f"{'driving' if sign > 0.0 else 'braking'}_{axle}"] for axle in "fr"]]
     most = min(a_y, 1.0 / max(float(use.max()), 1e-9))
-    f = np.linspace(0.0, most, CHOSEN.pushes + 1)[1:, None]
-    load = np.maximum(pressed + transfer * f, LIGHTEST)
-    left = (grip * load * np.sqrt(np.maximum(1.0 - (use * f) ** 2, 0.0))).min(axis=1)
-    return min(most, float((f[:, 0] / np.maximum(1.0 - left / a_y, 1e-9)).min()))
+    f = np.linspace(0.0, most, CHOSEN.pushes + 1)[1:]
+    a_x = sign * GRAVITY * f - car.drag * v_x**2
+    pushed = np.array(pushed_function()(p, car_numbers(car), a_x[None], v_x)).T
+    left = (grip * pushed).min(axis=1)
+    return min(most, float((f / np.maximum(1.0 - left / a_y, 1e-9)).min()))
 
 
 def ggv_text(model: TireModel) -> str:

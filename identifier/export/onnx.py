@@ -9,12 +9,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
+from codegen.clean_c import recognized
+from codegen.elementary import atan
 from codegen.errors import TireidError
 from codegen.escape import visible
+from codegen.graph import BUILDERS, function_of, graph_of
 from identifier.axle.band import FLOOR, RELATIVE, root
 from identifier.axle.band_step import LEAST_BEFORE, hinges
 from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
@@ -22,10 +26,13 @@ from identifier.axle.model import AxleModel
 from identifier.band import LEVEL, normal_quantile
 from identifier.estimate.model import FittedModel
 from identifier.export.specialize import INPUTS, Signal
+from identifier.motion.model import curve_function
+from identifier.motion.parameters import INDEX, curve_index
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.extras import needs
 from models.files import write_atomically
+from models.vehicle import Vehicle
 
 
 class MissingOnnxError(TireidError, ImportError):
@@ -169,7 +176,8 @@ def _network(model: NetworkModel, *, single: bool) -> bytes:
     )
 
 
-# The axle model's static force curve: F_i = load_i Σ_j w_ij tanh(α_i/α_j).
+# The static force curve: of an axle model F_i = load_i Σ_j w_ij tanh(α_i/α_j), of a fit the curve
+# of `identifier.motion.model`, operator by operator.
 #
 # What the whole model adds, the lag of slip and the sway of the body, has a state and stays out.
 # So does downforce, which needs a speed: its κ are given as metadata, F times 1 + κ v_x².
@@ -188,7 +196,11 @@ def _curves(model: AxleModel, *, single: bool, add_band: _AddBand | None) -> byt
         graph.node("MatMul", units, graph.number(load * weights[:, None]), result=force.name)
         if add_band is not None:
             add_band(graph, axle, units)
-    car, loads, more = model.vehicle, "", {}
+    return _content_of_curves(graph, model.vehicle, single=single, with_band=add_band is not None)
+
+
+def _content_of_curves(graph: _Graph, car: Vehicle, *, single: bool, with_band: bool) -> bytes:
+    loads, more = "", {}
     if car.has_downforce:
         loads = " under static loads, at v_x times 1 + downforce v_x^2"
         keys = ("downforce_front_s2_m2", "downforce_rear_s2_m2")
@@ -196,11 +208,54 @@ def _curves(model: AxleModel, *, single: bool, add_band: _AddBand | None) -> byt
     return graph.content(
         "axle_force_curves",
         _SLIPS,
-        _FORCES if add_band is None else (*_FORCES, *_HALF_BANDS),
+        (*_FORCES, *_HALF_BANDS) if with_band else _FORCES,
         f"Static axle force over slip angle of {visible(car.name)}{loads}; {_SLIP_SIGN}",
         {"vehicle": visible(car.name), **more},
         single=single,
     )
+
+
+def _fitted_curves(model: FittedModel, *, single: bool, with_band: bool) -> bytes:
+    """Return the static curves of a fit, as those of `_curves`."""
+    graph, x = _Graph(), ca.SX.sym("x")
+    for i, axle in enumerate("fr"):
+        found = curve_function()(ca.DM(model.curve_numbers(axle)), x)
+        at_slip = ca.Function("curve", [x], found[: 3 if with_band else 1])
+        phi, *slopes = _written(graph, at_slip, _SLIPS[i].name)
+        load = graph.number(model.vehicle.axle_loads[i])
+        graph.node("Mul", phi, load, result=_FORCES[i].name)
+        if with_band:
+            _band_of_fit(model, graph, i, phi, *slopes)
+    return _content_of_curves(graph, model.vehicle, single=single, with_band=with_band)
+
+
+# No runtime has an Atan of double: our own is made of the others.
+_BUILDERS = {**BUILDERS, "tanh": ca.tanh, "exp": ca.exp, "atan": atan}
+_OPERATORS = {
+    "add": "Add", "sub": "Sub", "mul": "Mul", "div": "Div", "neg": "Neg", "inv": "Reciprocal",
+    "tanh": "Tanh", "exp": "Exp", "sin": "Sin", "cos": "Cos", "sqrt": "Sqrt", "lt": "Less",
+    "select": "Where",
+}  # fmt: skip
+
+
+def _written(graph: _Graph, function: ca.Function, argument: str) -> list[str]:
+    """Add the operators of an SX function of a scalar; return the names of its results."""
+    plain = function_of(graph_of(function), function, _BUILDERS)
+    scalars, names = recognized(graph_of(plain), whole=False), dict[int, str]()
+    for place in scalars.reached():
+        node = scalars.nodes[place]
+        given = [names[a] for a in node.args]
+        if node.op == "const":
+            names[place] = graph.number(node.value)
+        elif node.op == "input":
+            names[place] = argument
+        elif node.op == "sq":
+            names[place] = graph.square(*given)
+        elif node.op == "twice":
+            names[place] = graph.node("Add", *given, *given)
+        else:
+            names[place] = graph.node(_OPERATORS[node.op], *given)
+    return [names[place] for entries in scalars.outputs for place in entries]
 
 
 def _sensitivity(graph: _Graph, model: AxleModel, axle: int, units: str, speed: float) -> str:
@@ -212,25 +267,33 @@ def _sensitivity(graph: _Graph, model: AxleModel, axle: int, units: str, speed: 
     return graph.node("Concat<axis = 1>", units, slope)
 
 
-def _variance(graph: _Graph, model: AxleModel, h: str, P: Array) -> str:
-    """Return h' P h of weights and the zero of the slip.   P : of an axle (n + 3, n + 3)."""
-    n = len(model.ladder)
-    learnt = [*range(n), n + 2]
-    by = root(P[np.ix_(learnt, learnt)])
+def _square_of(graph: _Graph, h: str, P: Array, index: list[int]) -> str:
+    """Return h' P h, (batch, 1).   index : of the rows of P that h is of."""
+    by = root(P[np.ix_(index, index)])
     product = graph.node("MatMul", h, graph.number(by))
     return graph.node("MatMul", graph.square(product), graph.number(np.ones((by.shape[1], 1))))
 
 
-def _band_of_fit(source: FittedModel, graph: _Graph, axle: int, units: str) -> None:
-    """Add half the width of the band of an axle, as of a fit; arguments as of `_band_of_axle`."""
-    model, node, number = source.in_units(), graph.node, graph.number
-    load = model.vehicle.axle_loads[axle]
-    h = _sensitivity(graph, model, axle, units, float(source.speeds.mean()))
-    left = _variance(graph, model, h, model.covariance[axle])
-    share = node("Mul", _FORCES[axle].name, number(source.band.error_share[axle] / load))
-    own = node("Add", graph.square(share), number(source.band.error_floor[axle] ** 2))
-    sd, size = node("Sqrt", node("Add", left, own)), number(load * normal_quantile(LEVEL))
-    node("Mul", sd, size, result=_HALF_BANDS[axle].name)
+def _band_of_fit(
+    model: FittedModel, graph: _Graph, i: int, phi: str, slope: str, *numbers: str
+) -> None:
+    """Add half the width of the band of an axle, as of a fit at the speed of its drives.
+    i : 0 in front, 1 at the rear.   phi, slope, numbers : names of φ [static loads], of dφ/dx and
+        of the slopes of φ over the numbers of its curve, (batch, 1).
+    """
+    node, number, band = graph.node, graph.number, model.band
+    index, P = curve_index("fr"[i]), model.covariance
+    shares = {"steering_zero": 1.0 - i, "v_y_bias": 1.0 / model.speeds.mean(), "v_y_angle": 1.0}
+    columns = dict(zip(index, numbers, strict=True)) | {
+        INDEX[name]: node("Mul", slope, number(share)) for name, share in shares.items()
+    }
+    moves = [k for k in columns if P[k, k] > 0.0]
+    h = node("Concat<axis = 1>", *(columns[k] for k in moves))
+    left = _square_of(graph, h, P, moves)
+    own = graph.square(node("Mul", phi, number(band.error_share[i])))
+    total = node("Add", left, node("Add", own, number(band.error_floor[i] ** 2)))
+    size = number(model.vehicle.axle_loads[i] * normal_quantile(LEVEL))
+    node("Mul", node("Sqrt", total), size, result=_HALF_BANDS[i].name)
 
 
 def _band_of_axle(model: AxleModel, graph: _Graph, axle: int, units: str) -> None:
@@ -240,9 +303,10 @@ def _band_of_axle(model: AxleModel, graph: _Graph, axle: int, units: str) -> Non
     node, number = graph.node, graph.number
     load, calibration = model.vehicle.axle_loads[axle], model.band.calibration
     speed = calibration.speed
-    h = _sensitivity(graph, model, axle, units, speed)
+    n, h = len(model.ladder), _sensitivity(graph, model, axle, units, speed)
+    learnt = [*range(n), n + 2]  # weights and the zero of the slip
     left, before = (
-        _variance(graph, model, h, P[axle]) for P in (model.covariance, model.prior_covariance)
+        _square_of(graph, h, P[axle], learnt) for P in (model.covariance, model.prior_covariance)
     )
     before = node("Max", before, number(LEAST_BEFORE))
     share = node("Min", node("Div", left, before), number(1.0))
@@ -271,16 +335,14 @@ def _band_of_axle(model: AxleModel, graph: _Graph, axle: int, units: str) -> Non
 
 def onnx_bytes(model: TireModel, *, single: bool = False, with_band: bool = False) -> bytes:
     """Return a frozen model as the content of an ONNX file; the same model gives the same bytes.
-    model : the whole model for a network, the static force curves for an axle model and, in hidden
-        units, for a fit.
+    model : the whole model for a network, the static force curves for an axle model and a fit.
     single : whether numbers are float32; else they are float64.
     """
     if isinstance(model, AxleModel):
         band = partial(_band_of_axle, model) if with_band else None
         return _curves(model, single=single, add_band=band)
     if isinstance(model, FittedModel):
-        band = partial(_band_of_fit, model) if with_band else None
-        return _curves(model.in_units(), single=single, add_band=band)
+        return _fitted_curves(model, single=single, with_band=with_band)
     name = type(model).__name__
     if not isinstance(model, NetworkModel):
         raise NoOnnxError(f"{name} has no ONNX form, only networks and axle curves do")

@@ -17,7 +17,7 @@ from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.design import AxleIdentifier, curve_boxes, curve_tracks, resumed_units
 from identifier.axle.gate import Plausibility
 from identifier.axle.learning import Bounds, inward, rising_shares
-from identifier.axle.model import EXACT, AxleModel
+from identifier.axle.model import EXACT, AxleModel, begun
 from identifier.axle.prior import Prior
 from identifier.axle.slip import Sensors, Sway
 from identifier.estimate.model import FittedModel
@@ -121,7 +121,7 @@ class InertialIdentifier(Method):
         """Return the design for a car whose tires are known: it begins with the model.
         dt : sampling interval [s].
         """
-        usual, tires = cls.for_vehicle(vehicle, dt=dt), model.in_units(LADDER)
+        usual, tires = cls.for_vehicle(vehicle, dt=dt), begun(model)
         share = max(float(tires.sway_share.mean()), CHOSEN.least_share)
         return replace(
             usual,
@@ -153,7 +153,7 @@ class InertialIdentifier(Method):
         if isinstance(model, FittedModel):
             return cls.holding(model, vehicle, dt=dt), model
         usual = cls.for_vehicle(vehicle, dt=dt)
-        tires = None if model is None else model.in_units(usual.ladder)
+        tires = None if model is None else begun(model, usual.ladder)
         if not isinstance(tires, AxleModel) or tires.ladder != usual.ladder:
             return usual, None
         return replace(usual, sensors=tires.sensors), model

@@ -32,7 +32,7 @@ from identifier.axle.car import step_function, symbols
 from identifier.axle.gate import GateState, Plausibility, gate
 from identifier.axle.slip import SHORTEST
 from identifier.motion.chosen import CHOSEN
-from identifier.motion.parameters import INDEX, NAMES, SLIPS
+from identifier.motion.parameters import NAMES, SLIPS, curve_names
 from models.vehicle import GRAVITY, LIGHTEST
 
 # Slopes over all parameters are thousands of lines: to optimize them further takes the compiler
@@ -250,16 +250,6 @@ def _sway(at: _At, v_x: _Dual, r: _Dual) -> tuple[dict[str, _Dual], _Dual]:
     return {"rate": rate, "rho": rho}, slip
 
 
-def curve_symbols() -> tuple[list[Any], Any, Any, Any]:
-    """Return the numbers of a curve, a slip, and there φ and dφ/dx, as CasADi symbols.
-
-    The numbers are ln C, ln μ, c, E, q (4) and ln m, (9,); forces in static axle loads.
-    """
-    names = ("lnC", "lnmu", "c", "E", *(f"q{j}" for j in range(len(SLIPS))), "lnm")
-    numbers, x = [ca.SX.sym(name) for name in names], ca.SX.sym("x")
-    return numbers, x, *_curve(*numbers, x)
-
-
 def _curve(ln_C: Any, ln_mu: Any, c: Any, E: Any, *others: Any) -> tuple[Any, Any]:
     """Return φ and dφ/dx.   others : q (4), ln m, and the slip x."""
     *q, ln_m, x = others
@@ -307,23 +297,24 @@ def load_and_ellipse(
     return least, ca.sqrt(ca.fmax(1 - use**2, CHOSEN.least_grip))
 
 
-def curve_names(axle: str) -> list[str]:
-    """Return the numbers of `curve_symbols` of an axle but for the road, (8,)."""
-    names = ["ln_stiffness", "ln_grip", "shape", "curvature"]
-    return [f"{name}_{axle}" for name in (*names, *(f"residual{j}" for j in range(len(SLIPS))))]
-
-
 @cache
-def curve_index(axle: str) -> list[int]:
-    """Return where the numbers of `curve_symbols` of an axle stand among the parameters, (9,)."""
-    return [INDEX[name] for name in (*curve_names(axle), "ln_road")]
+def pushed_function() -> ca.Function:
+    """Return (parameters (p,), car (7,), a_x, v_x) -> λ G of both axles, (2,)."""
+    ports, s = symbols(parameters=len(NAMES), car=CarNumbers, a_x=1, v_x=1)
+    p = _by_name(NAMES, s.parameters)
+    both = [
+        load_and_ellipse(axle, s.car, [p[name] for name in pushed_names(axle)], s.a_x, s.v_x)
+        for axle in "fr"
+    ]
+    product = ca.vertcat(*(load * left for load, left in both))
+    return ca.Function("pushed", list(ports.values()), [product])
 
 
 @cache
 def curve_function() -> ca.Function:
-    """Return (numbers (9,), slip) -> φ, dφ/dx, ∂φ/∂numbers (9,)."""
-    numbers, x, phi, slope = curve_symbols()
-    vector = ca.vertcat(*numbers)
+    """Return (numbers (9,), slip) -> φ, dφ/dx, ∂φ/∂numbers (9,); forces in static axle loads."""
+    vector, x = ca.SX.sym("numbers", 5 + len(SLIPS)), ca.SX.sym("x")
+    phi, slope = _curve(*ca.vertsplit(vector), x)
     gradient = ca.densify(ca.jacobian(phi, vector)).T
     return ca.Function("curve", [vector, x], [phi, slope, gradient])
 

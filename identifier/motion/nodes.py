@@ -23,11 +23,10 @@ from identifier.motion.model import (
     CarNumbers,
     Columns,
     carcass_curve,
-    curve_names,
     load_and_ellipse,
     pushed_names,
 )
-from identifier.motion.parameters import NAMES
+from identifier.motion.parameters import NAMES, curve_names
 from models.vehicle import GRAVITY
 
 STATES = ("v_y", "r", "x_f", "x_r", "e_f", "e_r", "bank", "bank_rate")

@@ -3,6 +3,7 @@
 Axles are `_f` and `_r`. Forces are in static axle loads, so that one prior serves every car.
 """
 
+from functools import cache
 from typing import NamedTuple
 
 SLIPS = (0.01, 0.02, 0.05, 0.12)  # a_j [rad], of what the Magic Formula misses
@@ -58,3 +59,18 @@ PARAMETERS: tuple[Parameter, ...] = (
 )
 NAMES = tuple(parameter.name for parameter in PARAMETERS)
 INDEX = {name: i for i, name in enumerate(NAMES)}
+
+
+def curve_names(axle: str) -> list[str]:
+    """Return the numbers of a curve of an axle but for the road, (8,)."""
+    names = ["ln_stiffness", "ln_grip", "shape", "curvature"]
+    return [f"{name}_{axle}" for name in (*names, *(f"residual{j}" for j in range(len(SLIPS))))]
+
+
+@cache
+def curve_index(axle: str) -> list[int]:
+    """Return where the numbers of a curve of an axle stand among the parameters, (9,).
+
+    They are ln C, ln μ, c, E, q (4) and ln m of the road.
+    """
+    return [INDEX[name] for name in (*curve_names(axle), "ln_road")]

@@ -16,7 +16,7 @@
 #include "tireid_mpc_caution.h"
 
 #include "tireid_mpc_equations.h"
-#include "tireid_mpc_iteration.h"
+#include "tireid_mpc_numbers.h"
 
 #define N TIREID_MPC_HORIZON
 #define NX TIREID_MPC_STATES

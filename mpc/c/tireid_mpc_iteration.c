@@ -5,46 +5,18 @@
 
 #include "tireid_mpc_caution.h"
 #include "tireid_mpc_equations.h"
+#include "tireid_mpc_numbers.h"
 #include "tireid_mpc_qp.h"
 
 #define N TIREID_MPC_HORIZON
 #define NX TIREID_MPC_STATES
 #define STEERING 4U /* place of the angle among the states */
-#define MOST                                                                                       \
-    TIREID_MPC_C(1e12) /* of a number that is carried: what is computed of it does not overflow */
 #define FRESH ((N + 2U) / 3U)          /* stages linearized anew where the others are prepared */
 #define FEW_PRESSED (N / 2U)           /* stages, so few that the plan's limits are believed */
 #define NEARLY_TURN TIREID_MPC_C(0.1)  /* lateral acceleration of a road [m/s^2] that is the same */
 #define NEARLY_SPEED TIREID_MPC_C(0.1) /* [m/s] */
 
 #define real tireid_mpc_real
-
-bool tireid_mpc_finite(real x)
-{
-    const real difference = x - x;
-    return (difference <= TIREID_MPC_C(0.0)) && (difference >= TIREID_MPC_C(0.0));
-}
-
-real tireid_mpc_clipped(real x, real limit)
-{
-    const real low = (x > limit) ? limit : x;
-    return (low < -limit) ? -limit : low;
-}
-
-bool tireid_mpc_within(real x, real limit)
-{
-    return (x <= limit) && (x >= -limit);
-}
-
-bool tireid_mpc_carriable(const real *x, uint32_t n)
-{
-    uint32_t beyond = 0U;
-    uint32_t i;
-    for (i = 0U; i < n; i++) {
-        beyond += tireid_mpc_within(x[i], MOST) ? 0U : 1U;
-    }
-    return beyond == 0U;
-}
 
 void tireid_mpc_clear(tireid_mpc_state *state)
 {

@@ -13,7 +13,7 @@
 
 #include "tireid_mpc_active.h"
 #include "tireid_mpc_equations.h"
-#include "tireid_mpc_iteration.h"
+#include "tireid_mpc_numbers.h"
 #include "tireid_mpc_riccati.h"
 
 #define N TIREID_MPC_HORIZON

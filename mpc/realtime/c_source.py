@@ -25,16 +25,17 @@ PREFIX = "tireid_mpc"  # of the C as it lies there
 PLACES: Mapping[str, str] = {
     "tireid_mpc.h": "include", "tireid_mpc_equations.h": "src", "tireid_mpc_qp.h": "src",
     "tireid_mpc_riccati.h": "src", "tireid_mpc_active.h": "src", "tireid_mpc_iteration.h": "src",
-    "tireid_mpc_caution.h": "src", "tireid_mpc_riccati.c": "src", "tireid_mpc_active.c": "src",
-    "tireid_mpc_qp.c": "src", "tireid_mpc_caution.c": "src", "tireid_mpc_iteration.c": "src",
-    "tireid_mpc.c": "src",
+    "tireid_mpc_caution.h": "src", "tireid_mpc_numbers.h": "src", "tireid_mpc_numbers.c": "src",
+    "tireid_mpc_riccati.c": "src", "tireid_mpc_active.c": "src", "tireid_mpc_qp.c": "src",
+    "tireid_mpc_caution.c": "src", "tireid_mpc_iteration.c": "src", "tireid_mpc.c": "src",
 }  # fmt: skip
 # Of the tracker as one file, headers first.
 ORDER = (
     *("include/{}_config.h", "include/{}.h"),
     *("src/{}_equations.h", "src/{}_qp.h", "src/{}_riccati.h", "src/{}_active.h"),
-    *("src/{}_iteration.h", "src/{}_caution.h", "src/{}_equations.c", "src/{}_riccati.c"),
-    *("src/{}_active.c", "src/{}_qp.c", "src/{}_caution.c", "src/{}_iteration.c", "src/{}.c"),
+    *("src/{}_iteration.h", "src/{}_caution.h", "src/{}_numbers.h", "src/{}_equations.c"),
+    *("src/{}_numbers.c", "src/{}_riccati.c", "src/{}_active.c", "src/{}_qp.c"),
+    *("src/{}_caution.c", "src/{}_iteration.c", "src/{}.c"),
 )
 READ: Mapping[str, str] = {
     "x": "x[{}]", "u": "u", "kappa": "kappa", "v_x": "v_x", "dt": "params->stage_time",

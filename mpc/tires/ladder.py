@@ -15,7 +15,6 @@ from codegen.errors import TireidError
 from identifier.axle.dynamics import series_compliance
 from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
-from identifier.estimate.model import FittedModel
 from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
@@ -167,14 +166,6 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     pressed = model.vehicle.has_downforce
     structure = LadderAxles(units=ladder.size, pressed=pressed, mounted=mounted)
     return PredictionTire(structure, weights, model.vehicle, doubt)
-
-
-def fit_tire(model: FittedModel) -> PredictionTire:
-    """Return the prediction tire of a fit: its curves in hidden units, read by its sensors.
-    model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out.
-    """
-    doubt = model.band.half(CHOSEN.doubt_step * np.arange(CHOSEN.n_doubts, dtype=np.float64)).T
-    return axle_tire(model.in_units())._replace(doubt=doubt)
 
 
 def _downforce(vehicle: Vehicle) -> tuple[float, ...]:

@@ -186,40 +186,31 @@ def curve_slopes(tire: PredictionTire) -> Array:
     return np.array(_slopes(tire.structure)(SLIPS[None], tire.car, tire.weights))
 
 
-def believed_force(
+def believed(
     structure: TireStructure, slip: Pair, at: Point, max_slip: Any, rise: Any, grip: Any
-) -> Any:
-    """Return the axle forces that the tracker believes where friction may be another [N], (2,).
+) -> tuple[Any, Pair]:
+    """Return the axle forces [N], (2,), and relaxation lengths [m] that the tracker believes.
 
+    Beyond the slip that is of use the lag stays that of its edge.
     slip : what makes the force [rad].
     max_slip : slip up to which its curves are believed [rad], (2,).
     rise : slope beyond [N/rad], (2,).
     grip : friction over the one that the weights have [-]; not looked at where the structure offers
-    no other.
+        no other.
     """
     there = structure.similar(at, grip)
     if there is None:
-        return _extrapolated_force(structure, slip, at, max_slip, rise)
-    per_grip = 1 / grip
-    shared = slip[0] * per_grip, slip[1] * per_grip
-    return grip * _extrapolated_force(structure, shared, there, max_slip, rise)
-
-
-def _extrapolated_force(
-    structure: TireStructure, slip: Pair, at: Point, max_slip: Any, rise: Any
-) -> Any:
-    """Return the axle forces that the tracker believes [N], (2,).
-    slip : what makes the force [rad].
-    max_slip : slip up to which its curves are believed [rad], (2,).
-    rise : slope beyond [N/rad], (2,).
-    """
-    x = ca.SX.sym("x", 2)
-    curves = ca.vertcat(*structure.force((x[0], x[1]), at))
-    alpha = ca.vertcat(*slip)
+        there, grip = at, 1
+    x, alpha = ca.SX.sym("x", 2), ca.vertcat(*slip) * (1 / grip)
+    curves = ca.vertcat(*structure.force((x[0], x[1]), there))
+    lengths = ca.SX(ca.vertcat(*structure.lag_length((x[0], x[1]), there)))
     if ca.is_linear(curves, x):  # goes on as it is
-        return ca.substitute(curves, x, alpha)
-    inside = ca.fmin(ca.fmax(alpha, -max_slip), max_slip)
-    return ca.substitute(curves, x, inside) + rise * (alpha - inside)
+        inside = alpha
+    else:
+        inside = ca.fmin(ca.fmax(alpha, -max_slip), max_slip)
+        curves += rise * (alpha - inside)
+    force, lengths = ca.substitute([curves, lengths], [x], [inside])
+    return grip * force, (lengths[0], lengths[1])
 
 
 def _useful(slopes: Array) -> Array:

@@ -43,7 +43,7 @@ def test_nothing_is_found(name, package_of, tmp_path):
     ("name", "file", "pattern", "replacement", "complaint"),
     [
         ("tracker/axle", "src/tireid_mpc.c", r"!is_number\(in\)", "false", "BROKEN|runtime error"),
-        ("tracker/axle", "src/tireid_mpc_iteration.c", r"beyond == 0U", "true", "BROKEN|runtime"),
+        ("tracker/axle", "src/tireid_mpc_numbers.c", r"beyond == 0U", "true", "BROKEN|runtime"),
         (
             "identifier/axle",
             "src/tireid.c",

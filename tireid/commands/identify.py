@@ -124,7 +124,7 @@ def run(options: argparse.Namespace) -> int:
         write_identify_report(folder, found, figures, diagnosis, options.words)
         given = (
             found.table(),
-            _closing_line(learnt, last, vehicle, resumed=start is not None),
+            _closing_line(learnt, last, vehicle),
             doctor_text(diagnosis, repair, options.repair),
             verdicts_text(asked, "replayed on"),
             verdict_text(verdict),

@@ -8,7 +8,7 @@ import numpy as np
 
 from codegen import find_compiler
 from identifier.axle import AxleIdentifier, AxleModel
-from identifier.axle.curve import LADDER
+from identifier.axle.model import begun
 from identifier.inertial import InertialIdentifier
 from identifier.methods import continuing
 from identifier.run import OnlineIdentifier
@@ -101,7 +101,7 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
 
     v_y is there, measured or estimated: what was learnt without it goes on by the axle identifier.
     """
-    learnt = learnt.in_units(LADDER)
+    learnt = begun(learnt)
     try:
         method = continuing(learnt, vehicle, CHOSEN.period)
     except ValueError as error:
@@ -211,7 +211,7 @@ def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> Prediction
     if label == ORACLE:
         return setup.oracle()
     assert learnt is not None
-    return prediction_tire(learnt.in_units(LADDER) if label == LEARNING else learnt, setup.vehicle)
+    return prediction_tire(begun(learnt) if label == LEARNING else learnt, setup.vehicle)
 
 
 def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> Run:

@@ -54,17 +54,15 @@ def test_sample_by_sample_it_says_what_it_says_of_the_drive(learnt):
 
 
 def test_braking_takes_of_the_lateral_force_and_shifts_load(learnt):
-    model = learnt.model
-    coasts, f = model.ratio(np.array([0.1]), np.zeros(1))[0], 5.0 / 9.81  # without drag
-    np.testing.assert_allclose(coasts, 1.0, atol=1e-6)
-    braked = model.ratio(np.array([0.1]), np.array([-5.0]))[0]
+    model, f = learnt.model, 5.0 / 9.81
+    coasts, free, braked = (model.force(0.03, v_x=0.1, a_x=a) for a in (None, 0.0, -5.0))
+    np.testing.assert_allclose(free, coasts, rtol=1e-6)  # without drag
     transfer = model["load_transfer"] * model.vehicle.wheelbase * f
     used = np.array([model["braking_f"], model["braking_r"]]) * f
     load = 1.0 + transfer * np.array([1.0 / model.vehicle.l_r, -1.0 / model.vehicle.l_f])
     expected = load * np.sqrt(np.maximum(1.0 - used**2, 0.05))
-    np.testing.assert_allclose(braked, expected, rtol=1e-3)
-    alone, with_a_x = (model.force(0.03, "front", v_x=0.1, a_x=a) for a in (0.0, -5.0))
-    assert with_a_x == pytest.approx(alone * braked[0], rel=1e-3)
+    np.testing.assert_allclose(braked / coasts, expected, rtol=1e-3)
+    assert model.force(0.03, "front", v_x=0.1, a_x=-5.0) == braked[0]
 
 
 def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):

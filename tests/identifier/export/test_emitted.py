@@ -8,14 +8,17 @@ from datetime import date
 import numpy as np
 import pytest
 
+from identifier.axle.model import begun
 from identifier.band import normal_quantile
 from identifier.estimate.model import FittedModel
 from identifier.estimate.priors import Priors
+from identifier.estimate.solve import car_numbers
 from identifier.export.ggv import ggv_text, limits
 from identifier.export.slipx import slipx_files
 from identifier.export.tir import tire_properties
 from identifier.export.understeer import understeer_gradient
 from identifier.methods import make_method
+from identifier.motion.model import pushed_function
 from identifier.motion.parameters import INDEX
 from models.tires import MagicFormula
 from models.vehicle import GRAVITY, Vehicle, sedan
@@ -83,7 +86,7 @@ def test_a_property_file_reads_back_the_axle_over_slip_and_load(tmp_path, i):
 
 def test_the_axle_identifier_and_a_network_give_property_files_too(tmp_path):
     slip = np.linspace(-0.08, 0.08, 9)
-    for model in (fitted(**TIRES).in_units(), network()):
+    for model in (begun(fitted(**TIRES)), network()):
         load = 0.5 * CAR.axle_loads[1]
         tire = read(model, "rear", tmp_path)
         pair = np.array([2.0 * float(tire.forces(a, 0.0, 0.0, load).F_y) for a in slip])
@@ -134,7 +137,7 @@ def test_limits_of_a_car_are_those_that_the_ellipse_leaves_by_hand():
     ("h", "braking_r", "driving_f"), [(0.4, 0.9, 0.8), (0.45, 0.2, 0.2), (0.1, 1.1, 1.3)]
 )
 def test_the_diamond_of_planners_lies_within_the_forces_of_the_model(h, braking_r, driving_f):
-    """All that it allows both axles can give, by `FittedModel.ratio`; of a larger one they cannot.
+    """What it allows both axles can give, by load and ellipse; of a larger one they cannot.
 
     So it is on the side that limits a_x_max; the other is as wide or wider.
     """
@@ -147,13 +150,18 @@ def test_the_diamond_of_planners_lies_within_the_forces_of_the_model(h, braking_
               for i, known in enumerate(model.known_slip)]  # fmt: skip
     peak = low * forces / PRESSED.axle_loads
     coasting = -PRESSED.drag * found.v_x**2
+
+    def pushed(a_x):
+        car = car_numbers(PRESSED)
+        return np.array(pushed_function()(model.p, car, a_x[None], found.v_x[None])).T
+
     for side, most in ((-1.0, found.braking), (1.0, found.driving)):
         spare = []
         for share in np.linspace(0.0, 0.999, 200):
-            ratio = model.ratio(found.v_x, coasting + side * share * most)
+            ratio = pushed(coasting + side * share * most)
             able = GRAVITY * (peak * ratio).min(axis=1)
             assert (found.a_y * (1.0 - share) <= 1.002 * able).all(), (side, share)
-            larger = model.ratio(found.v_x, coasting + side * share * 1.03 * most)
+            larger = pushed(coasting + side * share * 1.03 * most)
             spare.append(GRAVITY * (peak * larger).min(axis=1) - found.a_y * (1.0 - share))
         ends = 1.03 * most * (braking_r if side < 0.0 else driving_f) > GRAVITY
         assert ((np.min(spare, axis=0) < 0.0) | ends | (most > 0.999 * found.a_y)).all(), side
@@ -164,7 +172,7 @@ def test_limits_fall_with_what_is_not_known_and_models_without_a_band_have_none(
     assert (doubtful.a_y < 0.97 * sure.a_y).all()
     assert (doubtful.braking < 0.97 * sure.braking).all()
     assert (sure.a_y < 0.95 * GRAVITY * 0.85).all()  # the mean of the curves' peaks
-    assert limits(fitted(sd=0.05).in_units()).a_y[0] == pytest.approx(sure.a_y[0], rel=0.05)
+    assert limits(begun(fitted(sd=0.05))).a_y[0] == pytest.approx(sure.a_y[0], rel=0.05)
     with pytest.raises(ValueError, match="NetworkModel cannot tell how sure it is"):
         limits(network())
     with pytest.raises(ValueError, match="front axle is not known at any slip"):

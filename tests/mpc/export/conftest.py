@@ -7,11 +7,14 @@ import pytest
 from identifier.export.package import build_package
 from identifier.methods import make_method
 from models.vehicle import sedan
+from mpc.export.package import build_mpc_package
 from mpc.export.pair import build_pair
+from mpc.tires import prediction_tire
 from tests.identifier.export.conftest import STRICT as STRICT
 from tests.identifier.export.conftest import compiler as compiler
 from tests.identifier.export.conftest import put
 from tests.identifier.export.conftest import run as run
+from tests.identifier.export.test_emitted import TIRES, fitted
 from tests.kept import Kept
 
 LAWS = ("integral", "axle")
@@ -28,8 +31,16 @@ def pairs():
 
 @pytest.fixture(scope="session")
 def packages(pairs):
-    """By law, the tracker alone."""
-    return Kept(LAWS, lambda law: pairs[law].tracker)
+    """By law, the tracker alone; "fit": that of a fit's own curve."""
+
+    def tracker(law):
+        return (
+            build_mpc_package(prediction_tire(fitted(**TIRES)))
+            if law == "fit"
+            else pairs[law].tracker
+        )
+
+    return Kept((*LAWS, "fit"), tracker)
 
 
 @pytest.fixture

@@ -12,7 +12,7 @@ from mpc.problem import Limits, Problem
 from mpc.realtime import Tracker
 from mpc.tires import oracle_tire, prediction_tire
 from mpc.tires.chosen import CHOSEN as TIRES_CHOSEN
-from mpc.tires.tire import ALL, Car, Point, believed_force, valid_slip
+from mpc.tires.tire import ALL, Car, Point, believed, valid_slip
 
 CAR = sedan()
 SLIPS = np.linspace(-0.4, 0.4, 161)
@@ -23,7 +23,7 @@ def curves(tire, valid=ALL, delta=0.0):
     """Axle forces [N] over slip as they are believed, (2, k)."""
     x = ca.SX.sym("x")
     at = Point(0.0, 0.0, delta, 20.0, Car(*map(float, tire.car)), ca.SX(tire.weights))
-    force = believed_force(tire.structure, (x, x), at, *map(ca.DM, valid))
+    force, _ = believed(tire.structure, (x, x), at, *map(ca.DM, valid))
     return np.array(ca.Function("force", [x], [force])(SLIPS[None]))
 
 
@@ -68,7 +68,7 @@ def test_a_curve_goes_on_without_a_kink(oracle):
     valid, step = valid_slip(oracle, MOST), 1e-6
     x = ca.SX.sym("x", 2)
     at = Point(0.0, 0.0, 0.0, 20.0, Car(*map(float, oracle.car)), ca.SX(oracle.weights))
-    force = believed_force(oracle.structure, (x[0], x[1]), at, *map(ca.DM, valid))
+    force, _ = believed(oracle.structure, (x[0], x[1]), at, *map(ca.DM, valid))
     slope = ca.Function("slope", [x], [ca.diag(ca.jacobian(force, x))])
     below, above = (np.array(slope(valid.slip + d)).ravel() for d in (-step, step))
     np.testing.assert_allclose(above, below, rtol=1e-3)
