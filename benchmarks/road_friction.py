@@ -31,7 +31,7 @@ from models.friction import Friction, FrictionChange
 from models.plant import PlantError
 from models.recordings import Recording
 
-EACH = 10  # cars of a class
+EACH = 6  # cars of a class
 SAME, DROPS, RISES = 2, 3, 1  # drives of a car
 LESS, MORE = (0.3, 0.8), (1.25, 1.6)  # friction over that of the road that taught
 WHEN = (4.0, 12.0)  # s, of the change, which takes a tenth of a second
