@@ -191,4 +191,4 @@ KEEPINGS: Mapping[str, Callable[[Gains, Operation], Gains]] = {
         gains, rho_W=0.0, rho_V=0.0, W_max=known.W_large, V_max=known.V_start
     ),
 }
-DEFAULT_KEEPING = "projection"  # of designs that are found; measured by benchmarks/forgetting.py
+DEFAULT_KEEPING = "projection"  # of designs that are found

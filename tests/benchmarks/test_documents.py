@@ -31,14 +31,14 @@ def a_script(monkeypatch):
 def test_a_table_is_written_whole_with_its_date_and_what_it_missed():
     new = written(TEXT, {"lap": RECORD})
     assert "| lap | time [s] |\n| --- | --- |\n| first | 2.0 |\n" in new
-    assert "Recorded 2026-01-02 by `benchmarks/lap.py`. Targets missed: time (<= 1 s)." in new
+    assert "`lap.py`, 2026-01-02. Targets missed: time (<= 1 s)." in new
     assert "old" not in new and new.endswith("<!-- end -->\n\nMore.\n")
     assert written(new, {"lap": RECORD}) == new
 
 
 def test_a_table_says_that_its_record_is_older_than_the_code_or_that_there_is_none():
     older = written(TEXT, {"lap": RECORD | {"code": "other"}})
-    assert "by `benchmarks/lap.py`; **the code has changed since**." in older
+    assert "`lap.py`, 2026-01-02; **the code has changed since**." in older
     assert "Not recorded yet: `python -m benchmarks.run_all --record --only lap`." in written(
         TEXT, {}
     )
@@ -63,7 +63,7 @@ def test_every_record_is_of_a_script_and_every_table_of_a_document_has_one():
         text = path.read_text(encoding="utf-8")
         named |= {name.partition("/")[0] for name in re.findall(r"<!-- table ([\w/]+) -->", text)}
         assert text.count("<!-- table ") == len(documents.PLACE.findall(text)), path
-    assert named - {"summary"} == set(BENCHMARKS)
+    assert named - {"summary", "paper"} == set(BENCHMARKS)
 
 
 def test_the_tables_of_the_documents_are_those_of_the_records():
