@@ -63,8 +63,9 @@ def run(script: str, words: list[str], out: Path) -> Outcome:
     """Run one script; print what it prints and keep it in a file of OUT."""
     start, printed = time.perf_counter(), []
     command = [sys.executable, "-m", f"benchmarks.{script}", *words]
-    both = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-    with subprocess.Popen(command, cwd=ROOT, text=True, **both) as process:
+    with subprocess.Popen(
+        command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    ) as process:
         assert process.stdout is not None
         for line in process.stdout:
             print(line, end="", flush=True)
