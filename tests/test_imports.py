@@ -66,8 +66,7 @@ def circles(texts: dict[str, str]) -> list[list[str]]:
     Imports in functions and for type checkers count.
     """
     homes = {
-        name.removesuffix(".py").removesuffix("/__init__").replace("/", "."): name
-        for name in texts
+        name.removesuffix(".py").removesuffix("/__init__").replace("/", "."): name for name in texts
     }
     imports = {name: local_imports(text, homes) - {name} for name, text in texts.items()}
     number: dict[str, int] = {}
