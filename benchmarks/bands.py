@@ -90,7 +90,7 @@ def held(case: Case) -> dict[str, tuple[float, float]]:
     ----------
     case : what is identified and evaluated.
     """
-    tires = {DEFAULT: fit(case.logs, case.car).model}
+    tires: dict[str, ti.TireModel] = {DEFAULT: fit(case.logs, case.car).model}
     if len(case.logs) == 1:
         method = make_method(LIVE, case.car)
         tires[LIVE] = ti.identify(case.logs[0], case.car, method, check=False).tire
@@ -134,12 +134,12 @@ def main() -> int:
         for case, answers in zip(every, pool.map(held, every), strict=True):
             for name, answer in answers.items():
                 found[f"{case.place}/{name}"].append(answer)
-    for key, answers in found.items():
-        share, count = float(np.mean([one for one, _ in answers])), int(key[-1])
+    for key, some in found.items():
+        share, count = float(np.mean([one for one, _ in some])), int(key[-1])
         targets.at_least(f"{key}: held, mean", share, LEAST[count], key=f"{key}/held")
         if count == 2:
             targets.at_most(f"{key}: held, mean", share, MOST)
-        width = float(np.median([one for _, one in answers]))
+        width = float(np.median([one for _, one in some]))
         targets.record(f"{key}/width", width)
         show(f"{key}: half width over rms error, median", f"{width:.2f}")
     return targets.finish(keep=options.record and DATA.is_dir())

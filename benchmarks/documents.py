@@ -8,7 +8,8 @@ A document has a table where it says so:
 What stands between is written anew: the table that `tables` of benchmarks/estimate.py makes of the
 record in benchmarks/results, and a line that says when and by which command it was recorded, what
 targets it missed, and whether the code has changed since. `<!-- table doctor/gross -->` is one of
-several tables of a script. `--check` writes nothing, and returns 1 where a document differs.
+several tables of a script; `summary` and `paper` are made here, of several records and of what a
+test computes again. `--check` writes nothing, and returns 1 where a document differs.
 """
 
 import argparse
@@ -62,6 +63,8 @@ def written(text: str, known: Mapping[str, Record]) -> str:
 
 def _block(name: str, known: Mapping[str, Record]) -> str:
     """Return what stands between the markers of a table."""
+    if name == "paper":
+        return _grid(paper())
     scripts = SUMMARY if name == "summary" else (name.partition("/")[0],)
     missing = [script for script in scripts if script not in known]
     if missing:
@@ -70,10 +73,15 @@ def _block(name: str, known: Mapping[str, Record]) -> str:
         table = summary({script: known[script]["values"] for script in scripts})
     else:
         table = _tables(scripts[0])(known[scripts[0]]["values"])[name]
-    lines = [table.header, ["---"] * len(table.header), *table.rows]
-    grid = "\n".join(f"| {' | '.join(row)} |" for row in lines)
     notes = [_state(script, known[script]) for script in scripts]
-    return f"{grid}\n\n{textwrap.fill(' '.join(notes), WIDTH, break_on_hyphens=False)}"
+    if name in scripts and (missed := "; ".join(known[name]["missed"])):
+        notes.append(f"Targets missed: {missed}.")
+    return f"{_grid(table)}\n\n{textwrap.fill(' '.join(notes), WIDTH, break_on_hyphens=False)}"
+
+
+def _grid(table: Table) -> str:
+    lines = [table.header, ["---"] * len(table.header), *table.rows]
+    return "\n".join(f"| {' | '.join(row)} |" for row in lines)
 
 
 @cache
@@ -88,12 +96,9 @@ def _code(script: str) -> str:
 
 
 def _state(script: str, record: Record) -> str:
-    """Say when and how a record was made, what it missed, and whether it is of today's code."""
-    said = f"Recorded {record['date']} by `benchmarks/{script}.py`"
-    if record["code"] != _code(script):
-        said += "; **the code has changed since**"
-    missed = "; ".join(record["missed"])
-    return f"{said}. Targets missed: {missed}." if missed else f"{said}."
+    """Say when and how a record was made, and whether it is of today's code."""
+    older = "" if record["code"] == _code(script) else "; **the code has changed since**"
+    return f"`{script}.py`, {record['date']}{older}."
 
 
 # The table of README.md takes rows of several records.
@@ -133,6 +138,25 @@ def summary(values: Mapping[str, Values]) -> Table:
 
 
 OWN = ("fit", "axle", "inertial")
+TABLES_OF_PAPER = ROOT / "tests" / "tireid" / "expected_tables.json"
+
+
+def paper() -> Table:
+    """Return Tables I and II of `tireid paper`, medians over the seeds."""
+    rows = []
+    for maneuver, laws in json.loads(TABLES_OF_PAPER.read_text(encoding="utf-8")).items():
+        for measure in laws["integral"]:
+            what = re.sub(r"^(.*)_(\d+)$", r"frozen at \2 s: \1", measure).replace("_", " ")
+            cells = [f"{laws[law][measure]['median']:.2f}" for law in LAWS]
+            rows.append([f"{maneuver.replace('_', ' ')}, {what}", *cells])
+    return Table(("RMSE [kN]", *LAWS.values()), rows)
+
+
+LAWS = {
+    "instantaneous": "instantaneous",
+    "integral": "integral",
+    "instantaneous_scaled": "instantaneous at η/λ",
+}
 
 
 def documents(root: Path = ROOT) -> list[Path]:

@@ -10,13 +10,15 @@ ends there and counts as it was until then.
 
 import sys
 from collections import defaultdict
+from collections.abc import Sequence
 from itertools import product
 
 from benchmarks.mpc_cases import Case, Score, all_driven, median_cm
 from benchmarks.targets import Table, Targets, Values, parse
 
-PATHS = ("iso-3888-2", "course")
-SHARES, FRICTIONS = (90, 97), (1.0, 0.5)  # % of the limit; -
+PATHS: Sequence[str] = ("iso-3888-2", "course")
+SHARES: Sequence[int] = (90, 97)  # % of the limit
+FRICTIONS: Sequence[float] = (1.0, 0.5)
 TIRES = ("linear", "paper", "axle", "oracle")
 SEEDS = 10
 WITHIN = 1.1  # times the rms of the tracker with the true tire

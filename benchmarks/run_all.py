@@ -62,20 +62,17 @@ def summary(outcomes: list[Outcome]) -> str:
 def run(script: str, words: list[str], out: Path) -> Outcome:
     """Run one script; print what it prints and keep it in a file of OUT."""
     start, printed = time.perf_counter(), []
-    process = subprocess.Popen(
-        [sys.executable, "-m", f"benchmarks.{script}", *words],
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    assert process.stdout is not None
-    for line in process.stdout:
-        print(line, end="", flush=True)
-        printed.append(line)
+    command = [sys.executable, "-m", f"benchmarks.{script}", *words]
+    with subprocess.Popen(
+        command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    ) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            print(line, end="", flush=True)
+            printed.append(line)
     (out / f"{script}.txt").write_text("".join(printed), encoding="utf-8")
     minutes = (time.perf_counter() - start) / 60.0
-    return outcome(script, process.wait(), "".join(printed), minutes)
+    return outcome(script, process.returncode, "".join(printed), minutes)
 
 
 def main(argv: list[str] | None = None) -> int:

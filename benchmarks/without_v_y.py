@@ -57,7 +57,7 @@ class Told:
     rms : error of side slip from the first sample [degrees].
     share : of that over side slip itself [-].
     within : share of errors of v_y within two standard deviations [%]; None without one.
-    force : frozen force error [% of the rms force], mean of both axles; None of a method without tires.
+    force : frozen force error [% of the rms force], mean of both axles; None without tires.
     """
 
     rms: float

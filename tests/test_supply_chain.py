@@ -110,7 +110,7 @@ def test_an_extra_that_names_others_asks_for_all_of_theirs():
     found = LOWEST["requirements"](project, ["b"])
     assert sorted(found) == ["one>=1", "one>=1", "two>=2", "x[y]>=3", "zero>=0"]
     asked = {name for name, _ in wanted(["test"])}
-    for extra in ("parquet", "mat", "mdf", "ros", "can", "fmu", "onnx", "cluster", "commonroad"):
+    for extra in ("parquet", "mat", "mdf", "ros", "can", "fmu", "onnx", "cluster"):
         assert {name for name, _ in wanted([extra])} <= asked
     assert LOWEST["lowest"](PROJECT, ["logs"])[0] == "casadi==3.7.0"
 

@@ -37,4 +37,4 @@ def test_a_sensor_that_fails_is_not_taken_for_ice(fault):
         plan_every=0,
     )
     assert run.completed
-    assert np.abs(run.e_y).max() < 0.5  # as benchmarks/mpc_sensor_faults.py asks
+    assert np.abs(run.e_y).max() < 0.5  # m: on its path
