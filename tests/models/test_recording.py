@@ -2,7 +2,6 @@
 
 import gzip
 import tracemalloc
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -134,12 +133,6 @@ def test_scraps_of_segments_are_left_out_and_told(kept, expected, breaks):
     assert part.notes == ((LEFT_OUT,) if scraps else ())
 
 
-def test_a_time_that_cuts_a_segment_short_leaves_it_out():
-    part = in_three().between(0.35, 99.0)
-    assert part.t[0] == pytest.approx(1.4)
-    assert part.notes == (LEFT_OUT,)
-
-
 def test_an_axle_that_rolls_without_slip_has_no_slip_angle():
     """On a circle of radius R about a point in line with the rear axle both slips vanish."""
     l_f, l_r, R, v = 1.2, 1.5, 30.0, 5.0
@@ -226,25 +219,3 @@ def test_a_long_recording_is_written_by_blocks_with_the_bytes_of_one_piece(
     tracemalloc.stop()
     assert path.read_bytes() == piece
     assert held < 0.5 * len(gzip.decompress(piece) if ending.endswith("gz") else piece)
-
-
-def test_what_somebody_may_write_is_copied_though_the_view_of_it_is_not_writable():
-    table = np.zeros((20, 2))
-    table[:, 0] = 20.0
-    view = table.view()
-    view.flags.writeable = False
-    n = len(table)
-    run = Recording(
-        name="a",
-        t=0.01 * np.arange(n),
-        v_x=view[:, 0],
-        v_y=view[:, 1],
-        r=np.zeros(n),
-        delta_f=np.zeros(n),
-        delta_r=np.zeros(n),
-    )
-    table[:] = np.nan
-    assert (run.v_x == 20.0).all() and not run.needed("v_y").any()
-    again = replace(run, name="b")
-    assert again.v_x is run.v_x  # nobody may write that one
-    assert np.shares_memory(run.taken(slice(0, 15)).v_x, run.v_x)

@@ -232,17 +232,3 @@ def test_of_a_long_log_the_hardest_part_teaches():
     part = hardest(log, 300.0)
     assert part.stop - part.start == 3000 and abs(t[part.start] - 1000.0) < 10.0
     assert hardest(log.between(0.0, 100.0), 300.0) == slice(0, len(log.between(0.0, 100.0)))
-
-
-def test_optima_are_compared_by_hubers_loss(problem, place):
-    z, p, _ = place
-    z = z.copy()
-    z[::7, 1] += 0.1  # what r shows there is far off
-    R, c = problem.R, TRUST.clip
-    weights = problem.weights(z, p, R)
-    off = (problem.nodes.measured - problem._run(problem._plain, z, p, {})["shows"])[:, :2]
-    off = np.abs(off[problem.nodes.counts]) / np.sqrt(problem.variance(R)[problem.nodes.counts, :2])
-    assert (off > c).any()
-    huber = np.where(off < c, 0.5 * off**2, c * off - 0.5 * c**2).sum()
-    nothing = {**weights, "of_shows": np.zeros_like(weights["of_shows"])}
-    assert problem.value(z, p, R) == pytest.approx(huber + problem.cost(z, p, nothing), rel=1e-9)

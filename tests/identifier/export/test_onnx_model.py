@@ -129,16 +129,6 @@ def test_a_network_in_the_sign_of_iso_8855_is_turned_round(car, drive, rng):
     assert np.array_equal(turned, OnnxModel(vehicle=car, content=paper).predict(recording))
 
 
-def test_columns_may_be_named_in_any_order(car, drive, rng):
-    recording, weights = drive(100), tire(rng)
-    plain = OnnxModel(vehicle=car, content=network_file(weights)).predict(recording)
-    swapped = network_file([weights[0][::-1], weights[1]])
-    told = OnnxModel(vehicle=car, content=swapped, inputs=("alpha_r", "alpha_f"))
-    named = network_file([weights[0][::-1], weights[1]], inputs=[("alpha_r", 1), ("alpha_f", 1)])
-    assert np.array_equal(told.predict(recording), plain)
-    assert np.array_equal(OnnxModel(vehicle=car, content=named).predict(recording), plain)
-
-
 @pytest.mark.parametrize("inputs", [None, ("alpha_r", "alpha_f")])
 def test_it_is_stored_and_read_again(car, drive, rng, tmp_path, inputs):
     recording = drive(50)

@@ -77,19 +77,6 @@ def test_side_slip_is_told_on_a_banked_road_with_an_honest_deviation(history, ba
     assert degrees(sd) < 4 * degrees(error)  # and not honest by knowing nothing
 
 
-def test_on_tires_of_an_estimate_side_slip_is_known_better_and_they_stay(estimate, history, banked):
-    method = continuing(estimate, CAR, v_y=False)
-    held = identify(as_shown(banked), CAR, method, start=estimate)
-    error, sd, _ = errors(held, banked)
-    assert degrees(error) < 0.85 * degrees(errors(history, banked)[0])
-    assert np.mean(np.abs(error) < 2 * sd) > 0.9
-    W, ladder = held.state["W"], np.array(method.ladder)
-    slope, level = (W / ladder).sum(axis=2), W.sum(axis=2)
-    assert np.abs(slope / slope[0] - 1.0).max() < 0.03
-    assert np.abs(level / level[0] - 1.0).max() < 0.15  # but for their grip
-    assert (held.state["own"] == held.state["own"][0]).all()
-
-
 def test_an_accelerometer_that_is_late_by_what_is_said_is_read_in_time(estimate, banked):
     method, shown = continuing(estimate, CAR, v_y=False), as_shown(banked)
     late = replace(shown, a_y=np.roll(shown.a_y, 6))

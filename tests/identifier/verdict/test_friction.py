@@ -9,7 +9,7 @@ from identifier.axle import AxleIdentifier
 from identifier.prediction import predict
 from identifier.run import identify
 from identifier.verdict import calibrated, judge_prediction, road_friction
-from identifier.verdict.friction import _mixed, filtered
+from identifier.verdict.friction import _mixed
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
 from models.plant import Plant
@@ -109,19 +109,6 @@ def test_the_verdict_of_a_prediction_names_the_road(tires, wetter, same):
     assert {one.code for one in slippery.findings if one.refuses} == {"force_missed"}
     assert "another_road" in [one.code for one in slippery.findings]
     assert "another_road" not in [one.code for one in judge_prediction(tires, same).findings]
-
-
-def test_a_segment_begins_where_it_is_sure_and_ends_where_it_is_not_likely():
-    """Windows of a road, of half its friction, and of the road again, without noise."""
-    grid = np.log([0.5, 1.0, 2.0])
-    t = 0.15 * np.arange(600)
-    half = (t > 30.0) & (t < 60.0)
-    away = np.full((3, t.size, 2), 0.2)
-    away[0, half], away[1, ~half] = 0.0, 0.0
-    slope, variance = np.zeros((3, t.size, 2)), np.full((t.size, 2), 0.05**2)
-    (road,) = filtered(t, grid, away, slope, variance).roads
-    assert 30.0 < road.first < 30.8 and 59.5 < road.last < 60.8
-    assert road.ratio == pytest.approx(0.5, abs=0.02)
 
 
 def test_a_road_that_begins_takes_over_what_is_known_of_the_zeros(rng):

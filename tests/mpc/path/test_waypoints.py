@@ -49,23 +49,6 @@ def test_smoothing_takes_the_noise_of_a_survey_out_of_the_curvature(rng):
     assert np.sqrt(np.mean(np.square(moved))) == pytest.approx(0.05, abs=0.01)
 
 
-def test_smoothing_leaves_an_open_path_without_noise_as_it_is(rng):
-    x = np.linspace(0.0, 60.0, 200)
-    y = 0.004 * x**2
-    plain = Path.from_waypoints(x, y)
-    smoothed = Path.from_waypoints(x, y, smoothing=0.01)
-    far = [
-        plain.project(a, b, near=s).e_y
-        for a, b, s in zip(smoothed.X, smoothed.Y, smoothed.s, strict=True)
-    ]
-    assert np.abs(far).max() < 0.05
-    noisy = Path.from_waypoints(x, y + rng.normal(0, 0.02, 200), smoothing=0.02)
-    inside = slice(40, -40)
-    assert noisy.kappa[inside] == pytest.approx(
-        np.interp(noisy.X, plain.X, plain.kappa)[inside], abs=3e-3
-    )
-
-
 @pytest.mark.parametrize("points", [5, 6, 8, 12])
 @pytest.mark.parametrize("distance", [0.05, 0.5, 5.0])
 def test_a_closed_line_of_few_points_keeps_the_distance_that_smoothing_allows(points, distance):
