@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 import pytest
@@ -126,8 +125,7 @@ def learnt(packages, slalom):
         run.run(slalom)
         return run
 
-    laws = ("axle", "inertial")
-    return Kept(product(laws, (False, True)), make)
+    return Kept(make)
 
 
 def refused(run, weights):

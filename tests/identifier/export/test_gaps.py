@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compi
 @pytest.fixture(scope="module")
 def shipped(packages):
     """By law, what a package is computed with; each test begins anew."""
-    return Kept(LAWS, lambda law: CompiledPackage.of(packages[law]))
+    return Kept(lambda law: CompiledPackage.of(packages[law]))
 
 
 def method_of(law):

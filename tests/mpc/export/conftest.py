@@ -23,13 +23,13 @@ def pairs():
     if shutil.which("gcc") is None:
         pytest.skip("needs gcc")
     car = sedan()
-    return Kept(LAWS, lambda law: build_pair(build_package(make_method(law, car), car)))
+    return Kept(lambda law: build_pair(build_package(make_method(law, car), car)))
 
 
 @pytest.fixture(scope="session")
 def packages(pairs):
     """By law, the tracker alone."""
-    return Kept(LAWS, lambda law: pairs[law].tracker)
+    return Kept(lambda law: pairs[law].tracker)
 
 
 @pytest.fixture
