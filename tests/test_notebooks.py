@@ -3,12 +3,9 @@
 import ast
 import json
 import re
-import shlex
 from pathlib import Path
 
 import pytest
-
-from tireid.cli import build_parser
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
@@ -81,29 +78,3 @@ def test_a_notebook_keeps_no_output_and_has_the_form_that_jupyter_reads(path):
         code = {"outputs", "execution_count"} if cell["cell_type"] == "code" else set()
         assert set(cell) == {"id", "cell_type", "metadata", "source"} | code
         assert not cell.get("outputs") and cell.get("execution_count") is None
-
-
-def strangers(gallery: str) -> list[str]:
-    """Commands of the gallery that there are none, and figures from folders that none writes."""
-    wrong, written = [], set()
-    shell = "\n".join(re.findall(r"^%%sh\n(.*?)^```$", gallery, re.M | re.S))
-    for line in shell.splitlines():
-        words = shlex.split(line)[1:]
-        try:
-            options = build_parser(words).parse_args(words)
-        except SystemExit:
-            wrong.append(line)
-        else:
-            written.add(str(getattr(options, "out", "")))
-    figures = re.findall(r'^Image\("(.*)"\)$', gallery, re.M)
-    assert shell and figures
-    return wrong + [name for name in figures if name.partition("/")[0] not in written]
-
-
-def test_the_gallery_shows_figures_of_commands_that_there_are(capsys):
-    gallery = (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8")
-    assert strangers(gallery) == []
-    planted = gallery.replace("tireid plan --vehicle", "tireid plan --wagon")
-    found = strangers(planted)
-    assert len(found) == 3 and found[0].startswith("tireid plan --wagon")
-    assert found[1:] == ["plan/area.png", "plan/band.png"]

@@ -12,12 +12,9 @@ from models.recordings import (
     LogMap,
     Recording,
     RecordingError,
-    Repair,
-    joined,
     read_recording,
     write_recording,
 )
-from models.vehicle import sedan
 
 N = 100
 
@@ -39,19 +36,6 @@ def test_signals_cannot_be_changed_and_do_not_follow_their_source():
     for array in (made.v_x, made.x, made.u):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
-
-
-def test_a_x_is_cut_and_joined_as_other_signals_are():
-    a_x = np.arange(N, dtype=np.float64)
-    made = recording(a_x=a_x)
-    assert np.array_equal(made.between(0.2, 0.4).a_x, a_x[20:41])
-    assert np.array_equal(made.taken(np.r_[0:20, 40:60]).a_x, np.r_[a_x[:20], a_x[40:60]])
-    assert np.array_equal(joined([made, made]).a_x, np.r_[a_x, a_x])
-    lacking = joined([made, recording(name="plain")])
-    assert lacking.a_x is None and "ax is left out, plain has none" in lacking.notes
-    assert np.array_equal(Repair(factor={"r": 2.0}).apply(made, sedan())[0].a_x, a_x)
-    with pytest.raises(RecordingError, match="a_x must be of a car"):
-        recording(a_x=np.full(N, 1e6))
 
 
 def test_x_and_u_stack_the_papers_vectors():

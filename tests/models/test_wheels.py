@@ -158,25 +158,6 @@ def test_a_long_log_is_worked_through_in_blocks_that_leave_no_trace(run, monkeyp
     assert again[1:] == whole[1:]
 
 
-@pytest.mark.parametrize(
-    ("given", "rule"),
-    [
-        ({"radius": (0.001,)}, "wheels: radius must lie between 0.01 and 2, it is 0.001"),
-        ({"radius": (0.3, float("nan"))}, "wheels: radius must lie between"),
-        ({"radius": (0.3, 0.3, 0.3)}, "one per axle or one per wheel, not 3 numbers"),
-        ({"track": (-1.5,)}, "wheels: track must lie between"),
-        ({"track": (1.5, 1.5, 1.5)}, "wheels: track must be one number or one per axle"),
-        ({"wheelbase": 0.0}, "wheels: wheelbase must lie between"),
-        ({"acceleration": float("inf")}, "wheels: acceleration must lie between"),
-        ({"driven": "left"}, "wheels: driven must be one of front, rear, all, none, not 'left'"),
-    ],
-)
-def test_what_no_wheels_have_is_refused_in_one_line(given, rule):
-    with pytest.raises(RecordingError) as caught:
-        Wheels(**given)
-    assert rule in str(caught.value) and "\n" not in str(caught.value)
-
-
 def test_each_wheel_has_its_radius():
     assert Wheels().radius_of("wheel_fl") is None
     assert Wheels(radius=(0.3,)).radius_of("wheel_rr") == 0.3

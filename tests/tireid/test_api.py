@@ -178,19 +178,6 @@ def test_a_recording_of_another_car_is_refused(log, car):
     ti.identify(log, swapped, check=False)
 
 
-def test_what_the_doctor_finds_is_logged_and_a_right_log_is_silent(log, car, caplog):
-    from dataclasses import replace
-
-    ti.identify(log, car)
-    assert [one for one in caplog.records if one.name == "tireid.doctor"] == []
-    wrong = replace(car, yaw_inertia=3.0 * car.mass * car.l_f * car.l_r)
-    found = ti.diagnose(log, wrong)
-    ti.identify(log, wrong)
-    told = [one.getMessage() for one in caplog.records if one.name == "tireid.doctor"]
-    assert told == [f"{log.name}: {one.text}" for one in found.findings]
-    assert "yaw inertia" in "".join(told)
-
-
 def columns_of(log):
     return {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
 

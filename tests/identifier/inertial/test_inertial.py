@@ -131,32 +131,6 @@ def test_what_is_told_for_observed_is_so_and_nothing_is_where_nothing_is_known(h
     assert np.isfinite(parked.outputs["v_y"]).all()
 
 
-def test_a_number_counts_once_also_where_it_is_repeated_or_settles_in_two_steps(history, banked):
-    """A sensor of 10 Hz in a log of 100 Hz has a tenth of the news; behind a filter it shows most
-    of a new number at once and the rest a step later.
-    """
-    shown = as_shown(banked)
-    held = 10 * (np.arange(len(shown)) // 10)
-    first = np.arange(len(shown)) % 10 == 0
-
-    def settling(y):
-        jump = np.diff(y[held], prepend=y[0])
-        return y[held] - 0.03 * first * jump
-
-    once = replace(shown, r=shown.r[held], a_y=shown.a_y[held])
-    twice = replace(once, r=settling(shown.r), a_y=settling(shown.a_y))
-    sds, noises = [np.median(errors(history, banked)[1])], []
-    for recording in (once, twice):
-        found = identify(recording, CAR, METHOD)
-        error, sd, _ = errors(found, banked)
-        assert np.mean(np.abs(error) < 2 * sd) > 0.8
-        sds.append(np.median(sd))
-        noises.append(found.state["readings"][-1].ravel()[4:6])
-    assert sds[1] > 1.05 * sds[0]
-    assert sds[2] == pytest.approx(sds[1], rel=0.1)
-    np.testing.assert_allclose(noises[1], noises[0], rtol=0.35)
-
-
 @pytest.mark.parametrize("tires", ["typical", "held"])
 def test_half_the_grip_is_noticed_within_half_a_second_of_sliding_and_learnt(tires, estimate):
     method, start = METHOD, None

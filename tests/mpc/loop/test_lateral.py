@@ -96,19 +96,6 @@ def test_the_acceleration_is_told_in_the_plane_of_the_road(told):
     assert gradient == pytest.approx(1.0, abs=0.015)
 
 
-def test_where_the_friction_is_another_the_position_keeps_it_right():
-    """The identifier says less of its error than there is; without a position that is all."""
-    road = Friction(changes=(FrictionChange(scale=0.5, at_time=6.0),))
-    driven = list(states(10.0, road, amplitude=0.05))
-    found = told_over(driven)
-    blind = told_over(driven, localization=Localization(position=1e3, heading=1.0))
-    after = slice(600, None)
-    worst = np.abs(found["error"][after]).max()
-    assert np.mean(np.abs(found["error"][after]) < 2.0 * found["v_y_sd"][after]) > 0.9
-    assert np.abs(found["inertial"][after]).max() > 3.0 * worst
-    assert np.abs(blind["error"][after]).max() > 1.5 * worst
-
-
 @pytest.mark.sweep("r", "X", "a_y")
 @pytest.mark.parametrize("channel", ["X", "psi", "v_x", "r", "delta", "a_y"])
 def test_a_lost_channel_widens_the_band_and_is_driven_through(swings, channel, told):
