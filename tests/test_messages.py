@@ -23,6 +23,7 @@ from models.friction import Friction, FrictionChange, FrictionError
 from models.maneuvers import ManeuverError, SampledSteer, Slalom, StepSteer
 from models.plant import Driver, Plant, PlantError, StepwisePlant
 from models.recordings import RecordingError, Repair, read_recording
+from models.recordings.wheels import Wheels
 from models.rules import require_kind
 from models.schema import require_few
 from models.sensors import Sensor, SensorError
@@ -148,6 +149,13 @@ REFUSED = {
         (lambda: read_recording(columns(vx=[9.0] * 99 + [[1.0, 2.0]])), "rows are of several"),
         (lambda: read_recording(columns(vx=np.ma.masked_equal(columns()["t"], 0.05))), "index 5"),
         (lambda: read_recording([1.0, 2.0]), "a data frame or a mapping"),
+        (lambda: Wheels(radius=(0.3, math.nan)), "wheels: radius must lie between 0.01 and 2"),
+        (lambda: Wheels(radius=(0.3, 0.3, 0.3)), "one per axle or one per wheel, not 3 numbers"),
+        (lambda: Wheels(track=(-1.5,)), "wheels: track must lie between"),
+        (lambda: Wheels(track=(1.5, 1.5, 1.5)), "wheels: track must be one number or one per axle"),
+        (lambda: Wheels(wheelbase=0.0), "wheels: wheelbase must lie between"),
+        (lambda: Wheels(acceleration=math.inf), "wheels: acceleration must lie between"),
+        (lambda: Wheels(driven="left"), "wheels: driven must be one of front, rear, all, none"),
         (lambda: read_recording(columns(), dt="0.01"), "dt must be positive, it is '0.01'"),
         (lambda: read_recording(columns(), columns=["r"]), "columns must be a mapping"),
     ],

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from models.extras import EXTRAS, needs
+from models.extras import EXTRAS
 from tests.sources import nodes_of
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -121,20 +121,3 @@ def test_what_a_message_says_to_install_is_the_whole_extra(extra):
     extras = [extra]
     texts = LOWEST["requirements"]({**PROJECT, "dependencies": []}, extras)
     assert told == {re.match(r"[\w-]+", text)[0] for text in texts}
-
-
-def from_an_index(text):
-    """Where a text installs tireid from an index of packages; none has it."""
-    return re.findall(r"pip install [^`#(\n]*\btireid\b", text)
-
-
-def test_nothing_says_to_install_tireid_from_an_index():
-    folders = ["codegen", "models", "identifier", "mpc", "tireid", "examples", "benchmarks", "docs"]
-    files = [path for name in folders for path in (ROOT / name).rglob("*")]
-    texts = [path for path in files if path.suffix in (".py", ".md", ".txt", ".toml", ".ipynb")]
-    assert len(texts) > 100
-    for path in (*texts, *ROOT.glob("*.md"), ROOT / "Makefile"):
-        assert not from_an_index(path.read_text(encoding="utf-8")), path
-    for planted in ("`pip install tireid[ros]`", "pip install 'tireid[can]'", "pip install tireid"):
-        assert from_an_index(planted), planted
-    assert not from_an_index(needs("a bag", "rosbags", "ros"))

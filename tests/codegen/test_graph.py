@@ -257,17 +257,6 @@ def test_a_choice_in_two_halves_is_one_choice_whichever_comes_first(turned, rng)
         assert chosen == (first if sign > 0.0 else second)
 
 
-def test_halves_of_different_choices_stay_two(rng):
-    c, d, a, b = (ca.SX.sym(name) for name in "cdab")
-    both = ca.if_else(c > 0, a, 0) + ca.if_else(ca.logic_not(d > 0), b, 0)
-    function = ca.Function("halves", [c, d, a, b], [both])
-    graph = recognized(graph_of(function))
-    assert "select" not in operations(graph)
-    for c_, d_ in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
-        expected = 2.0 * (c_ > 0) + 3.0 * (d_ <= 0)
-        assert float(function_of(graph, function)(c_, d_, 2.0, 3.0)) == expected
-
-
 @pytest.mark.parametrize(
     ("extreme", "wanted"), [(ca.fmax, (0.0, 0.5, 1.0)), (ca.fmin, (1.0, 0.5, 0.0))]
 )

@@ -114,24 +114,6 @@ def test_a_clock_that_jumps_misses_or_repeats_time_in_all_channels(size):
     assert shown.dt == pytest.approx(0.01)
 
 
-def test_an_accelerometer_elsewhere_feels_the_acceleration_of_its_place():
-    """On a circle of closed form: the second derivative of the path of the place itself."""
-    rate = lambda t: 0.4 * t + 0.1 * np.sin(t)  # noqa: E731  (heading)
-    t = np.linspace(0.0, 20.0, 2001)
-    r = 0.4 + 0.1 * np.cos(t)
-    still = replace(waves(), r=r, a_y=np.zeros_like(t))  # the c.g. rests, the car turns about it
-    shown = SensorElsewhere(sensor="accelerometer", x=1.2, y=0.5).apply(still).a_y
-    e = 1e-4
-
-    def place(t):
-        c, s = np.cos(rate(t)), np.sin(rate(t))
-        return np.array([1.2 * c - 0.5 * s, 1.2 * s + 0.5 * c])
-
-    a = (place(t + e) - 2.0 * place(t) + place(t - e)) / e**2
-    aside = -a[0] * np.sin(rate(t)) + a[1] * np.cos(rate(t))
-    np.testing.assert_allclose(shown[1:-1], aside[1:-1], atol=1e-5)
-
-
 def test_a_banked_recording_keeps_slip_and_obeys_newton_with_the_slope(drive):
     fault = Bank(vehicle=CAR, angle=math.radians(3.0), period=60.0)
     shown, m = fault.apply(drive), CAR.mass
@@ -146,21 +128,6 @@ def test_a_banked_recording_keeps_slip_and_obeys_newton_with_the_slope(drive):
 
 
 # Banked roads, wind and other tires behind, on the plant.
-
-
-def newton(run):
-    """Side force of inertia, m (dv_y/dt + v_x r) [N]."""
-    return CAR.mass * (np.gradient(run.v_y, run.t) + run.v_x * run.r)
-
-
-def test_on_a_banked_road_the_plant_obeys_newton_with_the_slope_and_a_y_is_that_of_the_tires():
-    bank = Bank(vehicle=CAR, angle=math.radians(3.0), period=8.0)
-    run = Plant(CAR, TIRE).simulate(STEER, speed=20.0, bank=bank.angle_at)
-    slope = GRAVITY * np.sin(math.radians(3.0) * np.cos(2.0 * math.pi * run.t / 8.0))
-    force = run.axle_force.sum(axis=1)
-    rest = newton(run) - force - CAR.mass * slope
-    assert np.abs(rest[3:-3]).max() < 0.01 * np.abs(force).max()
-    np.testing.assert_allclose(CAR.mass * run.a_y, force, rtol=1e-12, atol=1e-9)
 
 
 def test_rear_wheels_may_have_tires_of_their_own():

@@ -166,19 +166,6 @@ def test_steady_turning_is_that_of_the_linear_bicycle():
     assert run.a_y[-1] == pytest.approx(speed * r, rel=0.01)
 
 
-def test_speed_at_the_limit_is_paid_by_the_drive():
-    """Steady state, power in = power lost in slip: F_x v_x summed is what side force takes away."""
-    step = StepSteer(amplitude=0.06, onset=0.1, rate_limit=0.5, duration=25.0)
-    run = PLANT.simulate(step, speed=20.0)
-    assert np.ptp(run.v_x[-200:]) < 1e-3
-    along, aside = body_forces(run)
-    end = -1
-    power = along.sum(axis=1)[end] * run.v_x[end] + aside.sum(axis=1)[end] * run.v_y[end]
-    power += yaw_moment(run, CAR)[end] * run.r[end]
-    assert abs(power) < 1e-3 * run.F_x[end].sum() * run.v_x[end]
-    assert run.F_x[end].sum() > 200.0
-
-
 def test_downforce_adds_to_the_loads_of_its_axle_by_the_square_of_speed():
     racer = replace(CAR, downforce_area_front=1.5, downforce_area_rear=2.5)
     run = Plant(racer).simulate(replace(HARD, amplitude=0.05), speed=lambda t: 40.0 - t)
@@ -217,17 +204,6 @@ def test_load_transfer_in_a_steady_turn_is_the_formula_on_paper():
     moment = 0.5 * (run.F_z[-1] * [-track, track, -track, track]).sum()
     by_hand = m * a_y * CHASSIS.cg_height + m * GRAVITY * h * run.roll[-1]
     assert moment == pytest.approx(by_hand, rel=1e-3)
-
-
-def test_mirrored_steering_is_mirrored_driving_to_the_last_digits():
-    left = PLANT.simulate(replace(HARD, duration=4.0), speed=20.0)
-    right = PLANT.simulate(replace(HARD, duration=4.0, amplitude=-HARD.amplitude), speed=20.0)
-    for key in ("v_y", "r", "roll", "Y", "a_y", "axle_force"):
-        one, other = getattr(left, key), getattr(right, key)
-        assert np.abs(one + other).max() <= 1e-9 * np.abs(one).max()
-    swapped = [1, 0, 3, 2]
-    assert np.abs(left.F_z - right.F_z[:, swapped]).max() <= 1e-9 * CAR.weight
-    assert np.abs(left.F_y + right.F_y[:, swapped]).max() <= 1e-9 * CAR.weight
 
 
 def test_the_integration_is_of_fourth_order():
@@ -346,31 +322,6 @@ def test_a_log_of_a_run_carries_the_truth_and_goes_through_sensors(rng):
     assert np.std(noisy.v_y - run.v_y) == pytest.approx(0.05, rel=0.15)
     with pytest.raises(ValueError, match="rng"):
         run.recording(Sensors())
-
-
-def conical_tire():
-    """The sedan's left tire with ply steer, conicity and a longitudinal shift."""
-    assert isinstance(PLANT.tire, MagicFormula)
-    shifts = {"PHY1": 0.004, "PVY1": 0.03, "PHX1": 0.002, "RBY3": 0.02}
-    return replace(PLANT.tire, coefficients=replace(PLANT.tire.coefficients, **shifts))
-
-
-def test_tires_with_conicity_push_against_each_other_and_the_car_stays_straight():
-    straight = StepSteer(amplitude=0.0, onset=0.0, rate_limit=1.0, duration=2.0)
-    run = Plant(CAR, conical_tire()).simulate(straight, speed=20.0)
-    assert np.abs(run.F_y[:, 0]).min() > 100.0
-    np.testing.assert_allclose(run.F_y[:, 0], -run.F_y[:, 1], rtol=1e-12)
-    assert np.abs(run.Y).max() < 1e-9
-    # A free wheel does not drive by its shift.
-    assert np.abs(run.F_x).max() < 2.0
-
-
-def test_it_does_not_matter_of_which_side_the_tire_was_measured():
-    step = StepSteer(amplitude=0.03, onset=0.1, rate_limit=0.5, duration=2.0)
-    tire = conical_tire()
-    as_is = Plant(CAR, tire).simulate(step, speed=20.0)
-    mirrored = Plant(CAR, tire.mirrored()).simulate(step, speed=20.0)
-    np.testing.assert_allclose(mirrored.r, as_is.r, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,8 @@ import gzip
 from pathlib import Path
 
 import numpy as np
-import pyarrow
-import pyarrow.parquet
 import pytest
 
-from models.logs.door import open_log
-from models.logs.text import TextTable
 from models.recordings import (
     LogMap,
     Recording,
@@ -74,45 +70,6 @@ def test_runs_are_listed_chosen_and_named(tmp_path):
     plain = write(tmp_path / "plain.csv", HEADER, rows())
     assert runs(plain) == []
     assert "holds one run without a name, so no run 'a'; leave it out" in refusal(plain, "a")
-
-
-@pytest.mark.parametrize("with_runs", [False, True])
-def test_a_text_of_standard_names_is_gone_through_no_more_often_than_needed(
-    tmp_path, monkeypatch, with_runs
-):
-    """Once for its columns, and once before for the names of its runs."""
-    passes = []
-    real = TextTable.cells
-
-    def counted(self, kinds, run=None):
-        passes.append(kinds)
-        return real(self, kinds, run)
-
-    monkeypatch.setattr(TextTable, "cells", counted)
-    ending = ",a" if with_runs else ""
-    header = HEADER + (",run" if with_runs else "")
-    path = write(tmp_path / "log.csv", header, [line + ending for line in rows()])
-    read_recording(path, check=False)
-    assert len(passes) == 1 + with_runs
-    log = open_log(path)
-    passes.clear()
-    assert log.listed() == log.listed()
-    assert len(passes) == 1
-
-
-def test_parquet_gives_the_same_as_csv(tmp_path):
-    t = 0.01 * np.arange(60)
-    columns = {"t": t, "vx": t + 20, "vy": 0 * t, "r": 0 * t, "delta_f": 0 * t, "run": ["a"] * 60}
-    path = tmp_path / "log.parquet"
-    pyarrow.parquet.write_table(pyarrow.table(columns | {"other": ["x"] * 60}), path)
-    got = read_recording(path)
-    assert got.name == "log:a"
-    assert np.array_equal(got.v_x, t + 20)
-    assert runs(path) == ["a"]
-    pyarrow.parquet.write_table(pyarrow.table(columns | {"vx": ["fast"] * 60}), path)
-    assert "vx must be numeric" in refusal(path)
-    pyarrow.parquet.write_table(pyarrow.table(columns | {"r": [None] + [0.0] * 59}), path)
-    assert "r must be finite, 1 of 60" in refusal(path)
 
 
 @pytest.mark.parametrize(
@@ -242,26 +199,6 @@ def test_a_log_argument_is_split_at_the_right_colon(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("log.csv:a").touch()
     assert split_log_argument("log.csv:a") == (Path("log.csv:a"), None)
-
-
-def test_ax_is_read_forward_in_either_axes_and_left_aside_where_it_cannot_be(tmp_path):
-    lines = [f"{k * 0.01:.6f},20,0.5,0,0,0.1,{0.01 * k:.2f}" for k in range(60)]
-    header = HEADER + ",ay,ax"
-    good = write(tmp_path / "good.csv", header, lines)
-    expected = 0.01 * np.arange(60)
-    np.testing.assert_allclose(read_recording(good, check=False).a_x, expected)
-    sae = read_recording(good, check=False, log_map=LogMap(axes="SAE"))
-    np.testing.assert_allclose(sae.a_x, expected)
-    np.testing.assert_allclose(sae.a_y, -0.1)
-    lines[30] = lines[30].rpartition(",")[0] + ","
-    holed = write(tmp_path / "holed.csv", header, lines)
-    got = read_recording(holed, check=False)
-    assert got.a_x is None and got.a_y is not None
-    assert sum(note.startswith("ax is left aside: ") for note in got.notes) == 1
-    with pytest.raises(RecordingError, match="ax must be finite"):
-        read_recording(holed, check=False, columns={"ax": "ax"})
-    twice = write(tmp_path / "twice.csv", header + ",ax", [line + ",0" for line in lines])
-    assert read_recording(twice, check=False).a_x is None
 
 
 def test_inverse_forces_stand_in_where_none_were_measured(tmp_path):

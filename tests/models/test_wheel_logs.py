@@ -91,22 +91,6 @@ def test_wheels_are_told_by_words_and_by_a_map_that_is_written_and_read(run, whe
     assert not np.array_equal(again.v_x, read.v_x)  # the driven wheels stand back
 
 
-def test_a_speed_that_is_logged_is_used_and_tells_the_radius(run, wheels):
-    turns = {name: one / RADIUS for name, one in wheels.items()}
-    data = columns(run, turns, vx=run.v_x)
-    told = {name: f"{name} [rad/s]" for name in CORNERS}
-    got = read_recording(data, columns=told)
-    np.testing.assert_array_equal(got.v_x, run.v_x)
-    (note,) = (one for one in got.notes if "wheels roll by vx" in one)
-    radii = [float(word) for word in note.replace(",", "").split() if word.startswith("0.3")]
-    assert len(radii) == 4
-    np.testing.assert_allclose(radii, RADIUS, rtol=0.005)
-    factors = read_recording(
-        columns(run, wheels, 0.97, vx=run.v_x), columns={name: f"{name} [m/s]" for name in CORNERS}
-    )
-    assert any("wheel_rl 1.031 times its speed" in one for one in factors.notes)
-
-
 def test_wheels_that_nobody_told_leave_a_log_with_a_speed_as_it_is(run, wheels):
     data = columns(run, wheels, vx=run.v_x)
     data["wheel_fl"] = np.where(run.t > 5.0, np.nan, data["wheel_fl"])

@@ -3,7 +3,6 @@
 import ast
 import builtins
 import json
-import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -137,18 +136,6 @@ def test_a_run_names_its_parts(log, car, tmp_path):
     run.save(str(tmp_path / "run"), overwrite=True)
 
 
-def test_methods_have_the_names_of_the_command_line(log, car):
-    assert ti.methods()[0] == "fit" and {"axle", "integral", "linear"} <= {*ti.methods()}
-    by_name = ti.identify(log, car, "linear").force
-    assert np.array_equal(by_name, ti.identify(log, car, ti.make_method("linear", car)).force)
-    assert ti.certify("axle", car).verdict == "pass"
-    for call in (lambda: ti.identify(log, car, "lineal"), lambda: ti.certify("lineal", car)):
-        with pytest.raises(ValueError, match=r"^method must be one of fit, axle.*not 'lineal'$"):
-            call()
-    with pytest.raises(TypeError, match=r"^vehicle must be a Vehicle, as of Vehicle.from_toml"):
-        ti.certify(car, "axle")
-
-
 def test_all_errors_have_one_base_and_the_builtin_of_their_meaning():
     for path in (path for name in PACKAGES for path in (ROOT / name).rglob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
@@ -184,19 +171,6 @@ def test_a_recording_of_another_car_is_refused(log, car):
     with pytest.raises(RecordingError):
         ti.identify(log, swapped)
     ti.identify(log, swapped, check=False)
-
-
-def test_what_the_doctor_finds_is_logged_and_a_right_log_is_silent(log, car, caplog):
-    from dataclasses import replace
-
-    ti.identify(log, car)
-    assert [one for one in caplog.records if one.name == "tireid.doctor"] == []
-    wrong = replace(car, yaw_inertia=3.0 * car.mass * car.l_f * car.l_r)
-    found = ti.diagnose(log, wrong)
-    ti.identify(log, wrong)
-    told = [one.getMessage() for one in caplog.records if one.name == "tireid.doctor"]
-    assert told == [f"{log.name}: {one.text}" for one in found.findings]
-    assert "yaw inertia" in "".join(told)
 
 
 def columns_of(log):
@@ -367,18 +341,6 @@ def test_a_saved_model_comes_back(tires, log, tmp_path, name):
     again = ti.TireModel.load(path)
     assert type(again) is type(tires[name])
     assert np.array_equal(again.predict(log), tires[name].predict(log))
-
-
-def test_a_summary_says_what_the_numbers_are(tires):
-    tire = tires["axle"]
-    lines = tire.summary().splitlines()
-    stiffness = next(line for line in lines if line.startswith("cornering stiffness"))
-    assert "kN/rad" in stiffness
-    values = [float(word) for word in re.findall(r"(\d+) ± \d", stiffness)]
-    assert np.allclose(values, tire.stiffness / 1e3, rtol=5e-3)
-    for word in ("relaxation length", "known up to", "standard deviation", "time of learning"):
-        assert word in tire.summary()
-    assert tires["linear"].known_slip is None and "known" not in tires["linear"].summary()
 
 
 def test_no_method_goes_on_from_a_curve(tires, tmp_path):

@@ -10,8 +10,7 @@ from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
 from benchmarks.faults import Late, Misaligned
 from identifier.doctor import Finding, examine
-from identifier.doctor.faults import Candidate, Search, _all_move, prepared
-from identifier.doctor.pieces import segments_of
+from identifier.doctor.faults import Candidate, Search, prepared
 from identifier.doctor.suspects import NOTES, SUSPECTS
 from identifier.estimate import Drive
 from identifier.estimate.solve import descend, simulate
@@ -168,19 +167,6 @@ def test_a_motion_that_is_shrunk_explains_nothing(driven):
     assert lines[1].cost > lines[0].cost
 
 
-def test_slopes_over_a_shrunk_v_x_are_those_of_its_residuals(driven):
-    car, log, _ = driven
-    search = prepared(log, car)
-    problem = search.problem.under(_all_move(search.problem.priors))
-    k, h = INDEX["v_x_factor"], 1e-5
-    p = search.nominal().p
-    p[k] = -0.1
-    at = problem.residuals(p)
-    beside = [problem.residuals(p + sign * h * np.eye(p.size)[k]).e for sign in (1.0, -1.0)]
-    slope = at.slopes[:, :, list(problem.index).index(k)]
-    np.testing.assert_allclose(slope, (beside[0] - beside[1]) / (2.0 * h), rtol=1e-3, atol=2e-3)
-
-
 def test_a_move_to_where_a_y_fits_stays_within_bounds(driven):
     car, log, _ = driven
     search = prepared(Late(channels=("v_y",), delay=0.1).apply(log), car)
@@ -238,21 +224,6 @@ def test_what_does_not_help_the_other_half_is_not_sure(driven, monkeypatch):
     assert (found.code, found.channel, found.sure) == ("delay", "r", False)
 
 
-def test_a_rival_that_helps_as_much_takes_the_sureness(driven):
-    """Two suspects of one gain: the drive does not tell which of them it is."""
-    car, log, _ = driven
-    late = Late(channels=("r",), delay=0.08).apply(log)
-    search, _ = searched(late, car)
-    best = search.found[0].first
-    search.wide, search.mean = {}, {}
-    base = search.nominal()
-    rival = best._replace(gain=best.gain - 1.0)
-    assert search.stands(best, None, base)
-    assert not search.stands(best, rival, base)
-    same = best._replace(gain=best.gain - 20.0)
-    assert not search.stands(best, same, base), "the rival's repair is as good as this"
-
-
 @pytest.mark.sweep("3")
 @pytest.mark.parametrize("between", [2, 3])
 def test_nothing_is_found_in_a_right_log_that_was_drawn_from_a_slower_clock(driven, between):
@@ -278,25 +249,6 @@ def test_a_drive_that_never_drives_is_not_asked(driven):
     said = examine(replace(log, v_x=0.01 * log.v_x), car)
     assert said.findings == ()
     assert "hardly drives" in said.unobservable[0]
-
-
-def test_a_long_log_is_looked_at_where_it_is_lively(driven):
-    car, log, _ = driven
-    n = 10 * len(log)
-    longer = replace(
-        log,
-        t=log.dt * np.arange(n),
-        **{
-            name: np.tile(getattr(log, name), 10)
-            for name in ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
-        },
-    )
-    parts = segments_of(longer, car, longest=60.0, pieces=4)
-    assert len(parts) == 4
-    assert sum(part.duration for part in parts) == pytest.approx(60.0, abs=0.1)
-    turning = math.sqrt(sum(np.mean(part.r**2) for part in parts) / 4.0)
-    assert turning > math.sqrt(np.mean(log.r**2))
-    assert segments_of(log, car, longest=61.0, pieces=4) == (log,)
 
 
 @pytest.mark.parametrize("suspect", SUSPECTS, ids=lambda one: one.parameter)
@@ -327,18 +279,6 @@ def test_a_late_signal_is_read_on_time_within_each_segment(driven):
         np.testing.assert_allclose(one, other, atol=0.02 * np.abs(other).max())
     np.testing.assert_array_equal(read.signals[:, 0], drive.signals[:, 0])
     np.testing.assert_array_equal(read.signals[:, 3], drive.signals[:, 3])
-
-
-def test_a_line_of_the_accelerometer_tells_what_is_wrong_with_it(driven):
-    car, log, _ = driven
-    wrong = replace(log, a_y=1.3 * log.a_y + 0.5)
-    search = prepared(Late(channels=("a_y",), delay=0.05).apply(wrong), car)
-    base = search.nominal()
-    wide = {"a_y.offset": 1.0, "a_y.factor": 0.5, "a_y.delay": 0.2}
-    b, factor, late, *_ = search.accelerometer.line(base.p, wide).numbers
-    assert 1.0 / factor == pytest.approx(1.3, rel=0.03)
-    assert b / factor == pytest.approx(0.5, abs=0.05)
-    assert late == pytest.approx(0.05, abs=0.005)
 
 
 def test_a_finding_that_is_sure_has_a_repair():

@@ -19,7 +19,6 @@ from identifier.estimate.latent import (
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes
 from identifier.estimate.priors import Priors
-from identifier.estimate.solve import around_beliefs
 from identifier.motion.nodes import LATENT_NAMES
 from identifier.verdict import judge_prediction
 from models.recordings import Recording, RecordingError
@@ -105,20 +104,6 @@ def test_the_step_is_that_of_the_dense_matrix(problem, place):
     inverse = np.linalg.inv(H / np.outer(scale, scale)) / np.outer(scale, scale)
     whole = own[:, 0, 0] + np.einsum("ni,ij,nj->n", slopes, P, slopes)
     np.testing.assert_allclose(whole, np.diag(inverse)[: z.size : 8], rtol=1e-3)
-
-
-def test_what_a_drive_tells_counts_less_and_what_is_believed_does_not(problem, place):
-    z, p, _ = place
-    told = []
-    for lasting in (1.0, 2.0, 4.0):
-        one = _Latent(problem.nodes, CAR, problem.priors, trust=replace(TRUST, lasting=lasting))
-        told.append(np.linalg.inv(one.spread(z, p, problem.R)[1]))
-    believed = around_beliefs(problem.priors, p)[1][np.ix_(problem.index, problem.index)]
-    shares = [(one - believed) / np.abs(np.diag(told[0])).max() for one in told]
-    np.testing.assert_allclose(shares[1], shares[0] / 2.0, atol=1e-9)
-    np.testing.assert_allclose(shares[2], shares[0] / 4.0, atol=1e-9)
-    assert np.abs(shares[0]).max() > 1e-3
-    assert TRUST.lasting > 1.0
 
 
 def test_parameters_that_are_held_leave_their_doubt(problem, place):
@@ -232,17 +217,3 @@ def test_of_a_long_log_the_hardest_part_teaches():
     part = hardest(log, 300.0)
     assert part.stop - part.start == 3000 and abs(t[part.start] - 1000.0) < 10.0
     assert hardest(log.between(0.0, 100.0), 300.0) == slice(0, len(log.between(0.0, 100.0)))
-
-
-def test_optima_are_compared_by_hubers_loss(problem, place):
-    z, p, _ = place
-    z = z.copy()
-    z[::7, 1] += 0.1  # what r shows there is far off
-    R, c = problem.R, TRUST.clip
-    weights = problem.weights(z, p, R)
-    off = (problem.nodes.measured - problem._run(problem._plain, z, p, {})["shows"])[:, :2]
-    off = np.abs(off[problem.nodes.counts]) / np.sqrt(problem.variance(R)[problem.nodes.counts, :2])
-    assert (off > c).any()
-    huber = np.where(off < c, 0.5 * off**2, c * off - 0.5 * c**2).sum()
-    nothing = {**weights, "of_shows": np.zeros_like(weights["of_shows"])}
-    assert problem.value(z, p, R) == pytest.approx(huber + problem.cost(z, p, nothing), rel=1e-9)

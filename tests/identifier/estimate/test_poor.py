@@ -7,7 +7,7 @@ import pytest
 
 import tireid as ti
 from identifier.estimate.fit import fit
-from identifier.estimate.poor import _Kinematics, _new_values, _Shown, on_time
+from identifier.estimate.poor import _new_values, on_time
 from models.recordings.record import joined
 
 from .conftest import driven
@@ -87,42 +87,6 @@ def test_a_drive_of_two_pieces_is_two_problems(log):
     assert np.std(found.v_y - exact.v_y) < 0.05
     parts = ti.identify(joined(shown), CAR, check=False).history.parts(shown)
     np.testing.assert_array_equal(np.concatenate([one.recording.v_y for one in parts]), found.v_y)
-
-
-def test_banded_algebra_gives_the_least_squares(log):
-    """By a dense matrix of the same equations."""
-    some = log.between(2.0, 2.6)
-    new = np.arange(3, len(some), 7)
-    s = _Shown(interval=0.07, late=0.013, noise=0.02, push=0.01, wanders=0.1)
-    v_y, missed = _Kinematics(some, new).carried(s, np.ones(len(new)))
-    n, dt = len(some), some.dt
-    rows, right = [], []
-
-    def row(weight, value, **at):
-        one = np.zeros(2 * n + 1)
-        for place, factor in at.items():
-            one[int(place[1:])] += factor
-        rows.append(weight * one)
-        right.append(weight * value)
-
-    felt = 0.5 * dt * (some.a_y[1:] + some.a_y[:-1])
-    turns = some.v_x * some.r
-    moved = felt - 0.5 * dt * (turns[1:] + turns[:-1])
-    for k in range(n - 1):
-        v, b = 2 * k, 2 * k + 1
-        at = {f"_{v}": -1, f"_{v + 2}": 1, f"_{b}": dt / 2, f"_{b + 2}": dt / 2}
-        row((s.push * dt) ** -0.5, moved[k], **at, **{f"_{2 * n}": felt[k]})
-        row((s.wanders * dt) ** -0.5, 0.0, **{f"_{b}": -1, f"_{b + 2}": 1})
-    row(1e-2, 0.0, _0=1)
-    row(1 / 0.15, 0.0, _1=1)
-    row(1 / 0.04, 0.05, **{f"_{2 * n}": 1})
-    for k in new[new * dt >= s.late]:
-        i, share = divmod(k - s.late / dt, 1.0)
-        at = {f"_{2 * int(i)}": 1 - share, f"_{2 * int(i) + 2}": share}
-        row(1 / s.noise, some.v_y[k], **at)
-    x = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
-    np.testing.assert_allclose(v_y, x[: 2 * n : 2], atol=1e-7)
-    assert len(missed) == len(new)
 
 
 def test_a_user_learns_from_a_receiver_nearly_as_well(log, caplog):

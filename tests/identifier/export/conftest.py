@@ -10,7 +10,7 @@ import pytest
 from identifier.axle.band import BandCalibration
 from identifier.export.compiled import samples_of
 from identifier.export.package import build_package
-from identifier.methods import METHODS, make_method
+from identifier.methods import make_method
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
@@ -41,7 +41,7 @@ def packages():
             return banded(car, with_a_y=True)
         return build_package(make_method(law, car), car)
 
-    return Kept((*METHODS, "linear_kf", BANKED), make)
+    return Kept(make)
 
 
 def banded(car, **options):
@@ -88,7 +88,7 @@ def drives(packages, slalom, samples):
             rows[2300:2330, 1], rows[2380:2400, 1], rows[2400:, 1] = 1e4, -np.inf, np.nan
         return rows[1900:2600]
 
-    return Kept((*TWO, BANKED, "inertial"), make)
+    return Kept(make)
 
 
 def put(folder, files):

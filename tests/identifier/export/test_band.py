@@ -1,13 +1,10 @@
 """The band in C and FMU: that of the model, narrower as it learns; zero where forces read zero."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identifier.axle.band import BandCalibration
-from identifier.axle.band_step import _hinged, hinges
 from identifier.export.compiled import CompiledPackage, samples_of
 from identifier.export.fmu import fmu_text
 from identifier.export.onnx import NoOnnxError, onnx_bytes
@@ -65,26 +62,6 @@ def test_where_forces_read_zero_there_is_no_band(package, slalom):
     told = CompiledPackage.of(package).run_samples(rows).outputs["half_band"]
     assert (told[50:200] > 0.0).all()
     assert (told[280:] == 0.0).all()
-
-
-def test_the_manifest_keeps_the_calibration_and_says_what_is_told(package, packages):
-    manifest = json.loads(package.files["tireid.json"])
-    again = BandCalibration.from_dict(manifest["band"])
-    np.testing.assert_array_equal(again.factors, CALIBRATION.factors)
-    assert {"name": "half_band", "size": 2} in [
-        {key: one[key] for key in ("name", "size")} for one in manifest["outputs"]
-    ]
-    afresh = json.loads(build_package(AXLE, CAR, with_band=True).files["tireid.json"])
-    assert afresh["band"] is None
-    assert "band" not in json.loads(packages["axle"].files["tireid.json"])
-
-
-def test_hinges_are_the_straight_lines_between_centers():
-    values, at = np.array([[1.0, 3.0, 2.0, 2.5], [0.5, 0.4, 0.9, 4.0]]), (0.1, 0.2, 0.5, 0.6)
-    for x in (0.0, 0.1, 0.15, 0.2, 0.44, 0.55, 0.6, 9.0):
-        for numbers, row in zip(hinges(values, at), values, strict=True):
-            found = float(_hinged(list(map(float, numbers)), at, x))
-            assert found == pytest.approx(np.interp(x, at, row))
 
 
 def test_an_fmu_has_a_band_where_its_step_tells_one():

@@ -84,16 +84,6 @@ def test_a_property_file_reads_back_the_axle_over_slip_and_load(tmp_path, i):
         assert np.abs(pair - force).max() <= 0.02 * np.abs(force).max()
 
 
-def test_the_axle_identifier_and_a_network_give_property_files_too(tmp_path):
-    slip = np.linspace(-0.08, 0.08, 9)
-    for model in (begun(fitted(**TIRES)), network()):
-        load = 0.5 * CAR.axle_loads[1]
-        tire = read(model, "rear", tmp_path)
-        pair = np.array([2.0 * float(tire.forces(a, 0.0, 0.0, load).F_y) for a in slip])
-        force = model.force(slip, "rear")
-        assert np.abs(pair - force).max() <= 0.02 * np.abs(force).max(), model.kind
-
-
 def test_a_curve_that_is_no_magic_formula_has_no_property_file():
     bumpy = fitted(residual0_f=2.0, residual1_f=-2.2, residual2_f=0.9)
     with pytest.raises(ValueError, match=r"front axle is no Magic Formula: .* % of its peak"):
@@ -192,14 +182,6 @@ def test_raceline_planners_read_the_table(tmp_path):
     assert (table[:, 1:] > 0.0).all() and (table[:, 1:] < 50.0).all() and table[-1, 2] > table[0, 2]
     comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
     assert comments[-1] == "# v_mps, ax_max_mps2, ay_max_mps2" and "Lower end" in comments[1]
-
-
-def test_the_loader_of_raceline_planners_takes_the_table(tmp_path):
-    helpers = pytest.importorskip("trajectory_planning_helpers", reason="needs its loader of g-g-v")
-    path = tmp_path / "ggv.csv"
-    path.write_text(ggv_text(fitted()), encoding="utf-8")
-    ggv, _ = helpers.import_veh_dyn_info.import_veh_dyn_info(str(path), None)
-    assert ggv.shape == (13, 3)
 
 
 # Understeer.

@@ -203,26 +203,6 @@ def test_a_saved_state_goes_on_as_if_nothing_had_happened(master, version):
     assert (other.run(inputs[120:], 0.01, first=120) == through).all()
 
 
-@pytest.mark.parametrize("version", [2, 3])
-def test_after_a_reset_it_is_as_new(master, version):
-    """Weights, counters, time and switches: the second run is the first one, sample by sample."""
-    inputs, one = rows(swaying(150)), master(version)
-    first = one.run(inputs, 0.01)
-    one.adapt(False)
-    one.fmu.reset()
-    assert one.count(SAMPLES) == 0
-    assert one.forces() == [0.0, 0.0]
-    if one.two:
-        one.fmu.setupExperiment(startTime=3.0)
-        one.fmu.enterInitializationMode()
-    else:
-        one.fmu.enterInitializationMode(startTime=3.0)
-    one.fmu.exitInitializationMode()
-    assert (one.run(inputs, 0.01, first=300) == first).all()
-    assert one.count(SAMPLES) == 150
-    assert np.abs(first[-1] - in_python(swaying(150))["axle_force"][0]).max() > 100
-
-
 @pytest.mark.sweep("3")
 @pytest.mark.parametrize("version", [2, 3])
 def test_the_state_of_another_model_is_refused(master, version, capfd):

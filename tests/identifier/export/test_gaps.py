@@ -9,7 +9,6 @@ from codegen import find_compiler
 from identifier.export.compiled import CompiledPackage, Status, samples_of
 from identifier.export.specialize import SIDE_SLIP
 from identifier.methods import make_method
-from identifier.refused import STALE_TIME
 from identifier.run import OnlineIdentifier, identify
 from models.vehicle import sedan
 from tests.identifier.export.conftest import BANKED
@@ -27,7 +26,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compi
 @pytest.fixture(scope="module")
 def shipped(packages):
     """By law, what a package is computed with; each test begins anew."""
-    return Kept(LAWS, lambda law: CompiledPackage.of(packages[law]))
+    return Kept(lambda law: CompiledPackage.of(packages[law]))
 
 
 def method_of(law):
@@ -98,18 +97,6 @@ def test_every_channel_heals(law, channel, gap, shipped, slalom):
     after = slice(800 + gap + 30, 1500)
     size = np.sqrt((clean[after] ** 2).mean(0))
     assert (np.sqrt(((force - clean)[after] ** 2).mean(0)) < 0.03 * size).all()
-
-
-def test_the_time_that_makes_forces_stale_may_be_set(packages, rows):
-    package = packages["axle"]
-    header = "include/tireid_config.h"
-    assert f"#define TIREID_STALE_TIME ({STALE_TIME})" in package.files[header]
-    files = {**package.files, header: "#define TIREID_STALE_TIME 0.1\n" + package.files[header]}
-    run = CompiledPackage.of(package._replace(files=files)).run_samples(rows)
-    assert (run.status[500:509] == Status.BAD_INPUT).all()
-    assert (run.status[509:550] == Status.STALE).all()
-    assert (run.axle_force[509:550] == 0.0).all()
-    assert run.status[550 + 60] == Status.OK
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -10,7 +10,6 @@ import pytest
 from codegen import Scan
 from identifier.baselines import LaggedEkf
 from identifier.export.layout import Member, covariance_order
-from identifier.export.package import run_in_virtual_machine, synthetic_samples
 from identifier.export.specialize import Signal, SpecializedStep, specialize
 from identifier.methods import METHODS, make_method
 from identifier.run import identify
@@ -104,31 +103,6 @@ def test_every_port_has_a_unit_and_words(law):
     assert specialized.outputs[0].name == "axle_force"
 
 
-def test_synthetic_samples_rest_drive_and_rest_again():
-    specialized = specialize(make_method("integral", CAR), CAR)
-    samples = synthetic_samples(specialized)
-    resting = samples[:, 0] < specialized.min_speed
-    assert resting[0]
-    assert resting[len(samples) // 2]
-    assert (~resting).sum() > 150
-    outputs, _ = run_in_virtual_machine(specialized, samples)
-    assert (outputs[resting, :2] == 0.0).all()
-    assert np.abs(outputs[~resting, :2]).max() > 500.0
-
-
-def test_the_self_test_starts_at_rest_and_turns_to_both_sides_at_many_speeds():
-    specialized = specialize(make_method("integral", CAR), CAR)
-    v_x, *signals = synthetic_samples(specialized).T
-    n, lowest = v_x.size, specialized.min_speed
-    assert v_x[0] == 0.0 and v_x[n // 2] < lowest, "it rests at the start, and once more"
-    assert v_x.max() == pytest.approx(15.0 * lowest)
-    fast = v_x > lowest
-    assert len(np.unique(v_x[fast])) > 50
-    for signal in signals:
-        assert signal[fast].min() < 0.0 < signal[fast].max()
-        assert signal[fast].max() + signal[fast].min() == pytest.approx(0.0, abs=0.4 * signal.max())
-
-
 def test_covariances_of_two_sizes_among_the_weights_are_refused():
     """The C that checks them knows one size."""
     sizes = [Signal("P", "-", "of two", size=4, rule=COVARIANCE)]
@@ -137,19 +111,3 @@ def test_covariances_of_two_sizes_among_the_weights_are_refused():
     assert covariance_order([member, member]) == 2
     with pytest.raises(ValueError, match="one size"):
         covariance_order([member, larger])
-
-
-def test_the_exported_step_goes_without_an_accelerometer(slalom):
-    """As the method does where none is logged; and a log of a banked road would tell it."""
-    method = make_method("axle", CAR)
-    specialized = specialize(method, CAR)
-    assert "bank" in method.setup(CAR).carry
-    assert "bank" not in specialized.carry
-    assert "a_y" not in specialized.function.name_in()
-    felt = slalom.axle_force.sum(axis=1) / CAR.mass - 0.5
-    told, untold = (
-        identify(replace(slalom, a_y=a_y), CAR, method).axle_force for a_y in (felt, None)
-    )
-    folded = run_folded(specialized, replace(slalom, a_y=felt))
-    assert np.abs(folded - untold).max() <= 1e-6
-    assert np.abs(told - untold).max() > 1.0

@@ -77,19 +77,6 @@ def test_side_slip_is_told_on_a_banked_road_with_an_honest_deviation(history, ba
     assert degrees(sd) < 4 * degrees(error)  # and not honest by knowing nothing
 
 
-def test_on_tires_of_an_estimate_side_slip_is_known_better_and_they_stay(estimate, history, banked):
-    method = continuing(estimate, CAR, v_y=False)
-    held = identify(as_shown(banked), CAR, method, start=estimate)
-    error, sd, _ = errors(held, banked)
-    assert degrees(error) < 0.85 * degrees(errors(history, banked)[0])
-    assert np.mean(np.abs(error) < 2 * sd) > 0.9
-    W, ladder = held.state["W"], np.array(method.ladder)
-    slope, level = (W / ladder).sum(axis=2), W.sum(axis=2)
-    assert np.abs(slope / slope[0] - 1.0).max() < 0.03
-    assert np.abs(level / level[0] - 1.0).max() < 0.15  # but for their grip
-    assert (held.state["own"] == held.state["own"][0]).all()
-
-
 def test_an_accelerometer_that_is_late_by_what_is_said_is_read_in_time(estimate, banked):
     method, shown = continuing(estimate, CAR, v_y=False), as_shown(banked)
     late = replace(shown, a_y=np.roll(shown.a_y, 6))
@@ -142,32 +129,6 @@ def test_what_is_told_for_observed_is_so_and_nothing_is_where_nothing_is_known(h
     parked = identify(replace(slow, v_x=np.full(len(slow), 0.5)), CAR, METHOD)
     assert not parked.outputs["side_slip_observable"].any()
     assert np.isfinite(parked.outputs["v_y"]).all()
-
-
-def test_a_number_counts_once_also_where_it_is_repeated_or_settles_in_two_steps(history, banked):
-    """A sensor of 10 Hz in a log of 100 Hz has a tenth of the news; behind a filter it shows most
-    of a new number at once and the rest a step later.
-    """
-    shown = as_shown(banked)
-    held = 10 * (np.arange(len(shown)) // 10)
-    first = np.arange(len(shown)) % 10 == 0
-
-    def settling(y):
-        jump = np.diff(y[held], prepend=y[0])
-        return y[held] - 0.03 * first * jump
-
-    once = replace(shown, r=shown.r[held], a_y=shown.a_y[held])
-    twice = replace(once, r=settling(shown.r), a_y=settling(shown.a_y))
-    sds, noises = [np.median(errors(history, banked)[1])], []
-    for recording in (once, twice):
-        found = identify(recording, CAR, METHOD)
-        error, sd, _ = errors(found, banked)
-        assert np.mean(np.abs(error) < 2 * sd) > 0.8
-        sds.append(np.median(sd))
-        noises.append(found.state["readings"][-1].ravel()[4:6])
-    assert sds[1] > 1.05 * sds[0]
-    assert sds[2] == pytest.approx(sds[1], rel=0.1)
-    np.testing.assert_allclose(noises[1], noises[0], rtol=0.35)
 
 
 @pytest.mark.parametrize("tires", ["typical", "held"])

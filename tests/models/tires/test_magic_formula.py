@@ -144,19 +144,6 @@ def test_a_wheel_that_rolls_backwards_slips_by_the_angle_to_its_axis():
     assert SEDAN.forces(pi, 0.0, 0.0, 4000.0).F_y == pytest.approx(0.0, abs=1e-6)
 
 
-def test_combined_slip_of_the_sedan_stays_in_its_friction_ellipse():
-    alpha, kappa = np.meshgrid(
-        np.linspace(-pi / 2, pi / 2, 241),
-        np.concatenate([-np.geomspace(1e-3, 1.0, 100), [0.0], np.geomspace(1e-3, 1.0, 100)]),
-    )
-    for F_z in (200.0, 2000.0, 4000.0, 9000.0):
-        d = F_z / 4000.0 - 1.0
-        F = SEDAN.forces(ca.DM(alpha.ravel()), ca.DM(kappa.ravel()), 0.0, F_z)
-        x = np.array(F.F_x) / ((1.08 - 0.11 * d) * F_z)
-        y = np.array(F.F_y) / ((1.00 - 0.13 * d) * F_z)
-        assert 0.999 < np.hypot(x, y).max() < 1.01
-
-
 @pytest.mark.parametrize("name", ["PEX1", "PEY1", "REX1", "REY1"])
 def test_curvature_is_at_most_one(name):
     def force(E):
@@ -185,16 +172,3 @@ def test_symbols_and_floats_give_the_same_force(kind):
         values = [float(v) for v in ca.Function("f", x, list(result)).call(list(point))]
     assert all(isinstance(value, kind) for value in result)
     assert values == pytest.approx(LOPSIDED.forces(*point), rel=1e-13)
-
-
-def test_the_sedan_tire_is_what_its_header_says():
-    assert SEDAN.cornering_stiffness(4000.0) == pytest.approx(62e3, rel=0.005)
-    assert SEDAN.cornering_stiffness(2000.0) == pytest.approx(37e3, rel=0.005)
-    stiffness = [SEDAN.cornering_stiffness(F_z) for F_z in (7500.0, 7600.0, 7700.0)]
-    assert max(stiffness) == stiffness[1]
-    assert SEDAN.slip_stiffness(4000.0) == pytest.approx(88e3)
-    camber_thrust = SEDAN.forces(0.0, 0.0, 1e-4, 4000.0).F_y / 1e-4
-    assert camber_thrust == pytest.approx(-2.2e3, rel=0.01)
-    lock = SEDAN.forces(0.0, -1.0, 0.0, 4000.0).F_x
-    assert lock == pytest.approx(-0.7 * 1.08 * 4000.0, rel=0.02)
-    assert SEDAN.valid_range.F_z[0] < 4000.0 < SEDAN.valid_range.F_z[1] < 12000.0

@@ -254,16 +254,6 @@ def test_a_negative_lateral_friction_is_the_same_tire(tmp_path):
     assert tire.cornering_stiffness(F_z) > 0.0
 
 
-def test_a_negative_use_mode_mirrors_the_tire(tmp_path):
-    lopsided = {"PHY1": "0.01", "PVY1": "0.02", "RHX1": "0.003"}
-    plain = MagicFormula.from_tir(written(tmp_path, edited(**lopsided, USE_MODE="14")))
-    tire = MagicFormula.from_tir(written(tmp_path, edited(**lopsided, USE_MODE="-14")))
-    assert tire.side == plain.side == "left"
-    there, here = (one.forces(a, 0.0, 0.0, 4000.0).F_y for one, a in ((plain, -0.03), (tire, 0.03)))
-    assert here == pytest.approx(-there)
-    assert plain.forces(0.03, 0.0, 0.0, 4000.0).F_y != pytest.approx(here, rel=1e-3)
-
-
 def test_all_missing_coefficients_are_named_at_once(tmp_path):
     message = complaint(tmp_path, edited(PCY1=None, PKX1=None, FNOMIN=None))
     assert message.startswith("lacks FNOMIN, PKX1, PCY1")

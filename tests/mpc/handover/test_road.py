@@ -141,16 +141,6 @@ def test_the_road_before_comes_back_where_it_explains_enough_more(tire, size):
     assert change.before - change.after == pytest.approx(17.0 * size)
 
 
-def test_a_change_waits_until_enough_was_seen_for_it(tire):
-    wet = at_friction(tire, 0.5)
-    judge = Formula(tire, true=1.0, least=0.5, slope=20.0)
-    half = Road(tire, 0.5)
-    assert look(half, wet, judge, baseline=1.0, window=seen(0.4)) is None
-    assert look(half, wet, judge, baseline=1.0, window=seen(0.7)).verdict is Verdict.RECOVERY
-    fresh = half._replace(changed_at=9.5)
-    assert look(fresh, wet, judge, baseline=1.0, window=seen(0.4)).verdict is Verdict.CORRECTION
-
-
 def test_a_drop_is_sought_down_to_ice_and_in_the_last_moments_alone(tire):
     lengths = []
 

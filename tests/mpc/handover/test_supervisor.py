@@ -198,21 +198,3 @@ def test_a_fault_takes_back_what_was_handed_over_just_before_and_teaches_nothing
         assert supervisor.observe(*row, fault="sensors disagree") is None
     assert supervisor.identifier.counts.samples == samples
     assert supervisor.t == pytest.approx(0.01 * (k + 60))
-
-
-@pytest.mark.sweep("2.0")
-@pytest.mark.parametrize("relapse", [6.0, 2.0])
-def test_a_fault_that_comes_back_soon_takes_back_what_was_learnt_between(car, learnt, dry, relapse):
-    rules, calm = Rules(relapse=relapse), 4.0
-    supervisor, rows = supervisor_of(car, learnt, rules=rules), samples_of(dry[1])
-    for row in rows[:300]:
-        supervisor.observe(*row)
-    supervisor.observe(*rows[300], fault="sensors disagree")
-    known = supervisor.identifier.model().to_dict()
-    for row in rows[301 : 301 + round(100 * calm)]:
-        supervisor.observe(*row)
-    assert supervisor.identifier.model().to_dict() != known
-    supervisor.observe(*rows[-1], fault="sensors disagree")
-    assert (supervisor.identifier.model().to_dict() == known) is (calm < relapse)
-    most = relapse / rules.learnt_every + 3
-    assert len(supervisor._models) <= most

@@ -145,17 +145,6 @@ def test_a_learner_sees_every_sample_and_its_notes_are_kept(bump):
     assert shares[-1] == 1.0
 
 
-def test_plans_lie_along_the_path(bump, noisy):
-    assert len(noisy.plans) == math.ceil(len(noisy) / 10)
-    plan = noisy.plans[20]
-    X, Y = plan.line(bump)
-    assert plan.period == 200
-    assert X[0] == pytest.approx(noisy.X[200], abs=0.1)
-    assert np.hypot(np.diff(X), np.diff(Y)) == pytest.approx(1.2, abs=0.02)
-    lifted = plan._replace(x=np.full((3, 5), 0.5))
-    assert np.hypot(lifted.line(bump)[0] - X, lifted.line(bump)[1] - Y) == pytest.approx(0.5)
-
-
 def test_the_recording_is_what_an_identifier_reads(noisy):
     recording = noisy.recording()
     assert np.array_equal(recording.v_y, noisy.measured["v_y"])

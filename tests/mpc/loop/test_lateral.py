@@ -18,12 +18,10 @@ from mpc.handover.learner import Learner
 from mpc.handover.supervisor import Supervisor
 from mpc.loop.drive import drive
 from mpc.loop.lateral import LateralEstimate, LateralVelocity, Localization
-from mpc.loop.record import estimate_scores
 from mpc.loop.sensing import CarSensors, FaultySensors, Measured, imu_and_localization
-from mpc.path import Path, iso_3888_1
+from mpc.path import iso_3888_1
 from mpc.realtime import Tracker
 from mpc.tires import prediction_tire
-from tests.mpc.loop.test_drive import Driver
 
 CAR, DT = sedan(), 0.01
 SPEED = 20.0
@@ -98,19 +96,6 @@ def test_the_acceleration_is_told_in_the_plane_of_the_road(told):
     assert gradient == pytest.approx(1.0, abs=0.015)
 
 
-def test_where_the_friction_is_another_the_position_keeps_it_right():
-    """The identifier says less of its error than there is; without a position that is all."""
-    road = Friction(changes=(FrictionChange(scale=0.5, at_time=6.0),))
-    driven = list(states(10.0, road, amplitude=0.05))
-    found = told_over(driven)
-    blind = told_over(driven, localization=Localization(position=1e3, heading=1.0))
-    after = slice(600, None)
-    worst = np.abs(found["error"][after]).max()
-    assert np.mean(np.abs(found["error"][after]) < 2.0 * found["v_y_sd"][after]) > 0.9
-    assert np.abs(found["inertial"][after]).max() > 3.0 * worst
-    assert np.abs(blind["error"][after]).max() > 1.5 * worst
-
-
 @pytest.mark.sweep("r", "X", "a_y")
 @pytest.mark.parametrize("channel", ["X", "psi", "v_x", "r", "delta", "a_y"])
 def test_a_lost_channel_widens_the_band_and_is_driven_through(swings, channel, told):
@@ -172,32 +157,6 @@ def test_it_is_what_all_measurements_at_once_say(monkeypatch, rng):
 
 
 # In the loop.
-
-
-def test_the_tracker_steers_on_what_is_told_and_the_record_says_so():
-    path = Path.from_waypoints([0, 30, 60, 90], [0, 0, 2, 2], name="bump")
-    driver = Driver()
-    run = drive(
-        path,
-        DoubleTrackCar(CAR),
-        driver,
-        speed=15.0,
-        sensors=imu_and_localization(np.random.default_rng(3)),
-        rng=np.random.default_rng(1),
-        lateral=lateral(),
-    )
-    assert run.completed
-    assert [m.v_y for m in driver.seen] == run.estimates["v_y"].tolist()
-    assert "v_y" not in run.measured
-    assert np.array_equal(run.recording().v_y, run.estimates["v_y"])
-    assert run.recording().estimated == ("v_y",)
-    assert np.array_equal(run.recording().a_y, run.measured["a_y"])
-    found = estimate_scores(run)
-    assert found.rms_error_m_s == pytest.approx(
-        math.sqrt(sum((run.estimates["v_y"] - run.v_y) ** 2) / len(run))
-    )
-    assert 0.0 < found.rms_error_deg < 0.3
-    assert found.within_two_sd > 0.9
 
 
 @pytest.fixture(scope="module")

@@ -1,9 +1,7 @@
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 
 from mpc.path import iso_3888_1, iso_3888_2, slalom
-from mpc.path.gates import Gate
 
 # start, end, width, right edge above that of the first gate; b is the width of the car
 TABLE = {
@@ -38,54 +36,6 @@ def test_the_car_passes_between_the_cones_of_the_standard(build, b):
         np.count_nonzero((path.cones[:, 0] >= start) & (path.cones[:, 0] <= end))
         for start, end, *_ in TABLE[build](b)
     )
-
-
-def smallest_peak(gates, x, clearance, easing):
-    """The least max |y''| by linear programming, y'' linear between the x, |y'''| <= k/easing."""
-    n, h = x.size, x[1] - x[0]
-    # y'' = w: y by two sums, exact for a w that is linear in every step
-    to_slope = np.zeros((n, n))
-    to_place = np.zeros((n, n))
-    for i in range(1, n):
-        to_slope[i] = to_slope[i - 1]
-        to_slope[i, i - 1 : i + 1] += 0.5 * h
-        to_place[i] = to_place[i - 1] + h * to_slope[i - 1]
-        to_place[i, i - 1] += h * h / 3.0
-        to_place[i, i] += h * h / 6.0
-    rows, limits = [], []
-    for gate in gates:
-        inside = (x >= gate.start) & (x <= gate.end)
-        for sign, edge in ((1.0, gate.left - clearance), (-1.0, -gate.right - clearance)):
-            rows.append(np.column_stack((sign * to_place[inside], np.zeros(inside.sum()))))
-            limits.append(np.full(inside.sum(), edge))
-    rate = np.diff(np.eye(n), axis=0) / h
-    for matrix, factor in ((np.eye(n), 1.0), (rate, 1.0 / easing)):
-        for sign in (1.0, -1.0):
-            rows.append(np.column_stack((sign * matrix, np.full(len(matrix), -factor))))
-            limits.append(np.zeros(len(matrix)))
-    ends = np.zeros((4, n + 1))
-    ends[0, :n], ends[1, :n], ends[2, 0], ends[3, n - 1] = to_place[-1], to_slope[-1], 1.0, 1.0
-    cost = np.append(np.zeros(n), 1.0)
-    bounds = [(None, None)] * n + [(0.0, None)]
-    found = linprog(cost, np.vstack(rows), np.concatenate(limits), ends, np.zeros(4), bounds)
-    assert found.status == 0
-    return found.fun
-
-
-def test_the_line_has_nearly_the_smallest_peak_curvature_that_there_is():
-    b = 1.8
-    right = -0.5 * (1.1 * b + 0.25)
-    gates = [
-        Gate(
-            start=start - 40.0 * (k == 0),
-            end=end + 40.0 * (k == 2),
-            right=right + offset,
-            left=right + offset + width,
-        )
-        for k, (start, end, width, offset) in enumerate(TABLE[iso_3888_1](b))
-    ]
-    least = smallest_peak(gates, np.linspace(-40.0, 165.0, 206), 0.5 * b + 0.05, 10.0)
-    assert 0.99 * least < iso_3888_1(car_width=b).peak_curvature < 1.02 * least
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Sets of active limits before the interior point: what they find, and where none is tried."""
 
-import ctypes
-
 import numpy as np
 import pytest
 
@@ -76,39 +74,6 @@ def test_no_set_is_tried_after_many_rows_switched_or_without_a_plan(tire, proble
     assert counts[0] == counts[1] < counts[2]
     tracker.reset()
     assert tracker.instance.state["switched"] == np.iinfo(np.uint32).max
-
-
-@pytest.fixture
-def counting(tire, problem, monkeypatch):
-    """Make trackers of a C that counts what it factorizes."""
-    source = instance.tracker_source(tire.structure, problem.horizon, single=False)
-    begins = "bool mpc_factorize(mpc_work *work, real R, uint32_t last)\n{"
-    assert source.count(begins) == 1
-    counted = source.replace(begins, f"unsigned factorized;\n{begins}\n    factorized++;")
-    monkeypatch.setattr(instance, "tracker_source", lambda *_, **__: counted)
-    return lambda **words: Tracker(tire, problem, **words)
-
-
-def factorized(tracker, at, *, switched=0):
-    """How often a step factorizes, and its command."""
-    count = ctypes.c_uint.in_dll(tracker.instance._library, "factorized")
-    count.value = 0
-    command = solved(tracker, at, switched=switched)
-    return count.value, command
-
-
-def test_no_set_is_tried_where_the_car_is_thrown_off_its_plan(counting):
-    tracker = counting()
-    x0 = np.zeros(tracker.instance.start.size)
-    at = (x0, np.zeros(tracker.problem.horizon), np.full(tracker.problem.horizon, 18.0))
-    iterated(tracker, *at)
-    near, thrown = x0.copy(), x0.copy()
-    near[0], thrown[0] = 0.001, 2.0
-    assert factorized(tracker, (near, *at[1:]))[0] == 1
-    quiet, first = factorized(tracker, (thrown, *at[1:]))
-    known, again = factorized(tracker, (thrown, *at[1:]), switched=MANY)
-    assert quiet == known  # nothing is factorized in vain before the interior point
-    np.testing.assert_array_equal(first.plan_u, again.plan_u)
 
 
 @pytest.mark.sweep("pull*")
