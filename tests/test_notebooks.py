@@ -3,9 +3,12 @@
 import ast
 import json
 import re
+import shlex
 from pathlib import Path
 
 import pytest
+
+from tireid.cli import build_parser
 
 ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))

@@ -78,7 +78,6 @@ def test_what_is_told_is_to_the_last_bit_what_the_step_tells(paths, version, ste
     assert np.ptp(told[:, 2]) > 0.1
 
 
-@pytest.mark.sweep("washout")
 @needs_rivals
 def test_an_fmu_tells_as_much_of_side_slip_as_its_step(tmp_path, monkeypatch):
     """Not every method knows whether anything can be seen."""
