@@ -28,9 +28,9 @@ from identifier.estimate.drive import Drive
 from identifier.estimate.model import FittedModel
 from identifier.estimate.priors import SENSORS, Priors
 from identifier.estimate.solve import Problem, around_beliefs, car_numbers, normal
-from identifier.motion.model import curve_function, curve_index
+from identifier.motion.model import curve_function
 from identifier.motion.nodes import GIVEN, node_scan
-from identifier.motion.parameters import INDEX, NAMES
+from identifier.motion.parameters import INDEX, NAMES, curve_index
 from identifier.tire_model import TireModel
 from models import maneuvers
 from models.maneuvers import Maneuver
