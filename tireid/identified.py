@@ -34,7 +34,7 @@ from tireid.figures.paper import error_figure, weights_figure
 from tireid.figures.side_slip import side_slip_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import learnt_axles_figure, slip_figure
-from tireid.output import axle_columns, text_table, write_csv, write_json, write_table
+from tireid.output import axle_columns, text_table, write_csv, write_json, write_long_csv
 from tireid.progress import Progress, say
 
 _OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
@@ -170,9 +170,7 @@ class Results:
             "version": __version__,
         }
 
-    def write(
-        self, folder: Path, *, curves: str = "csv", progress: Progress | None = None
-    ) -> dict[str, Figure]:
+    def write(self, folder: Path, progress: Progress | None = None) -> dict[str, Figure]:
         """Write everything into a folder; return the figures by the name of their file.
 
         progress : informed how far it is; None informs nobody.
@@ -185,11 +183,11 @@ class Results:
             model.save(folder / f"weights{end}.json", valid=valid)
             columns = _curve_columns(model, [run.recording for run in self.runs])
             write_csv(folder / f"curve{end}.csv", columns)
-        self._write_curves(folder, curves, progress or Progress("curves"))
+        self._write_curves(folder, progress or Progress("curves"))
         say("drawing figures")
         return save_figures(folder, self._figures())
 
-    def _write_curves(self, folder: Path, curves: str, progress: Progress) -> None:
+    def _write_curves(self, folder: Path, progress: Progress) -> None:
         learnt, count = self.runs[0], len(self.runs)
         for k, run in enumerate(self.runs):
             replays = {
@@ -198,12 +196,12 @@ class Results:
             }
             end = "" if run is learnt else f"_{file_name(run.recording)}"
             share = progress.within(_WRITING * k / count, _WRITING * (k + 1) / count)
-            write_table(folder / f"forces{end}.{curves}", _force_columns(run, replays, share))
+            write_long_csv(folder / f"forces{end}.csv", _force_columns(run, replays, share))
         if _OBSERVED in learnt.outputs:
             found = (_error_columns(learnt, one) for one in learnt.blocks())
-            write_table(folder / f"errors.{curves}", found)
+            write_long_csv(folder / "errors.csv", found)
         if learnt.online:
-            write_table(folder / f"weights.{curves}", _weight_columns(learnt))
+            write_long_csv(folder / "weights.csv", _weight_columns(learnt))
 
     def _figures(self) -> dict[str, Figure]:
         learnt, model = self.runs[0], self.model

@@ -7,7 +7,6 @@ the next run says so.
 """
 
 import hashlib
-import importlib
 import json
 import os
 import shutil
@@ -22,7 +21,6 @@ import numpy as np
 from codegen.arrays import Array
 from codegen.errors import TireidError
 from codegen.writing import naming, write_file
-from models.extras import needs
 from models.files import resolved
 from models.schema import read_json
 from tireid.exchange import ClaimedError, claim, exchange
@@ -321,42 +319,6 @@ def write_long_csv(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
             for first in range(0, len(table), _ROWS):
                 some = table[first : first + _ROWS]
                 file.write((row * len(some)) % tuple(some.ravel().tolist()))
-
-
-def write_table(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
-    """Write columns that come part by part: as `write_csv` does, or as Parquet with all digits."""
-    if path.suffix != ".parquet":
-        write_long_csv(path, parts)
-        return
-    pyarrow, parquet = _parquet()
-    with naming(path), ExitStack() as stack:
-        writer: Any = None
-        for columns in parts:
-            arrays = {  # by their buffers: what makes arrays of NumPy's imports pandas
-                name: pyarrow.Array.from_buffers(
-                    pyarrow.float64(),
-                    len(column),
-                    [None, pyarrow.py_buffer(np.ascontiguousarray(column, dtype=np.float64))],
-                )
-                for name, column in columns.items()
-            }
-            table = pyarrow.table(arrays)
-            if writer is None:
-                writer = stack.enter_context(parquet.ParquetWriter(path, table.schema))
-            writer.write_table(table)
-
-
-def require_curves(kind: str) -> None:
-    """Refuse a kind of file for curves that cannot be written here."""
-    if kind == "parquet":
-        _parquet()
-
-
-def _parquet() -> tuple[Any, Any]:
-    try:
-        return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
-    except ImportError:
-        raise ValueError(needs("--curves parquet", "pyarrow", "parquet")) from None
 
 
 def text_table(rows: Sequence[Sequence[str]], align: str = "", *, indent: str = "") -> str:

@@ -135,20 +135,6 @@ def test_every_curve_is_also_data(result, law):
     assert len(weights.dtype.names) == 1 + columns
 
 
-def test_curves_as_parquet_stand_in_place_of_those_as_csv(logs, tmp_path, unmade):
-    parquet = pytest.importorskip("pyarrow.parquet")
-    words = ["identify", str(logs / "quick.csv"), "--vehicle", str(logs / "car.toml")]
-    words += ["--method", "axle"]
-    for curves in ("csv", "parquet"):
-        assert main([*words, "--curves", curves, "--out", str(tmp_path / curves)]) in (0, 3)
-    for name in ("forces", "weights"):
-        assert not (tmp_path / "parquet" / f"{name}.csv").exists()
-        table = parquet.read_table(tmp_path / "parquet" / f"{name}.parquet")
-        told = np.loadtxt(tmp_path / "csv" / f"{name}.csv", delimiter=",", skiprows=1)
-        found = np.column_stack([column.to_pylist() for column in table.columns])
-        np.testing.assert_allclose(found, told, rtol=1e-8)
-
-
 def test_slip_angles_and_forces_of_every_axle_are_in_its_own_column(result, logs):
     """The columns alone say it: slips by the other columns, truth by the log."""
     car = sedan()

@@ -1,7 +1,6 @@
 """Files and drawings of long recordings: nothing that reaches far is lost, and no byte changes."""
 
 import io
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from tireid.figures import thinned
 from tireid.figures.forces import inputs_figure
 from tireid.figures.thinned import cloud, drawn_times, shown, shown_of_run
 from tireid.learning import identify
-from tireid.output import require_curves, write_csv, write_long_csv, write_table
+from tireid.output import write_csv, write_long_csv
 from tireid.reports.common import _recording_digest
 
 N = 500_000
@@ -142,24 +141,3 @@ def test_the_hash_of_a_long_recording_tells_one_bit(drive, monkeypatch):
     r[2999] = np.nextafter(r[2999], 1.0)
     assert _recording_digest(drive) == _recording_digest(replace(drive))
     assert _recording_digest(drive) != _recording_digest(replace(drive, r=r))
-
-
-def test_a_parquet_table_in_parts_holds_every_digit_of_every_column(tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet")
-    rng = np.random.default_rng(1)
-    columns = {"t_s": 0.01 * np.arange(1000), "Fyf_N": rng.standard_normal((1000, 2))[:, 1]}
-    columns["Fyr_N"] = np.where(rng.random(1000) < 0.1, np.nan, columns["Fyf_N"] * 1e-300)
-    cuts = [slice(0, 1), slice(1, 400), slice(400, 1000)]
-    path = tmp_path / "forces.parquet"
-    write_table(path, ({k: v[cut] for k, v in columns.items()} for cut in cuts))
-    table = parquet.read_table(path)
-    assert table.column_names == list(columns)
-    for name, values in columns.items():
-        np.testing.assert_array_equal(np.array(table.column(name).to_pylist()), values)
-
-
-def test_without_pyarrow_parquet_is_refused_before_anything_is_learnt(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    require_curves("csv")
-    with pytest.raises(ValueError, match="--curves parquet needs pyarrow: pip install pyarrow"):
-        require_curves("parquet")

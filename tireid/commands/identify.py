@@ -25,7 +25,7 @@ from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.figures.style import paper_design
 from tireid.identified import Results, file_name
 from tireid.learning import identify, with_v_y
-from tireid.output import output_folder, require_curves, require_free, write_json
+from tireid.output import output_folder, require_free, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import guaranteed_text, side_slip_text, write_identify_report
 from tireid.verdicts import verdict_text, verdicts_text
@@ -66,8 +66,6 @@ def add_parser(commands: Any) -> None:
     shared.add_weights(parser, "begin with this model")
     shared.add_seed(parser, "the initial weights of the paper's network")
     shared.add_accept(parser)
-    text = "format of curves over time (csv); parquet is smaller and faster, with all digits"
-    parser.add_argument("--curves", choices=("csv", "parquet"), default="csv", help=text)
     shared.add_output(parser, "identify")
     parser.set_defaults(run=run)
 
@@ -81,7 +79,6 @@ def run(options: argparse.Namespace) -> int:
     start = shared.stored_model(options.weights)
     if options.run_name is not None and len(options.logs) > 1:
         raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
-    require_curves(options.curves)
     if options.repair is not None:
         require_free(options.repair, force=options.force)
     logs = [_read(log, options.run_name, vehicle, design, options) for log in options.logs]
@@ -137,7 +134,7 @@ def run(options: argparse.Namespace) -> int:
         if options.bound is not None:
             tire = guaranteed(learnt, bound, last, tire)
         found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
-        figures = found.write(folder, curves=options.curves, progress=progress.begin(_DRAWING))
+        figures = found.write(folder, progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(folder, found, figures, diagnosis, options.words)
         given = (
