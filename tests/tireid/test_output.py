@@ -447,7 +447,6 @@ def test_a_full_disk_leaves_the_old_folder_whole(tmp_path):
 
 def test_what_cannot_be_written_is_named_by_every_writer(tmp_path):
     pytest.importorskip("resource")
-    pytest.importorskip("pyarrow", reason="needs the package pyarrow")
     program = """
     import resource
     from pathlib import Path
@@ -457,7 +456,7 @@ def test_what_cannot_be_written_is_named_by_every_writer(tmp_path):
     from models.files import write_atomically
     from tireid.cli import one_line
     from tireid.figures.style import save_figures
-    from tireid.output import output_folder, write_csv, write_json, write_table
+    from tireid.output import output_folder, write_csv, write_json
 
     columns = {"t_s": np.random.default_rng(0).random(9999)}
     here, text = Path.cwd(), "x" * 9999
@@ -469,7 +468,6 @@ def test_what_cannot_be_written_is_named_by_every_writer(tmp_path):
     writers = {
         "data.json": lambda path: write_json(path, [text]),
         "rows.csv": lambda path: write_csv(path, columns),
-        "rows.parquet": lambda path: write_table(path, [columns]),
         "model.json": lambda path: write_atomically(path, text),
         "figure.png": lambda path: save_figures(path.parent, {path.stem: Figure()}),
         "page.html": lambda path: write_file(path, text),
@@ -484,6 +482,6 @@ def test_what_cannot_be_written_is_named_by_every_writer(tmp_path):
             print(one_line(error).replace(f"{here}/", ""))
     """
     told = " ".join(ran(textwrap.dedent(program), tmp_path))
-    names = ("data.json", "rows.csv", "rows.parquet", "model.json", "figure.png", "page.html")
+    names = ("data.json", "rows.csv", "model.json", "figure.png", "page.html")
     wanted = [f"{name}: file too large" for name in (*names, "results/deep.json")]
     assert told == " ".join(wanted)
