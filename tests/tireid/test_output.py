@@ -370,7 +370,6 @@ def test_a_run_that_is_killed_leaves_the_old_folder_or_the_new_one(tmp_path, at_
 
 def test_what_cannot_be_written_is_named_by_every_writer(tmp_path):
     pytest.importorskip("resource")
-    pytest.importorskip("pyarrow", reason="needs the package pyarrow")
     program = """
     import resource
     from pathlib import Path

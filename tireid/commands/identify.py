@@ -119,7 +119,7 @@ def run(options: argparse.Namespace) -> int:
         asked = _asked(learnt.freeze(last), others)
         tire = calibrated(learnt, last, verdict)
         found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
-        figures = found.write(folder, progress=progress.begin(_DRAWING))
+        figures = found.write(folder, progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(folder, found, figures, diagnosis, options.words)
         given = (

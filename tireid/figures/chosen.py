@@ -14,9 +14,6 @@ class Chosen(NamedTuple):
     dark: float = 0.55  # share of the color scale from which text is white
     longest: int = 17  # letters of a recording's name beside a map
     # drive
-    bins: int = 60  # of a histogram
-    drive_wide: float = 10.0  # times slower than the median: from there on the axis is logarithmic
-    ms_per_s: float = 1e3  # ms in a second
     # dashes of tires as they are at the end of a drive [points]
     later: tuple[int, tuple[float, float]] = (0, (2.5, 0.9))
     near: float = 0.75  # a limit is drawn where a command comes this close to it
@@ -39,7 +36,6 @@ class Chosen(NamedTuple):
     small: float = 160.0  # in a picture of more than that [m] cars cannot be seen
     # a part of such a path that is drawn large, where a car was farthest off [m]
     zoom: float = 44.0
-    seen: float = 0.05  # deviations are drawn larger until the largest is this share of the picture
     # paper
     paper_wide: float = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
     offset: float = 0.2  # between neighboring laws, as a share of the distance of columns

@@ -49,7 +49,7 @@ def _force_panels(
     curves = [force for _, row in rows for force, _ in row]
     reference = curves[0] if known is None else known
     signals: list[Signal] = [force.__getitem__ for force in (reference, *curves)]
-    signals += [lambda at, force=force: force[at] - reference[at] for force in curves]
+    signals += [_missed(force, reference) for force in curves]
     part = shown(recording.t, ends, *signals)
     t, unit = drawn_times(recording, recording.t[part]), style.force_unit_of(reference[part])
 
@@ -76,6 +76,10 @@ def _force_panels(
         panels[-1, 0].set_ylim(style.force_range(np.zeros(1), *within))
     style.label_forces(panels, unit, residual=bool(residuals))
     return figure, panels, unit
+
+
+def _missed(force: Array, reference: Array) -> Signal:
+    return lambda at: force[at] - reference[at]
 
 
 @style.styled

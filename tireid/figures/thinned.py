@@ -17,7 +17,7 @@ from models.recordings import Recording
 
 COLUMNS = 1500  # of pixels, more than any panel has
 
-_Samples = NDArray[Any]  # indices, or whether each sample is meant
+_Samples = NDArray[np.intp]  # indices
 Signal = Callable[[slice | _Samples], NDArray[Any]]  # values (k,) or (k, m) at some samples
 
 
@@ -26,9 +26,6 @@ def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> _Samples:
 
     t : times of the samples (n,) [s].   ends : first and last time [s].
     """
-    if len(t) <= LONG:
-        within: _Samples = (t >= ends[0]) & (t <= ends[1])
-        return within
     first = int(np.searchsorted(t, ends[0], side="left"))
     last = int(np.searchsorted(t, ends[1], side="right"))
     if last - first <= LONG:
