@@ -45,12 +45,15 @@ from models.vehicle import Vehicle
 # has a peak and keeps its sign.
 
 _LOGIT = math.log((SHAPE - 1.0) / (2.0 - SHAPE))
-_SPREADS = ("stiffness_spread", "shape_spread", "friction_spread")
-KINDS = (0, 0, 1, 1, 2, 2)  # of each θ of the curve, in the order of the spreads
-LIMITS = (2.0, 3.0, 1.5)  # of |θ| by kind: stiffness within a factor of 7.4, friction 4.5
-LAG_LIMIT = 2.0  # of |ln σ/σ₀|: a relaxation length within a factor of 7.4
-OFFSET_LIMITS = (5.0, 8.0)  # spreads of δ₀ and of b: 0.01 rad, for a sedan 0.2 m/s
-OWN = 4  # unknowns beside those of the curve: ln σ/σ₀ (2,), δ₀ and b over their spreads
+OF_CURVE = 6  # of the unknowns θ; then ln σ/σ₀ (2,), δ₀ and b over their spreads
+# Standard deviations of θ at first: log stiffness, logit shape, log friction, in front and behind.
+SPREAD = np.array([0.5, 0.5, 0.7, 0.7, 0.4, 0.4, 0.5, 0.5, 1.0, 1.0])
+# Of |θ|: stiffness within a factor of 7.4, friction 4.5, a relaxation length 7.4; the last two are
+# 0.01 rad, and for a sedan 0.2 m/s.
+LIMIT = np.array([2.0, 2.0, 3.0, 3.0, 1.5, 1.5, 2.0, 2.0, 5.0, 8.0])
+FRICTION = 0.9  # at first
+STEERING_SPREAD = 0.002  # [rad] standard deviation of the zero of the front steering at first
+OUTLIER = 5.0  # standard deviations
 
 
 def _decoded(p: BicycleParameters, friction: Any, loads: Any, theta: Any) -> Any:
@@ -84,9 +87,7 @@ def _correct(
     return estimate + move, (after + after.T) / 2
 
 
-_NOISE = ("v_y_noise", "r_noise", "v_y_disturbance", "r_disturbance", "outlier")
 _CONSTANTS = ("noise", "walk", "limit", "prior", "learning_speed")
-_OWN_PRIOR = ("relaxation_length", "steering_spread", "v_y_spread")
 
 
 def _build_step(textbook: bool) -> ca.Function:
@@ -95,20 +96,19 @@ def _build_step(textbook: bool) -> ca.Function:
     Carried: estimate (n,) = [v_y, r, α' where slip lags, θ], its covariance P, before (3,) = δ_f,
     δ_r and v_x of the last sample, running (1 after a sample in motion); where slip lags also the
     `LaggedSlip` of what is measured, which the output force reads as the frozen model does: that of
-    the θ carried into the sample. Held: noise in the order of `_NOISE` (standard deviations [m/s],
-    [rad/s]; disturbances per root of time [m/s/√s], [rad/s/√s]), walk of θ [1/√s], limit of |θ|,
-    learning_speed [m/s], prior: friction [-], then `_OWN_PRIOR`. Below that speed θ and its
+    the θ carried into the sample. Constant: noise (standard deviations of v_y [m/s] and r [rad/s];
+    disturbances [m/s/√s], [rad/s/√s]; outlier), walk of θ [1/√s], limit of |θ|, learning_speed
+    [m/s], prior: friction [-], σ₀ [m], spreads of δ₀ [rad] and b [m/s]. Below that speed θ and its
     covariance are kept, and x and α' begin anew from the measurement.
     textbook : whether it is without lag and offsets; then θ is that of the curve alone.
     """
-    s, of_curve = sample_ports(), len(KINDS)
-    lags, own, prior = (0, 0, 1) if textbook else (2, OWN, 1 + len(_OWN_PRIOR))
-    unknowns = of_curve + own
+    s, lags = sample_ports(), 0 if textbook else 2
+    unknowns = OF_CURVE if textbook else LIMIT.size
     p, dt, n = s.parameters, s.sampling[0], 2 + lags + unknowns
     estimate, P, before = ca.SX.sym("estimate", n), ca.SX.sym("P", n, n), ca.SX.sym("before", 3)
-    running, noise = ca.SX.sym("running"), ca.SX.sym("noise", len(_NOISE))
+    running, noise = ca.SX.sym("running"), ca.SX.sym("noise", 5)
     walk, limit = ca.SX.sym("walk", unknowns), ca.SX.sym("limit", unknowns)
-    known, learning_speed = ca.SX.sym("prior", prior), ca.SX.sym("learning_speed")
+    known, learning_speed = ca.SX.sym("prior", 4), ca.SX.sym("learning_speed")
     moved, theta = estimate[: 2 + lags], estimate[2 + lags :]
     x, loads = estimate[:2], axle_loads(p)
     learning = s.v_x >= learning_speed
@@ -116,17 +116,17 @@ def _build_step(textbook: bool) -> ca.Function:
     def slip_of(v_x: Any, x: Any, u: Any) -> Any:
         if textbook:
             return wheel_slip(p, v_x, x, u)
-        return measured_slip(p, known[2:4] * theta[of_curve + 2 :], v_x, x, u)
+        return measured_slip(p, known[2:4] * theta[OF_CURVE + 2 :], v_x, x, u)
 
     def force_of(slip: Any, u: Any) -> Any:
-        return magic_formula(_decoded(p, known[0], loads, theta[:of_curve]), slip, u)
+        return magic_formula(_decoded(p, known[0], loads, theta[:OF_CURVE]), slip, u)
 
     u_mean = (before[:2] + s.u) / 2
     v_mean = ca.fmax((before[2] + s.v_x) / 2, learning_speed)
     alpha = slip_of(v_mean, x, u_mean)
     slip = alpha if textbook else moved[2:]
     rate = motion_rate(p, v_mean, x, force_of(slip, u_mean))
-    sigma: Any = None if textbook else known[1] * ca.exp(theta[of_curve : of_curve + 2])
+    sigma: Any = None if textbook else known[1] * ca.exp(theta[OF_CURVE : OF_CURVE + 2])
     if not textbook:
         rate = ca.vertcat(rate, v_mean / sigma * (alpha - slip))
     ahead = ca.vertcat(midpoint(estimate, rate, dt), theta)
@@ -183,72 +183,42 @@ def _scan(textbook: bool) -> Scan:
 class CurveEkf(Method):
     """Tire parameters that walk at random, slowly, in the coordinates of `_decoded`.
 
-    With them the lag of the tire and the zeros of both sensors, which the default learns too.
-    walk : of every parameter [1/√s].   v_y_noise : standard deviation of measured v_y [m/s].
-    r_noise : standard deviation of the measured yaw rate [rad/s].
-    v_y_disturbance : what the curve misses, as random change of v_y [m/s/√s].
-    r_disturbance : what the curve misses, as random change of the yaw rate [rad/s/√s].
-    relaxation_length : what σ of both axles is held for at first [m].
-    v_y_spread : standard deviation of the bias of v_y at first [m/s].
-    steering_spread : standard deviation of the zero of the front steering at first [rad].
-    relaxation_spread : standard deviation of the logarithm of σ at first [-].
-    textbook : without lag and offsets, as papers have this filter; the four before do nothing then.
-    friction : what friction is held for at first [-].
-    stiffness_spread : standard deviation of the logarithm of stiffness at first [-].
-    shape_spread : standard deviation of the Magic Formula's shape at first, as its logit [-].
-    friction_spread : standard deviation of the logarithm of friction at first [-].
-    dt : sampling interval [s].   learning_speed : below this speed [m/s] learning rests.
-    min_speed : below this speed [m/s] forces read zero.
+    With them the lag of the tire and the zeros of both sensors, which the default learns too. The
+    size of the car sets its numbers: for a sedan noise of 0.02 m/s and 0.002 rad/s. Disturbances
+    stand for what the curve misses, for a natural time at once: 8 % of g without lag and offsets,
+    half of it with them. The parameters may walk by one percent in a second. Both were chosen on 32
+    random cars of our plant, from a compact to 1:10.
+    time : sqrt(L/g) of the car [s].   speed : sqrt(g L) [m/s].   wheelbase : L [m].
+    textbook : without lag and offsets, as papers have this filter.
+    dt : sampling interval [s].   min_speed : below this speed [m/s] forces read zero.
     """
 
-    walk: float
-    v_y_noise: float
-    r_noise: float
-    v_y_disturbance: float
-    r_disturbance: float
-    relaxation_length: float
-    v_y_spread: float
-    steering_spread: float = 0.002
-    relaxation_spread: float = 0.5
+    time: float
+    speed: float
+    wheelbase: float
     textbook: bool = False
-    friction: float = 0.9
-    stiffness_spread: float = 0.5
-    shape_spread: float = 0.7
-    friction_spread: float = 0.4
-    outlier: float = 5.0
     dt: float = 0.01
-    learning_speed: float = 3.0
     min_speed: float = 1.0
 
     def __post_init__(self) -> None:
-        filtered = ("walk", *_NOISE, "friction", *_SPREADS, *_OWN_PRIOR, "relaxation_spread")
-        names = (*filtered, "dt", "learning_speed", "min_speed")
+        names = ("time", "speed", "wheelbase", "dt", "min_speed")
         require_positive(ValueError, **{name: getattr(self, name) for name in names})
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01, textbook: bool = False) -> Self:
-        """Return the filter for a car: for a sedan noise of 0.02 m/s and 0.002 rad/s.
-
-        Disturbances stand for what the curve misses, for a natural time at once: 8 % of g without
-        lag and offsets, half of it with them. The parameters may walk by one percent in a second.
-        Both were chosen on 32 random cars of our plant, from a compact to 1:10.
-        dt : sampling interval [s].
-        """
-        time, speed = vehicle.froude_time, vehicle.froude_speed
-        missed = 1.0 if textbook else 0.5
         return cls(
-            walk=0.0075 / math.sqrt(time),
-            v_y_noise=0.004 * speed,
-            r_noise=0.001 / time,
-            v_y_disturbance=0.08 * missed * speed / math.sqrt(time),
-            r_disturbance=0.12 * missed / time**1.5,
-            relaxation_length=0.4 * vehicle.wheelbase,
-            v_y_spread=0.005 * speed,
+            time=vehicle.froude_time,
+            speed=vehicle.froude_speed,
+            wheelbase=vehicle.wheelbase,
             textbook=textbook,
             dt=dt,
-            learning_speed=0.6 * speed,
             min_speed=vehicle.lowest_speed,
         )
+
+    @property
+    def prior(self) -> Array:
+        """Friction [-], σ₀ of both axles [m], spreads of δ₀ [rad] and of b [m/s]."""
+        return np.array([FRICTION, 0.4 * self.wheelbase, STEERING_SPREAD, 0.005 * self.speed])
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -266,56 +236,44 @@ class CurveEkf(Method):
         """Return what a run needs; it begins afresh, from the prior."""
         if start is not None:
             raise ValueError("this filter begins afresh: it goes on from no stored model")
-        lags = 0 if self.textbook else 2
-        prior = () if self.textbook else _OWN_PRIOR
-        noise = [self.v_y_noise, self.r_noise, *[self.v_y_noise / self.learning_speed] * lags]
+        lags, unknowns = (0, OF_CURVE) if self.textbook else (2, LIMIT.size)
+        missed, learning_speed = 1.0 if self.textbook else 0.5, 0.6 * self.speed
+        v_y_noise, r_noise = 0.004 * self.speed, 0.001 / self.time
+        v_y_disturbance = 0.08 * missed * self.speed / math.sqrt(self.time)
+        r_disturbance = 0.12 * missed / self.time**1.5
+        begun = [v_y_noise, r_noise, *[v_y_noise / learning_speed] * lags]
         return Setup(
             scan=_scan(self.textbook),
             carry={
-                "estimate": np.zeros(2 + lags + self.limit.size),
-                "P": np.diag([*noise, *self.spread]) ** 2,
+                "estimate": np.zeros(2 + lags + unknowns),
+                "P": np.diag([*begun, *SPREAD[:unknowns]]) ** 2,
                 "before": np.zeros(3),
                 "running": np.zeros(1),
                 **({} if self.textbook else unlagged()),
             },
             constants={
-                "noise": np.array([getattr(self, name) for name in _NOISE]),
-                "walk": np.full(self.limit.size, self.walk),
-                "limit": self.limit,
-                "prior": np.array([getattr(self, name) for name in ("friction", *prior)]),
-                "learning_speed": np.array(self.learning_speed),
+                "noise": np.array([v_y_noise, r_noise, v_y_disturbance, r_disturbance, OUTLIER]),
+                "walk": np.full(unknowns, 0.0075 / math.sqrt(self.time)),
+                "limit": LIMIT[:unknowns],
+                "prior": self.prior,
+                "learning_speed": np.array(learning_speed),
                 "vehicle": np.array(vehicle.bicycle),
                 "sampling": np.array([self.dt, self.min_speed]),
             },
         )
 
-    @property
-    def spread(self) -> Array:
-        """Standard deviations of the unknowns θ at first, (n,) [-]."""
-        of_curve = [getattr(self, _SPREADS[kind]) for kind in KINDS]
-        own = [] if self.textbook else [self.relaxation_spread, self.relaxation_spread, 1.0, 1.0]
-        return np.array([*of_curve, *own])
-
-    @property
-    def limit(self) -> Array:
-        """What the unknowns θ stay within, (n,) [-]."""
-        of_curve = [LIMITS[kind] for kind in KINDS]
-        own = [] if self.textbook else [LAG_LIMIT, LAG_LIMIT, *OFFSET_LIMITS]
-        return np.array([*of_curve, *own])
-
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> CurveModel:
         """Return the curve with the carried parameters, lag and offsets."""
-        theta, n = state["estimate"].ravel()[-self.limit.size :], len(KINDS)
-        loads = ca.DM(vehicle.axle_loads)
-        values = _decoded(vehicle.bicycle, self.friction, loads, ca.DM(theta[:n]))
+        n = OF_CURVE if self.textbook else LIMIT.size
+        theta, loads = state["estimate"].ravel()[-n:], ca.DM(vehicle.axle_loads)
+        values = _decoded(vehicle.bicycle, FRICTION, loads, ca.DM(theta[:OF_CURVE]))
         curve = CurveModel(
             vehicle=vehicle, parameters=np.array(ca.DM(values)), min_speed=self.min_speed
         )
         if self.textbook:
             return curve
-        lag, offset = theta[n : n + 2], theta[n + 2 :]
+        length, *spreads = self.prior[1:]
+        lag, offset = theta[OF_CURVE : OF_CURVE + 2], theta[OF_CURVE + 2 :]
         return replace(
-            curve,
-            relaxation_length=self.relaxation_length * np.exp(lag),
-            offset=offset * (self.steering_spread, self.v_y_spread),
+            curve, relaxation_length=length * np.exp(lag), offset=offset * np.array(spreads)
         )
