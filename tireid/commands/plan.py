@@ -36,8 +36,8 @@ def add_parser(commands: Any) -> None:
         description="Rank maneuvers by what one drive of each leaves: the expected error of the "
         "forces on another drive, random steering up to the same share of the grip, over their "
         "rms. Beside it stand the standard deviations of stiffness, grip and relaxation over their "
-        "values. On a real car the error of the model adds to all. Each maneuver is steered as "
-        "hard as --grip allows with the likely tires; steering.csv has the best. " + CAUTION,
+        "values. Each maneuver is steered as hard as --grip allows with the likely tires; "
+        "steering.csv has the best. " + CAUTION,
     )
     shared.add_vehicle(parser, default="the sedan; with --weights that of the model")
     shared.add_weights(parser, "a fit; plan what it leaves open")
