@@ -104,17 +104,6 @@ def test_a_dependency_without_a_lower_bound_is_refused():
         lowest({"dependencies": ["numpy"], "optional-dependencies": {}}, [])
 
 
-def test_an_extra_that_names_others_asks_for_all_of_theirs():
-    optional = {"a": ["one>=1"], "b": ["car[a,c]", "two>=2"], "c": ["car[b]", "one>=1", "x[y]>=3"]}
-    project = {"name": "car", "dependencies": ["zero>=0"], "optional-dependencies": optional}
-    found = LOWEST["requirements"](project, ["b"])
-    assert sorted(found) == ["one>=1", "one>=1", "two>=2", "x[y]>=3", "zero>=0"]
-    asked = {name for name, _ in wanted(["test"])}
-    for extra in ("parquet", "mat", "mdf", "ros", "can", "fmu", "onnx", "cluster"):
-        assert {name for name, _ in wanted([extra])} <= asked
-    assert LOWEST["lowest"](PROJECT, ["logs"])[0] == "casadi==3.7.0"
-
-
 @pytest.mark.parametrize("extra", EXTRAS)
 def test_what_a_message_says_to_install_is_the_whole_extra(extra):
     told = {re.fullmatch(r"'?([\w-]+).*", library)[1] for library in EXTRAS[extra]}

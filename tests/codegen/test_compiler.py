@@ -200,29 +200,6 @@ def test_a_new_cache_is_for_this_user_only(monkeypatch, tmp_path):
     assert [stat.S_IMODE(p.stat().st_mode) for p in (library.parent, library)] == [0o700, 0o600]
 
 
-@pytest.mark.parametrize("below", ["", "deeper"])
-def test_a_cache_that_is_a_file_is_replaced_for_this_run(monkeypatch, tmp_path, caplog, below):
-    (tmp_path / "file").write_text("not a folder")
-    monkeypatch.setenv("TIREID_CACHE", str(tmp_path / "file" / below))
-    compiler_module._temporary_folder.cache_clear()
-    with caplog.at_level("WARNING", logger="tireid"):
-        assert load_library(ONE, "one").one() == 1
-        stand_in = cache_folder()
-    assert list(stand_in.glob("one-*.so"))
-    assert len(caplog.messages) == 1
-    assert "no cache of compiled code" in caplog.messages[0]
-
-
-def test_a_user_without_a_home_has_a_cache_all_the_same(monkeypatch):
-    def homeless():
-        raise RuntimeError("Could not determine home directory.")
-
-    for name in ("TIREID_CACHE", "XDG_CACHE_HOME"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(Path, "home", homeless)
-    assert cache_folder().is_dir()
-
-
 NAN_GUARD = "double guarded(double x) { return x != x ? -1.0 : x; }"
 
 

@@ -78,14 +78,6 @@ def test_functions_that_differ_in_their_constants_alone_become_one():
     assert other(0.1, 2.0, of_other) == spring(1500.0, 40.0)(0.1, 2.0)
 
 
-def test_operations_that_a_result_takes_are_counted_once():
-    x = ca.SX.sym("x", 2)
-    shared = x[0] * x[1]
-    graph = graph_of(ca.Function("f", [x], [x[0], shared, (shared + 1) * (shared - x[1])]))
-    needed = graph.needed()
-    assert [needed[place] for (place,) in graph.outputs] == [0, 1, 4]
-
-
 def test_our_own_functions_are_found_again_and_those_of_libraries_replaced(rng):
     x = ca.SX.sym("x", 4)
     own = ca.Function("f", [x], [tanh(x[0]) + exp(x[1]) * atan(x[2]) - sin(x[3])])
@@ -228,18 +220,6 @@ def test_tuned_parts_are_the_whole(rng):
         assert float(parts.condition(*given)) == (v > 1.0)
         for a, b in zip(part(*given), parts.function(*given), strict=True):
             np.testing.assert_array_equal(np.array(a), np.array(b))
-
-
-def test_a_function_that_decides_nothing_stays_whole():
-    x = ca.SX.sym("x")
-    parts = tuned(ca.Function("f", [x], [tanh(3 * x)], ["x"], ["y"]), sampled=("x",))
-    assert parts.where_false is None
-    assert float(parts.condition(0.3)) == 1.0
-
-
-def test_casadi_simplifies_again_afterwards():
-    tuned(learning_step(), sampled=("v",))
-    assert ca.GlobalOptions.getSimplificationOnTheFly()
 
 
 @pytest.mark.parametrize("turned", [False, True])

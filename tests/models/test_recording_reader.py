@@ -243,15 +243,6 @@ def test_a_map_with_a_repair_is_judged_by_what_the_repair_leaves(mirrored):
     np.testing.assert_array_equal(recording.a_y, -20.0 * recording.r)  # as it was logged
 
 
-def test_a_data_frame_with_a_repair_is_judged_by_what_the_repair_leaves(mirrored):
-    log = read_recording(mirrored, check=False)
-    names = {"t": "t", "vx": "v_x", "vy": "v_y", "r": "r", "delta_f": "delta_f", "ay": "a_y"}
-    data = {column: getattr(log, name) for column, name in names.items()}
-    with pytest.raises(RecordingError, match="ay "):
-        read_recording(data, log_map=STILL_WRONG)
-    assert len(read_recording(data, log_map=RIGHT)) == len(log)
-
-
 def test_at_a_coarse_interval_a_segment_of_too_few_samples_is_left_out(tmp_path):
     lines = rows(40, dt=0.05) + rows(200, dt=0.05, start=10.0)  # 2 s and 10 s
     path = write(tmp_path / "coarse.csv", "t,vx,vy,r,delta_f", lines)

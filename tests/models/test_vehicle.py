@@ -213,11 +213,3 @@ def test_what_braking_wants_to_know_comes_back_from_files(tmp_path):
     plain = Vehicle.from_toml(written(tmp_path, SIX))
     assert [plain.lengthwise(name) for name in _OF_CHASSIS] == [None] * 3
     assert plain.drag == pytest.approx(0.5 * 1.2 * 0.7 / 1500.0)
-
-
-def test_the_chassis_tells_what_the_car_does_not():
-    chassis = replace(sedan().require_chassis(), drive_front_share=0.4, brake_front_share=0.55)
-    car = replace(sedan(), chassis=chassis, cg_height=0.6)
-    alone = car.without_chassis()
-    assert [car.lengthwise(name) for name in _OF_CHASSIS] == [0.6, 0.4, 0.55]
-    assert alone.chassis is None and alone.lengthwise("drive_front_share") == 0.4

@@ -101,18 +101,6 @@ def test_wheels_that_all_agree_are_all_trusted_but_driven_ones_stand_back(run):
     assert free < 0.9 * ours  # the sedan drives by its front wheels, and brakes by them more
 
 
-def test_a_lone_encoder_is_bounded_by_what_a_car_can_do(run):
-    slips = gentle_slip(run)
-    mean = np.mean([*shown(run, slips, np.random.default_rng(1)).values()], axis=0)
-    mean[1000:1003] = 80.0  # a spike
-    mean[2000:2004] = 0.0  # and a hole
-    wheels = replace(KNOWN, driven="all")
-    result = told(run, {"wheel": mean}, wheels)
-    assert rms(result.v_x - run.v_x) < 0.15
-    assert np.abs(np.diff(result.v_x)).max() < 0.5
-    assert result.held >= 7
-
-
 def stop_and_go(rng, n=6000):
     """Speed of a car that stands, launches, holds and brakes at random [m/s], (n,)."""
     wanted = np.repeat(rng.choice([0.0, 1.0], n // 100) * rng.uniform(-10.0, 9.0, n // 100), 100)

@@ -13,7 +13,7 @@ from identifier.doctor import Finding, examine
 from identifier.doctor.faults import Candidate, Search, prepared
 from identifier.doctor.suspects import NOTES, SUSPECTS
 from identifier.estimate import Drive
-from identifier.estimate.solve import descend, simulate
+from identifier.estimate.solve import descend
 from identifier.motion.parameters import INDEX
 from models.vehicle import GRAVITY
 from tests.identifier.conftest import areas_of, pressed
@@ -149,22 +149,6 @@ def test_swapped_lengths_are_a_note_that_names_the_swap():
     assert "as if they were swapped" in found.text
     shift = next(one for one in SUSPECTS if one.code == "center_of_gravity")
     assert "swapped" not in shift.words(2.0 * (car.l_f - car.l_r), 0.05, car)
-
-
-def test_a_motion_that_is_shrunk_explains_nothing(driven):
-    """A v_x that is told smaller misses less of the force, and of what the accelerometer shows."""
-    car, log, _ = driven
-    search = prepared(log, car)
-    p = search.nominal().p
-    small = p.copy()
-    small[INDEX["v_x_factor"]] = -0.2
-    missed = simulate(search.problem.drives[0], small, car)["missed"][search.problem.places(0)]
-    e = search.problem.residuals(small).e
-    np.testing.assert_allclose(e * 0.8 * search.problem.size[:, None], missed, rtol=1e-6, atol=1e-9)
-    wide = {"a_y.factor": 0.5}
-    lines = [search.accelerometer.line(q, wide) for q in (p, small)]
-    assert lines[1].of("a_y.factor")[0] > 0.15, "a_y seems too large then"
-    assert lines[1].cost > lines[0].cost
 
 
 def test_a_move_to_where_a_y_fits_stays_within_bounds(driven):
