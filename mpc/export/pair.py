@@ -8,7 +8,6 @@ from codegen.errors import TireidError
 from codegen.package import c_files, defines, generated, header
 from codegen.template import Words, filled
 from identifier.axle.model import AxleModel
-from identifier.axle.slip import SHORTEST
 from identifier.export.c_source import PREFIX
 from identifier.export.package import Package
 from identifier.inertial.motion import SENSORS
@@ -79,12 +78,10 @@ Arrays = dict[str, tuple[Sequence[float], str]]
 
 
 def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
-    shortest = repr(SHORTEST * model.vehicle.wheelbase)
     numbers: Numbers = {
         "CURVES": (1, "identified are curves over slip; else a network"),
         "UNITS": (f"{len(model.ladder)}U", "of a curve"),
         "SWAY": (repr(GRAVITY / model.sway.frequency**2), "g over the roll's frequency^2 [m]"),
-        "SHORTEST": (shortest, "lag that is always there [m]"),
     }
     if model.tells_v_y:  # beside it the share of the sway is none of what is learnt
         share = repr(float(model.sway_share[0]))
@@ -92,11 +89,7 @@ def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
             "SWAY_SHARE": (share, "of the sway of the body, not identified"),
             "STEERING": (f"{SENSORS.index('steering')}U", "which of the sensors' errors it is"),
         }
-    return numbers, {
-        "load": (model.vehicle.axle_loads, "static, of the axles [N]"),
-        "ladder": (model.ladder, "scales of the units [rad]"),
-        "max_slip": (tracker.problem.limits.slip, "of the tracker, at most [rad]"),
-    }
+    return numbers, {"max_slip": (tracker.problem.limits.slip, "of the tracker, at most [rad]")}
 
 
 def _of_network(model: NetworkModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:

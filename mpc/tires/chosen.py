@@ -7,8 +7,6 @@ class Chosen(NamedTuple):
     """Numbers of this package, by the file that reads them."""
 
     # ladder
-    n_common: int = 3  # weights of both axles, before 1/α_j
-    n_axle: int = 2  # weights of an axle, beside the w_j
     units: int = 6  # of the ladder
     # α_1 over the slip F_max/C at which the linear tire would reach the peak force
     narrowest: float = 0.25

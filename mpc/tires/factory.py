@@ -12,9 +12,9 @@ from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import Vehicle
+from mpc.tires.axles import axle_tire, fit_tire
 from mpc.tires.curves import linear_tire
-from mpc.tires.fit import fit_tire
-from mpc.tires.ladder import axle_tire, mounted_tire
+from mpc.tires.ladder import mounted_tire
 from mpc.tires.network import network_tire
 from mpc.tires.tire import PredictionTire
 

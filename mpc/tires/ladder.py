@@ -1,175 +1,19 @@
-"""Axles as ladders of tanh, lagged or not: frozen models, and any curve fitted by one.
+"""Any curve of an axle as a ladder of tanh, and the true tire of a car, fitted by one."""
 
-F = λ Σ_j w_j tanh(α'/α_j) cos δ per axle; lag σ = max(s λ Σ_j w_j/α_j (1 - tanh²) + σ_0, σ_least).
-λ = 1 + κ v_x² is the load of the axle over the static one, 1 where the car has no downforce.
-"""
-
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal
 
 import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
-from identifier.axle.dynamics import series_compliance
-from identifier.axle.model import AxleModel
-from identifier.axle.slip import SHORTEST
 from models.plant import tire_of
 from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
-from models.vehicle import Vehicle, load_ratio
+from models.vehicle import Vehicle
+from mpc.tires.axles import LadderAxles, curve_weights
 from mpc.tires.chosen import CHOSEN
-from mpc.tires.tire import Pair, Point, PredictionTire, TireStructure
-
-
-class Axle(NamedTuple):
-    """Weights of an axle: compliance s [m/N], least lag [m], w_j [N] (n,)."""
-
-    compliance: Any
-    least: Any
-    W: Any
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LadderAxles(TireStructure):
-    """Weights: [δ_0, b, σ_0], 1/α_j (n,), `Axle` in front and at the rear; where pressed, κ (2,);
-    where mounted, [β, g].
-
-    δ_0 [rad]: zero of the steering. b [m/s]: bias of v_y. β [rad]: mounting angle of its sensor.
-    g: relative error of the steering. They were learnt as errors of sensors, and the tracker reads
-    the same sensors.
-    lagged : whether the slip lags; else the lag's weights are there and do nothing.
-    """
-
-    saturates = True
-
-    units: int
-    lagged: bool = True
-    pressed: bool = False
-    mounted: bool = False
-
-    @property
-    def n_weights(self) -> int:
-        """3 + n + 2 (2 + n), 2 more where pressed, and 2 where mounted."""
-        return self._static + 2 * self.pressed + 2 * self.mounted
-
-    @property
-    def _static(self) -> int:
-        return CHOSEN.n_common + self.units + 2 * (CHOSEN.n_axle + self.units)
-
-    def slip(self, at: Point) -> Pair:
-        """Return the slip angles, errors of the sensors taken off [rad]."""
-        v_y, delta = at.v_y - at.w[1], at.delta
-        if self.mounted:
-            angle, gain = at.w[self.n_weights - 2], at.w[self.n_weights - 1]
-            v_y, delta = v_y - angle * at.v_x, (1 + gain) * delta
-        front, rear = TireStructure.slip(self, at._replace(v_y=v_y, delta=delta))
-        return front + at.w[0], rear
-
-    def force(self, slip: Pair, at: Point) -> Pair:
-        """Return the axle forces [N], frame of the body."""
-        per_scale, axles = self._weights(at.w)
-        front, rear = (
-            load * ca.dot(axle.W, ca.tanh(per_scale * x))
-            for axle, x, load in zip(axles, slip, self._loads(at), strict=True)
-        )
-        delta = (1 + at.w[self.n_weights - 1]) * at.delta if self.mounted else at.delta
-        cos_delta = 1 - delta**2 / 2 + delta**4 / 24  # as the frozen axle model has it
-        return front * cos_delta, rear
-
-    def lag_length(self, slip: Pair, at: Point) -> Pair:
-        """Return the relaxation lengths [m], which shorten with the slope of the curve."""
-        per_scale, axles = self._weights(at.w)
-        lengths = []
-        for axle, x, load in zip(axles, slip, self._loads(at), strict=True):
-            T = ca.tanh(per_scale * x)
-            slope = load * ca.dot(axle.W * per_scale, 1 - T * T)
-            lengths.append(ca.fmax(axle.compliance * slope + at.w[2], axle.least))
-        return lengths[0], lengths[1]
-
-    def at_friction(self, weights: Array, ratio: float) -> Array:
-        """Return `weights` (n_weights,) of another friction: 1/α_j over it, W times it."""
-        w, n = weights.copy(), self.units
-        w[CHOSEN.n_common : CHOSEN.n_common + n] /= ratio  # 1/α_j
-        axles = w[CHOSEN.n_common + n : self._static].reshape(2, -1)  # a view
-        axles[:, CHOSEN.n_axle :] *= ratio
-        return w
-
-    def similar(self, at: Point, ratio: Any) -> Point:
-        """Return `at`: nothing but slip makes the force."""
-        del ratio
-        return at
-
-    def _loads(self, at: Point) -> Pair:
-        """Return λ of the axles [-]; CasADi makes nothing of a factor of 1."""
-        if not self.pressed:
-            return 1, 1
-        front, rear = (load_ratio(at.w[self._static + i], at.v_x) for i in range(2))
-        return front, rear
-
-    def _weights(self, w: Any) -> tuple[Any, tuple[Axle, Axle]]:
-        n, size = self.units, CHOSEN.n_axle + self.units
-        start = CHOSEN.n_common + n
-        front, rear = (w[start + i * size : start + (i + 1) * size] for i in (0, 1))
-        return w[CHOSEN.n_common : start], (
-            Axle(front[0], front[1], front[2:]),
-            Axle(rear[0], rear[1], rear[2:]),
-        )
-
-
-def ladder_weights(
-    ladder: Array,
-    W: Array,
-    *,
-    compliance: Array,
-    least: Array,
-    shortest: float = 0.0,
-    offset: tuple[float, float] = (0.0, 0.0),
-    downforce: tuple[float, ...] = (),
-) -> Array:
-    """Return w of `LadderAxles`.
-    ladder : α_j [rad], (n,).   W : w_j [N], front and rear (2, n).   compliance : s [m/N], (2,).
-    least : least lag [m], (2,).   shortest : σ_0 [m].   offset : δ_0 [rad] and b [m/s].
-    downforce : κ of front and rear [s²/m²] where pressed, else nothing.
-    """
-    axles = np.column_stack([compliance, least, W])
-    scales = 1.0 / np.asarray(ladder)
-    return np.concatenate([offset, [shortest], scales, axles.ravel(), downforce])
-
-
-def axle_tire(model: AxleModel) -> PredictionTire:
-    """Return the prediction tire of a frozen axle model.
-
-    The sway of its body takes k ρ'/(ω² v_x) off the slip, ρ in steady cornering the force of the
-    axle over its load times g: the body gives way in series with the carcass, and k g/ω² adds to
-    the compliance. That is without the inertia of the roll: ω is above what steering asks for.
-    """
-    load, ladder = np.array(model.vehicle.axle_loads), np.array(model.ladder)
-    W, shortest = model.W * load[:, None], SHORTEST * model.vehicle.wheelbase
-    gives = series_compliance(model.compliance, model.sway_share, model.sway.frequency)
-    compliance = gives / load
-    slope = np.maximum((model.W / ladder).sum(axis=1), 0.1) * load
-    weights = ladder_weights(
-        ladder,
-        W,
-        compliance=compliance,
-        least=compliance * 0.02 * slope + shortest,  # the slope is held up as when it was learnt
-        shortest=shortest,
-        offset=(model.offset[0], model.offset[1]),
-        downforce=_downforce(model.vehicle),
-    )
-    mounted = any((model.sensors.v_y_angle, model.sensors.steering_gain))
-    if mounted:
-        weights = np.append(weights, [model.sensors.v_y_angle, model.sensors.steering_gain])
-    doubt = model.band.half(CHOSEN.doubt_step * np.arange(CHOSEN.n_doubts, dtype=np.float64)).T
-    pressed = model.vehicle.has_downforce
-    structure = LadderAxles(units=ladder.size, pressed=pressed, mounted=mounted)
-    return PredictionTire(structure, weights, model.vehicle, doubt)
-
-
-def _downforce(vehicle: Vehicle) -> tuple[float, ...]:
-    return vehicle.downforce if vehicle.has_downforce else ()
+from mpc.tires.tire import PredictionTire
 
 
 class CurveFitError(TireidError, ValueError):
@@ -291,7 +135,7 @@ def _fitted_tire(
 ) -> PredictionTire:
     ladder, W = fitted_ladder(alpha, force)
     least = np.zeros(2) if lengths is None else lengths
-    given, pressed = _downforce(vehicle), vehicle.has_downforce
-    weights = ladder_weights(ladder, W, compliance=np.zeros(2), least=least, downforce=given)
-    structure = LadderAxles(units=ladder.size, lagged=lengths is not None, pressed=pressed)
+    curves = np.hstack([np.tile(1.0 / ladder, (2, 1)), W])
+    weights = curve_weights(curves, downforce=vehicle.downforce, shortest=least)
+    structure = LadderAxles(units=ladder.size, lagged=lengths is not None)
     return PredictionTire(structure, weights, vehicle)

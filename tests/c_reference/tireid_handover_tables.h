@@ -9,11 +9,8 @@
 #define TIREID_HANDOVER_CURVES 1 /* identified are curves over slip; else a network */
 #define TIREID_HANDOVER_UNITS 4U /* of a curve */
 #define TIREID_HANDOVER_SWAY 0.10800000000000003 /* g over the roll's frequency^2 [m] */
-#define TIREID_HANDOVER_SHORTEST 0.0027 /* lag that is always there [m] */
 #define TIREID_HANDOVER_MAX_FORCE 73575.0 /* of an axle [N] */
 
-static const tireid_mpc_real load[2] = { (tireid_mpc_real)8447.5, (tireid_mpc_real)6267.5 }; /* static, of the axles [N] */
-static const tireid_mpc_real ladder[4] = { (tireid_mpc_real)0.016, (tireid_mpc_real)0.064, (tireid_mpc_real)0.128, (tireid_mpc_real)0.256 }; /* scales of the units [rad] */
 static const tireid_mpc_real max_slip[2] = { (tireid_mpc_real)0.2, (tireid_mpc_real)0.2 }; /* of the tracker, at most [rad] */
 
 #endif

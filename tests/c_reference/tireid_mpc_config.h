@@ -16,7 +16,7 @@ typedef double tireid_mpc_real;
 
 #define TIREID_MPC_HORIZON 40U /* stages of the plan */
 #define TIREID_MPC_STATES 7U /* e_y, e_psi, v_y, r, delta, lagged slip in front and at the rear */
-#define TIREID_MPC_WEIGHTS 19U /* numbers of the tire */
+#define TIREID_MPC_WEIGHTS 28U /* numbers of the tire */
 #define TIREID_MPC_ERRORS 7U /* e_y, e_psi, course, v_y, yaw rate, delta, progress */
 #define TIREID_MPC_SPEEDS 8U /* of the fall-back's table */
 #define TIREID_MPC_GAINS 7U /* a speed: of e_y, e_psi, v_y, r, wheels; delta, v_y of a turn */

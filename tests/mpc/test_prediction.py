@@ -10,7 +10,7 @@ from models.vehicle import sedan
 from mpc.prediction import build_dynamics, build_end, build_rk4, build_stage, state_size
 from mpc.problem import Cost
 from mpc.tires import PredictionTire, oracle_tire, prediction_tire
-from mpc.tires.ladder import LadderAxles, ladder_weights
+from mpc.tires.axles import LadderAxles, curve_weights
 from mpc.tires.tire import ALL, valid_slip
 
 CAR, DT, MOST = sedan(), 0.05, (0.06, 0.05)  # situations lie on both sides of these slips
@@ -29,13 +29,12 @@ def network(seed=0, hidden=10):
 
 def ladder():
     """Axle curves with compliance, so that the lag depends on the slip, and with offsets."""
-    weights = ladder_weights(
-        np.array([0.016, 0.064, 0.128, 0.256]),
-        7000.0 * np.array([[0.05, 0.5, 0.5, -0.15], [0.02, 0.6, 0.6, -0.3]]),
-        compliance=np.array([8e-6, 1e-5]),
-        least=np.array([0.02, 0.02]),
-        shortest=0.003,
-        offset=(0.01, 0.1),
+    scales = 1.0 / np.array([[0.016, 0.064, 0.128, 0.256]] * 2)
+    W = np.array([[0.05, 0.5, 0.5, -0.15], [0.02, 0.6, 0.6, -0.3]])
+    give = 7000.0 * np.array([8e-6, 1e-5])
+    sensors = (0.01, 0.03, 0.1, -0.01)
+    weights = curve_weights(
+        np.hstack([scales, W]), sensors=sensors, loads=7000.0, give=give, shortest=0.003
     )
     return PredictionTire(LadderAxles(units=4), weights, CAR)
 
@@ -165,9 +164,7 @@ def test_a_lag_too_short_for_the_stage_is_half_of_it():
 
 
 def test_the_shortest_lag_decays_within_a_stage():
-    weights = ladder_weights(
-        np.array([0.1]), np.zeros((2, 1)), compliance=np.zeros(2), least=np.array([0.1, 0.1])
-    )
+    weights = curve_weights(np.array([[10.0, 0.0]] * 2), shortest=0.1)
     tire = PredictionTire(LadderAxles(units=1), weights, CAR)
     given = [np.zeros(7), 0.0, 0.0, 40.0, 0.05, tire.car, tire.weights, *ALL, np.zeros(7)]
     A = np.array(build_stage(tire.structure)(*given)[1])

@@ -12,8 +12,7 @@
 #define MAX_FORCE ((real)TIREID_HANDOVER_MAX_FORCE) /* of an axle [N] */
 
 #if TIREID_HANDOVER_CURVES
-#define AXLE (UNITS + 2U)                         /* weights of an axle */
-#define SHORTEST ((real)TIREID_HANDOVER_SHORTEST) /* lag that is always there [m] */
+#define AXLE (4U + (2U * UNITS)) /* weights of an axle: load, its rise, give, lag; scales, units */
 #define SWAY ((real)TIREID_HANDOVER_SWAY) /* g over the square of the roll's frequency [m] */
 #define LEAST_SLOPE ((real)0.1)           /* of a force curve at zero [static loads a rad] */
 #define MAX_SLIP ((real)0.5)              /* up to which a flat curve is looked for [rad] */
@@ -36,37 +35,29 @@ static void beside(const tireid_weights *learnt, uint32_t i, real own[3])
 #endif
 }
 
-/* Weights of the prediction: offsets and lag, scales, then compliance, least lag and units. */
+/* Weights of the prediction: offsets, give and units; loads, scales and the shortest lag stay. */
 static bool convert(const tireid_weights *learnt, real w[WEIGHTS])
 {
     bool is_tire = true;
     uint32_t i;
     uint32_t j;
-    w[2] = SHORTEST;
-    for (j = 0U; j < UNITS; j++) {
-        w[3U + j] = (real)1.0 / ladder[j];
-    }
     for (i = 0U; i < 2U; i++) {
-        real *axle = &w[3U + UNITS + (i * AXLE)];
+        real *axle = &w[4U + (i * AXLE)];
         real own[3];
-        real compliance;
         real slope = (real)0.0;
         real most = (real)0.0;
         beside(learnt, i, own);
-        w[i] = own[2];
-        compliance = (own[0] + (SWAY * own[1])) / load[i];
+        w[2U * i] = own[2];
+        axle[2] = own[0] + (SWAY * own[1]);
         for (j = 0U; j < UNITS; j++) {
             const real weight = (real)learnt->W[i][j];
-            const real force = weight * load[i];
-            slope += weight / ladder[j];
-            most += (force < (real)0.0) ? -force : force;
-            axle[2U + j] = force;
+            slope += weight * axle[4U + j];
+            most += (weight < (real)0.0) ? -weight : weight;
+            axle[4U + UNITS + j] = weight;
         }
-        is_tire = is_tire && (most <= MAX_FORCE) && (slope >= LEAST_SLOPE)
-            && (compliance >= (real)0.0) && ((compliance - compliance) <= (real)0.0)
+        is_tire = is_tire && ((most * axle[0]) <= MAX_FORCE) && (slope >= LEAST_SLOPE)
+            && (axle[2] >= (real)0.0) && ((axle[2] - axle[2]) <= (real)0.0)
             && ((own[2] - own[2]) <= (real)0.0);
-        axle[0] = compliance;
-        axle[1] = (compliance * (real)0.02 * (slope * load[i])) + SHORTEST;
     }
     return is_tire;
 }
@@ -74,14 +65,15 @@ static bool convert(const tireid_weights *learnt, real w[WEIGHTS])
 /* Slope of an axle's force at a slip [N/rad]. */
 static real slope_at(const real w[WEIGHTS], uint32_t i, real slip)
 {
-    const real *force = &w[3U + UNITS + (i * AXLE) + 2U];
+    const real *axle = &w[4U + (i * AXLE)];
     real slope = (real)0.0;
     uint32_t j;
     for (j = 0U; j < UNITS; j++) {
-        const real t = (real)tanh((double)(w[3U + j] * slip));
-        slope += (force[j] * w[3U + j]) * ((real)1.0 - (t * t));
+        const real scale = axle[4U + j];
+        const real t = (real)tanh((double)(scale * slip));
+        slope += (axle[4U + UNITS + j] * scale) * ((real)1.0 - (t * t));
     }
-    return slope;
+    return axle[0] * slope;
 }
 
 /* Slip that is of use: up to where the force of the axle hardly grows any more. */
