@@ -167,6 +167,8 @@ def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
         ("rise", [one for one in every if one.ratio > 1.0]),
     ):
         slid = [one for one in some if not math.isnan(one.after)]
+        if not slid:
+            continue
         after = np.array([one.after for one in slid])
         found = 100.0 * float(np.mean(np.isfinite(after)))
         targets.record(f"{way}/{name}/slid", len(slid))
