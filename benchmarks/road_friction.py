@@ -191,9 +191,9 @@ def tables(v: Values) -> dict[str, Table]:
     v : recorded values.
     """
     rows = [
-        [way.replace("_", " "), f"{v[f'{way}/drives']}", f"{v[f'{way}/early']:.1f}",
+        [way.replace("_", " ", 1), f"{v[f'{way}/drives']}", f"{v[f'{way}/early']:.1f}",
          f"{v[f'{way}/drop/slid']}", f"{v[f'{way}/drop/soon']:.0f}", f"{v[f'{way}/drop/told']:.0f}",
-         f"{v[f'{way}/rise/told']:.0f}"]
+         f"{v[key]:.0f}" if (key := f"{way}/rise/told") in v else ""]
         for way in WAYS
     ]  # fmt: skip
     header = ("log", "drives", "false alarms [%]", "drops that matter", "detected within 1 s [%]",
