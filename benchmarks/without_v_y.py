@@ -310,8 +310,10 @@ def tables(v: Values) -> dict[str, Table]:
     held = [
         [words, *(f"{v[key]:.2f}" if (key := f"held/{log}/{of}/rms") in v else ""
                 for of in ("typical", "itself", "other"))]
-        for log, words in {slalom: "CarMaker, slalom", sine: "CarMaker, sine", "ferrari": "race car",
-                           "second_half": "race car, second half"}.items()
+        for log, words in (
+            (slalom, "CarMaker, slalom"), (sine, "CarMaker, sine"), ("ferrari", "race car"),
+            ("second_half", "race car, second half"),
+        )
     ]  # fmt: skip
     return {
         "without_v_y": Table(header, rows),
