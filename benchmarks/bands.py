@@ -13,7 +13,7 @@ import sys
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from itertools import combinations, pairwise, permutations
+from itertools import combinations, pairwise, permutations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -41,7 +41,7 @@ class Case(NamedTuple):
     place: str
     car: Vehicle
     logs: Sequence[Recording]
-    other: Recording
+    others: Sequence[Recording]
     since: float = 0.0
     slow: float = 0.0
 
@@ -56,8 +56,8 @@ def cases(*, quick: bool) -> Iterator[Case]:
     for one in random_cars(count=1) if quick else random_cars():
         first, second = one.others
         full = one.teach["full"]
-        yield Case("random", one.told, [full], first, CORNER)
-        yield Case("random", one.told, [full, first], second, CORNER)
+        yield Case("random", one.told, [full], [first], CORNER)
+        yield Case("random", one.told, [full, first], [second], CORNER)
     if quick or not DATA.is_dir():
         return
     runs = read("carmaker.csv.gz", CARMAKER_RUNS)
@@ -66,10 +66,9 @@ def cases(*, quick: bool) -> Iterator[Case]:
         middle = 0.5 * float(run.t[0] + run.t[-1])
         halves.append((run.between(run.t[0], middle), run.between(middle, run.t[-1])))
     for a, b in ((0, 1), (1, 0)):
-        for whose in halves:
-            yield Case("carmaker", CARMAKER, [one[a] for one in halves], whose[b])
+        yield Case("carmaker", CARMAKER, [one[a] for one in halves], [one[b] for one in halves])
     for log, other in permutations(runs):
-        yield Case("carmaker", CARMAKER, [log], other)
+        yield Case("carmaker", CARMAKER, [log], [other])
     whole = read_recording(DATA / "ferrari.csv.gz")
     edges = np.linspace(float(whole.t[0]), float(whole.t[-1]), 6)
     laps: Sequence[Recording] = [whole.between(a, b) for a, b in pairwise(edges)]
@@ -78,13 +77,12 @@ def cases(*, quick: bool) -> Iterator[Case]:
     for place, (car, drives, slow) in groups.items():
         for count in (1, 2):
             for logs in combinations(drives, count):
-                for other in drives:
-                    if not any(other is one for one in logs):
-                        yield Case(place, car, logs, other, 0.0, slow)
+                others = [one for one in drives if not any(one is log for log in logs)]
+                yield Case(place, car, logs, others, 0.0, slow)
 
 
-def held(case: Case) -> dict[str, tuple[float, float]]:
-    """Return by method the share of samples in the band [%], and half its width over the error.
+def held(case: Case) -> list[tuple[str, float, float]]:
+    """Return method, share of samples in the band [%], and half its width over the error.
 
     Parameters
     ----------
@@ -94,17 +92,16 @@ def held(case: Case) -> dict[str, tuple[float, float]]:
     if len(case.logs) == 1:
         method = make_method(LIVE, case.car)
         tires[LIVE] = ti.identify(case.logs[0], case.car, method, check=False).tire
-    found = {}
-    for name, tire in tires.items():
-        counts = case.other.t >= case.since
-        counts &= case.other.v_x >= max(case.slow, tire.min_speed)
-        if tire.band is None or case.other.axle_force is None:
+    found = []
+    for (name, tire), other in product(tires.items(), case.others):
+        if tire.band is None or other.axle_force is None:
             continue
-        away = np.abs(tire.predict(case.other) - case.other.axle_force)[counts]
-        half = tire.band.over(case.other, LEVEL)[counts]
+        counts = (other.t >= case.since) & (other.v_x >= max(case.slow, tire.min_speed))
+        away = np.abs(tire.predict(other) - other.axle_force)[counts]
+        half = tire.band.over(other, LEVEL)[counts]
         width = half.mean(axis=0) / np.sqrt(np.mean(away**2, axis=0))
         share = 100.0 * float(np.mean(away <= half))
-        found[f"{name}/{len(case.logs)}"] = (share, float(width.mean()))
+        found.append((f"{name}/{len(case.logs)}", share, float(width.mean())))
     return found
 
 
@@ -132,8 +129,8 @@ def main() -> int:
     found: dict[str, list[tuple[float, float]]] = defaultdict(list)
     with ProcessPoolExecutor() as pool:
         for case, answers in zip(every, pool.map(held, every), strict=True):
-            for name, answer in answers.items():
-                found[f"{case.place}/{name}"].append(answer)
+            for name, share, width in answers:
+                found[f"{case.place}/{name}"].append((share, width))
     for key, some in found.items():
         share, count = float(np.mean([one for one, _ in some])), int(key[-1])
         targets.at_least(f"{key}: held, mean", share, LEAST[count], key=f"{key}/held")

@@ -167,6 +167,8 @@ def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
         ("rise", [one for one in every if one.ratio > 1.0]),
     ):
         slid = [one for one in some if not math.isnan(one.after)]
+        if not slid:
+            continue
         after = np.array([one.after for one in slid])
         found = 100.0 * float(np.mean(np.isfinite(after)))
         targets.record(f"{way}/{name}/slid", len(slid))
@@ -189,9 +191,9 @@ def tables(v: Values) -> dict[str, Table]:
     v : recorded values.
     """
     rows = [
-        [way.replace("_", " "), f"{v[f'{way}/drives']}", f"{v[f'{way}/early']:.1f}",
+        [way.replace("_", " ", 1), f"{v[f'{way}/drives']}", f"{v[f'{way}/early']:.1f}",
          f"{v[f'{way}/drop/slid']}", f"{v[f'{way}/drop/soon']:.0f}", f"{v[f'{way}/drop/told']:.0f}",
-         f"{v[f'{way}/rise/told']:.0f}"]
+         f"{v[key]:.0f}" if (key := f"{way}/rise/told") in v else ""]
         for way in WAYS
     ]  # fmt: skip
     header = ("log", "drives", "false alarms [%]", "drops that matter", "detected within 1 s [%]",

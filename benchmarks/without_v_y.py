@@ -308,9 +308,12 @@ def tables(v: Values) -> dict[str, Table]:
                     for key, n in (("rms", 2), ("share", 2), ("within", 0), ("force", 1)))]
            for kind in CLASSES]  # fmt: skip
     held = [
-        [log.replace("_", " "), *(f"{v[key]:.2f}" if (key := f"held/{log}/{of}/rms") in v else ""
+        [words, *(f"{v[key]:.2f}" if (key := f"held/{log}/{of}/rms") in v else ""
                 for of in ("typical", "itself", "other"))]
-        for log in (slalom, sine, "ferrari", "second_half")
+        for log, words in (
+            (slalom, "CarMaker, slalom"), (sine, "CarMaker, sine"), ("ferrari", "race car"),
+            ("second_half", "race car, second half"),
+        )
     ]  # fmt: skip
     return {
         "without_v_y": Table(header, rows),
