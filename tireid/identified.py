@@ -138,7 +138,7 @@ class Results:
         `past_against_online` is the measure of the paper's section IV-A.
         """
         learnt, runs = self.runs[0], [self.runs[0], *self.parts, *self.runs[1:]]
-        design = learnt.design
+        design = learnt.method
         certificate = None if design.whole else certify(design, learnt.vehicle)
 
         def of_frozen(of: Callable[[Replay], AxleRmse | None]) -> dict[str, Any]:
@@ -212,7 +212,7 @@ class Results:
             "slip": slip_figure(model, recording, _beside(learnt)),
             "forces": force_figure(learnt, own),
         }
-        slip = side_slip(learnt, learnt.design.min_speed, recording.logged_v_y)
+        slip = side_slip(learnt, learnt.method.min_speed, recording.logged_v_y)
         if _OBSERVED in learnt.outputs:
             figures["error"] = error_figure(learnt, freeze_times=list(own))
             figures["weights"] = weights_figure(learnt, list(own))

@@ -41,7 +41,7 @@ class Run:
     @property
     def method(self) -> Method:
         """The method that ran."""
-        return self.history.design
+        return self.history.method
 
     @property
     def force(self) -> Array:

@@ -74,7 +74,7 @@ def calibrated(
     model = history.freeze(t)
     if (band := model.band) is None:
         return model
-    if history.design.whole:
+    if history.method.whole:
         share = (verdict or judge(history, t)).force_missed
         whole: TireModel = band.calibrated_by(None, None if share is None else np.array(share))
         return whole

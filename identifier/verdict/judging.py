@@ -84,7 +84,7 @@ def judge(history: History, t: float | None = None) -> Verdict:
     """
     model, whole = history.freeze(t), history.recording
     end = float(whole.t[-1]) if t is None else t
-    limits = history.design.limits
+    limits = history.method.limits
     reached = model.drives.at_bounds if limits is None else limits.active(history.state_at(end))
     return judge_identification(model, whole, state_index(whole, end), reached)
 

@@ -37,7 +37,7 @@ class _AskedRun(NamedTuple):
     def taught(self, recording: Recording) -> TireModel:
         """Return what the run's method learns of another drive until the freeze."""
         run = self.history
-        return learn(recording, run.vehicle, run.design, run.start, self.until)
+        return learn(recording, run.vehicle, run.method, run.start, self.until)
 
 
 def asked_run(history: History, t: float | None = None) -> _AskedRun:
@@ -62,7 +62,7 @@ _felt: WeakKeyDictionary[History, dict[int, Array | None]] = WeakKeyDictionary()
 
 def _road_felt(history: History, asked: Portion) -> Array | None:
     """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
-    method = history.design
+    method = history.method
     without = asked.recording.logged_v_y is None
     if method.accelerometer is None or ("v_y" in method.needs) == without:
         return None  # it was learnt of another motion than that which is asked

@@ -108,7 +108,7 @@ def test_gains_that_diverge_are_reported_not_hidden(car, drive):
 
 
 def test_a_recording_of_another_rate_is_refused(car, drive):
-    with pytest.raises(ValueError, match=r"sampled at 0.02 s, the design at 0.01 s"):
+    with pytest.raises(ValueError, match=r"sampled at 0.02 s, the method at 0.01 s"):
         identify(drive(n=50, dt=0.02), car, PaperIdentifier(gains=GAINS))
 
 

@@ -69,7 +69,7 @@ def made_up(scale: float = 5000.0, *, truth: bool = True, rear: float = 0.0) -> 
     unit = 1000.0 if scale > 100.0 else 1.0
     return History(
         vehicle=CAR,
-        design=PaperIdentifier(gains=GAINS, network=Network(hidden=3), force_unit=unit),
+        method=PaperIdentifier(gains=GAINS, network=Network(hidden=3), force_unit=unit),
         recording=recording,
         axle_force=1.1 * force,
         outputs={"f_hat": 0.1 * force / unit, "xi_tilde": 0.01 * rng.standard_normal((N, 2))},
@@ -251,7 +251,7 @@ def test_the_learnt_axles_are_drawn_each_in_its_own_numbers() -> None:
     growth = np.linspace(0.5, 1.0, n)[:, None, None]
     W = growth * np.array([[0.2, 0.3, 0.2, 0.1], [0.1, 0.4, 0.1, 0.3]])
     own = growth * np.array([[0.03, 0.5, 0.0], [0.05, 0.2, 0.0]])
-    history = replace(made_up(), design=design, state={"W": W, "own": own})
+    history = replace(made_up(), method=design, state={"W": W, "own": own})
     stiffness, lag, grip = learnt_axles_figure(history).axes
     for axle, load in enumerate(1500.0 * 9.81 / 2.7 * np.array([1.5, 1.2])):
         slope = (W[:-1, axle] / np.array(design.ladder)).sum(axis=1)

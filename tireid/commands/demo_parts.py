@@ -148,10 +148,10 @@ class Shipped(NamedTuple):
 def ship(story: Story, folder: Path) -> Shipped:
     """Export what the axle identifier learnt, as `tireid export` does, compile it and test it."""
     learnt, model = story.axle.runs[0], story.axle.model
-    exported = export(learnt.design, folder, start=model, vehicle=story.car)
+    exported = export(learnt.method, folder, start=model, vehicle=story.car)
     name, checks = exported.package.specialized.name, list[_Check]()
     if find_compiler() is not None:
-        expected = identify(learnt.recording, story.car, learnt.design, model).axle_force
+        expected = identify(learnt.recording, story.car, learnt.method, model).axle_force
         for precision, single in (("double", False), ("float", True)):
             verdict = self_test(folder, name, single=single)
             assert verdict is not None

@@ -165,7 +165,7 @@ def _require_tires(learnt: History, t: float) -> None:
 
 def _closing_line(learnt: History, t: float, vehicle: Vehicle) -> str:
     """Return the certificate of the paper's identifier, or what the axle identifier knows."""
-    model, certificate = learnt.freeze(t), learnt.design.certify(vehicle)
+    model, certificate = learnt.freeze(t), learnt.method.certify(vehicle)
     if model.known_slip is None and certificate.properties:
         return verdict_line(certificate)
     if model.known_slip is None:

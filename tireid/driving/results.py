@@ -27,8 +27,8 @@ from tireid.driving.runs import (
     LEARNING,
     LINEAR,
     ORACLE,
+    ClosedLoop,
     Conditions,
-    Run,
     run_drive,
 )
 from tireid.driving.setup import PLANT, Setup
@@ -118,7 +118,7 @@ class Drives(NamedTuple):
     """
 
     conditions: Conditions
-    runs: Sequence[Run]
+    runs: Sequence[ClosedLoop]
     learnt: TireModel | None
     source: str
 
@@ -181,7 +181,7 @@ class Drives(NamedTuple):
 SCORES = ("tires", "rms e_y", "peak e_y", "completed", "failures", "wall time: median / p99 / max")
 
 
-def score_rows(runs: Sequence[Run]) -> list[list[str]]:
+def score_rows(runs: Sequence[ClosedLoop]) -> list[list[str]]:
     rows = []
     for run in runs:
         score, end = run.scores, f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"
@@ -193,7 +193,7 @@ def score_rows(runs: Sequence[Run]) -> list[list[str]]:
     return rows
 
 
-def _summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str, Any]:
+def _summarize_drives(runs: Sequence[ClosedLoop], inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return what summary.json holds: scores of the first drive and of each, and what went in."""
     by_label = {run.label: _scores(run) for run in runs}
     return {
@@ -206,7 +206,7 @@ def _summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[st
     }
 
 
-def _scores(run: Run) -> dict[str, Any]:
+def _scores(run: ClosedLoop) -> dict[str, Any]:
     notes = [{"t_s": t, "note": text} for t, text in run.drive.notes]
     given = estimate_scores(run.drive)
     lateral = {} if given is None else {"lateral_velocity": given._asdict()}
@@ -248,7 +248,9 @@ def _drive_columns(drive: Drive) -> dict[str, Array]:
     }
 
 
-def _known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
+def _known_curves(
+    runs: Sequence[ClosedLoop], setup: Setup, learnt: TireModel | None
+) -> list[TireCurve]:
     """Return the tires of the trackers, and the linear and the true tire beside it."""
     models = {LINEAR: prediction_tire(setup.vehicle)}
     if learnt is not None:
@@ -269,7 +271,7 @@ def _known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -
     ]
 
 
-def _estimate_words(run: Run) -> str:
+def _estimate_words(run: ClosedLoop) -> str:
     got = estimate_scores(run.drive)
     assert got is not None
     return (
@@ -309,7 +311,7 @@ def write_drive_report(
     write_report(folder / REPORT, report)
 
 
-def _drive_headlines(runs: Sequence[Run]) -> list[Headline]:
+def _drive_headlines(runs: Sequence[ClosedLoop]) -> list[Headline]:
     first = runs[0].scores
     numbers = [
         Headline(
@@ -340,11 +342,11 @@ def _drive_headlines(runs: Sequence[Run]) -> list[Headline]:
     return numbers
 
 
-def _end(run: Run) -> str:
+def _end(run: ClosedLoop) -> str:
     return "" if run.scores.completed else f", who {run.drive.ending}"
 
 
-def _drive_warnings(runs: Sequence[Run]) -> list[str]:
+def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
     said = []
     for run in runs:
         scores = run.scores
@@ -369,7 +371,7 @@ def _bad(text: str) -> bool:
 
 
 def _drive_blocks(
-    runs: Sequence[Run], figures: Mapping[str, Figure], film: Path | None
+    runs: Sequence[ClosedLoop], figures: Mapping[str, Figure], film: Path | None
 ) -> list[Block]:
     blocks: list[Block] = [
         Table(caption="Scores of the drives.", header=SCORES, rows=score_rows(runs))
@@ -385,7 +387,7 @@ def _drive_blocks(
     return [*blocks, *drawings(figures, captions)]
 
 
-def known_blocks(runs: Sequence[Run], figures: Mapping[str, Figure]) -> list[Block]:
+def known_blocks(runs: Sequence[ClosedLoop], figures: Mapping[str, Figure]) -> list[Block]:
     """Return what trackers believed of the tires, and what they were given on the way."""
     captions = {
         "tires": "Forces of the first drive, and the tire models of the trackers.",

@@ -305,9 +305,9 @@ def force_unit_of(force: Array) -> ForceUnit:
 
 def paper_design(history: History) -> PaperIdentifier:
     """Return the design of a run of the paper's identifier, whose weights and error have units."""
-    if not isinstance(history.design, PaperIdentifier):
-        raise TypeError(f"a run of the paper's identifier is needed, not of {history.design}")
-    return history.design
+    if not isinstance(history.method, PaperIdentifier):
+        raise TypeError(f"a run of the paper's identifier is needed, not of {history.method}")
+    return history.method
 
 
 def force_range(reference: Array, *others: Array) -> tuple[float, float]:

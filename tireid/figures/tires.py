@@ -193,7 +193,7 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     """
     tracks, t = history.tracks_over(next(history.blocks())), history.recording.t
     if not tracks:
-        raise TypeError(f"{history.design} has no estimates of the axles")
+        raise TypeError(f"{history.method} has no estimates of the axles")
     at, curves = shown_of_run(history, lambda block: [o.values for o in history.tracks_over(block)])
     figure = style.new_figure(CHOSEN.page, 4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)

@@ -81,7 +81,7 @@ def write_identify_report(
                 command,
                 learnt.vehicle,
                 [run.recording for run in found.runs],
-                method=f"{found.method}, hash {digest(learnt.design.numbers())}",
+                method=f"{found.method}, hash {digest(learnt.method.numbers())}",
             ),
         ],
     )
@@ -104,7 +104,7 @@ def side_slip_text(learnt: History) -> str:
     """Return how well a run knew side slip, where it estimated it; else nothing."""
     if not {"v_y_sd", "side_slip_observable"} <= set(learnt.outputs):
         return ""
-    moves = learnt.recording.v_x >= learnt.design.min_speed
+    moves = learnt.recording.v_x >= learnt.method.min_speed
     sd = learnt.outputs["v_y_sd"].ravel()[moves] / learnt.recording.v_x[moves]
     seen = 100.0 * float(np.mean(learnt.outputs["side_slip_observable"].ravel()[moves]))
     median = float(np.degrees(np.median(sd)))

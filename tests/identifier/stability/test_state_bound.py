@@ -228,7 +228,7 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage(run):
     assert 1.0 < f_max < 20.0
     V_start = float(np.linalg.norm(history.state["V"][0]))
     signals = np.hstack([history.recording.x, history.recording.u])
-    x_bar_max = np.linalg.norm(signals / np.array(history.design.network.scale), axis=1).max()
+    x_bar_max = np.linalg.norm(signals / np.array(history.method.network.scale), axis=1).max()
     operation = Operation(
         n_h=8,
         dt=0.01,
@@ -240,7 +240,7 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage(run):
         V_start=V_start,
     )
     inverse = np.eye(2) / 6.0
-    proven = proven_bounds(history.design.gains, INTEGRAL, operation, inverse)
+    proven = proven_bounds(history.method.gains, INTEGRAL, operation, inverse)
     bounds = proven.leakage
     error = np.linalg.norm(history.outputs["xi_tilde"], axis=1).max()
     assert 0.02 * bounds.xi_tilde < error <= bounds.xi_tilde
