@@ -15,7 +15,7 @@ from codegen.arrays import Array
 from identifier.axle.slip import SHORTEST
 from identifier.estimate.model import FittedModel
 from identifier.motion.model import carcass_curve
-from identifier.motion.parameters import curve_names
+from identifier.motion.parameters import curve_index, curve_names
 from models.vehicle import load_ratio
 from mpc.tires.chosen import CHOSEN
 from mpc.tires.tire import Pair, Point, PredictionTire, TireStructure
@@ -96,7 +96,7 @@ def fit_tire(model: FittedModel) -> PredictionTire:
             [model[name] for name in _COMMON],
             [SHORTEST * car.wheelbase],
             *(
-                [load, pressed, give, *model.curve_numbers(axle)]
+                [load, pressed, give, *model.p[curve_index(axle)]]
                 for load, pressed, give, axle in zip(
                     car.axle_loads, car.downforce, model.give, "fr", strict=True
                 )

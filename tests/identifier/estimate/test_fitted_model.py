@@ -92,7 +92,7 @@ def test_grip_is_the_top_of_the_curve_and_known_slip_ends_where_a_drive_decides_
         run = identify(plant.simulate(maneuver, speed=20.0).recording(), car)
         grip = [one for one in run.tire.estimates() if one.title == GRIP]
         found.append(([one.value for one in grip], [one.sd for one in grip]))
-        assert (run.tire.known_slip > 0.9 * run.tire.driven).all()
+        assert (run.tire.known_slip > 0.9 * run.tire.reach.slip).all()
     values, sd = np.array([value for value, _ in found]), np.array([sd for _, sd in found])
     assert (np.abs(values - values[1]) < 2.0 * sd).all()
     assert (sd[:2] < 0.12).all() and (sd[2] > sd[:2]).all()
