@@ -7,7 +7,6 @@ from typing import Any, Self
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
 
 from codegen.arrays import Array, blocks, large
 from identifier.axle.car import Car
@@ -28,12 +27,11 @@ from identifier.motion.model import (
     REPLAYED,
     carcass_curve,
     curve_function,
-    pushed_function,
     replay_scan,
 )
 from identifier.motion.parameters import INDEX, NAMES, curve_index
 from identifier.setup import Setup
-from identifier.tire_model import AXLES, Axle, Drives, Estimate, Fact, TireModel
+from identifier.tire_model import Drives, Estimate, Fact, TireModel
 from models.recordings import Recording
 from models.rules import require_positive
 from models.schema import Table
@@ -98,32 +96,6 @@ class FittedModel(TireModel):
     def _steady(self, alpha: Array, v_x: float) -> Array:
         phi, _, _ = self.curve_at(np.column_stack([alpha, alpha]))
         return phi * self._loads * self.vehicle.load_ratio(v_x)
-
-    def force(  # type: ignore[override]
-        self,
-        alpha: ArrayLike,
-        axle: Axle | None = None,
-        *,
-        v_x: float | None = None,
-        a_x: float | None = None,
-    ) -> float | Array:
-        """Return the steady lateral force at slip angles, the wheels straight ahead [N].
-        a_x : longitudinal acceleration [m/s²]: braking and power take of the lateral force, and
-            shift load between the axles. None is of tires that push nothing lengthwise, as those
-            of a car that coasts.
-        """
-        found = np.asarray(TireModel.force(self, alpha, axle, v_x=v_x))
-        if a_x is None:
-            return found if found.ndim else float(found)
-        speed = self._curve_speed if v_x is None else v_x
-        coasting = -self.vehicle.drag * speed**2
-        pushed, numbers = pushed_function(), car_numbers(self.vehicle)
-        moving, plain = (
-            np.array(pushed(self.p, numbers, one, speed)).ravel() for one in (a_x, coasting)
-        )
-        ratio = moving / plain
-        scaled: Array = found * (ratio if axle is None else ratio[AXLES.index(axle)])
-        return float(scaled) if scaled.ndim == 0 else scaled
 
     def _pair(self, name: str) -> Array:
         """Return a parameter of both axles, (2,)."""

@@ -7,7 +7,6 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.motion.parameters import INDEX
-from models.vehicle import Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -23,7 +22,6 @@ class Posterior:
     memory : T, their integrated autocorrelation time [s], (2,).   cost : J at the optimum [nats].
     """
 
-    vehicle: Vehicle
     p: Array
     covariance: Array
     slope: Array

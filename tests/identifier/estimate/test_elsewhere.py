@@ -163,7 +163,7 @@ def test_a_network_file_tells_curves_and_band_of_a_fit(fitted):
     out = session.run(None, {"alpha_f": alpha[:, None], "alpha_r": alpha[:, None]})
     loads = np.array(CAR.axle_loads)
     np.testing.assert_allclose(np.hstack(out[:2]), fitted.force(alpha), atol=1e-9 * loads.min())
-    band = fitted.band.half(alpha, v_x=float(fitted.speeds.mean()))
+    band = fitted.band.half(alpha, v_x=float(fitted.reach.speeds.mean()))
     np.testing.assert_allclose(np.hstack(out[2:]), band, rtol=1e-9)
 
 

@@ -53,18 +53,6 @@ def test_sample_by_sample_it_says_what_it_says_of_the_drive(learnt):
     assert (away < 0.03 * size).all()
 
 
-def test_braking_takes_of_the_lateral_force_and_shifts_load(learnt):
-    model, f = learnt.model, 5.0 / 9.81
-    coasts, free, braked = (model.force(0.03, v_x=0.1, a_x=a) for a in (None, 0.0, -5.0))
-    np.testing.assert_allclose(free, coasts, rtol=1e-6)  # without drag
-    transfer = model["load_transfer"] * model.vehicle.wheelbase * f
-    used = np.array([model["braking_f"], model["braking_r"]]) * f
-    load = 1.0 + transfer * np.array([1.0 / model.vehicle.l_r, -1.0 / model.vehicle.l_f])
-    expected = load * np.sqrt(np.maximum(1.0 - used**2, 0.05))
-    np.testing.assert_allclose(braked / coasts, expected, rtol=1e-3)
-    assert model.force(0.03, "front", v_x=0.1, a_x=-5.0) == braked[0]
-
-
 def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):
     model = learnt.model
     slip = np.array([0.0005, 0.05])
