@@ -26,6 +26,7 @@ from codegen.errors import TireidError
 from identifier.estimate.chosen import CHOSEN as ESTIMATE
 from identifier.estimate.drive import Drive
 from identifier.estimate.model import FittedModel
+from identifier.estimate.posterior import Reach
 from identifier.estimate.priors import SENSORS, Priors
 from identifier.estimate.solve import Problem, around_beliefs, car_numbers, normal
 from identifier.motion.model import curve_function
@@ -117,7 +118,9 @@ def plan(
         require_within(PlanError, ESTIMATE.slow * vehicle.froude_speed, 100.0, speed=speed)
     if start is not None and not isinstance(start, FittedModel):
         raise PlanError(f"a plan goes on from a fit, this model is of kind {start.kind!r}")
-    priors = Priors.of(vehicle) if start is None else start.as_prior(vehicle)
+    priors = Priors.of(vehicle)
+    if start is not None:
+        priors = priors.known(start.p, start.covariance)
     p = priors.mean.copy()
     if friction is not None:
         require_within(PlanError, 0.1, 3.0, friction=friction)
@@ -243,8 +246,8 @@ class _Likely(NamedTuple):
         where = np.ix_(problem.index, problem.index)
         covariance[where] = np.linalg.inv(H + around_beliefs(self.priors, self.p)[1][where])
         return FittedModel(
-            vehicle=self.vehicle, p=self.p, covariance=covariance, driven=driven,
-            speeds=log.v_x[[0, 0]], a_x=np.zeros(2), unexplained=ERROR * both,
+            vehicle=self.vehicle, p=self.p, covariance=covariance,
+            reach=Reach(driven, log.v_x[[0, 0]], np.zeros(2), (ERROR * both) ** 2, 1.0),
         )  # fmt: skip
 
     def forces(self, maneuver: Maneuver, speed: float) -> Array:

@@ -77,21 +77,6 @@ class History:
                 return float(self.recording.t[part][np.argmin(sane)])
         return None
 
-    @property
-    def tracks(self) -> tuple[Track, ...]:
-        """What the method says it had learnt of the axles at each sample."""
-        joined: tuple[Track, ...] = ()
-        for block in self.blocks():
-            tracks = self.tracks_over(block)
-            if block.part == slice(0, len(self.recording)):
-                return tracks
-            if not joined:
-                shape = (len(self.recording), 2)
-                joined = tuple(track._replace(values=large(shape)) for track in tracks)
-            for track, here in zip(joined, tracks, strict=True):
-                track.values[block.part] = here.values
-        return joined
-
     def tracks_over(self, block: Block) -> tuple[Track, ...]:
         """Return what the method says it had learnt of the axles over a block of the run."""
         return self.method.tracks(self.vehicle, block.before)

@@ -542,7 +542,7 @@ def begun(model: TireModel, ladder: tuple[float, ...] = LADDER) -> TireModel:
     limits = Plausibility.for_vehicle(fit.vehicle)
     most = np.array([limits.max_steering, limits.slow])
     excitation = np.zeros((2, 1 + len(EDGES)))
-    excitation[:, 0] = fit.driven
+    excitation[:, 0] = fit.reach.slip
     return AxleModel(
         vehicle=fit.vehicle,
         ladder=ladder,
@@ -569,7 +569,7 @@ def _begun_axle(fit: Any, i: int, ladder: tuple[float, ...]) -> tuple[Array, Arr
     units = np.vstack([unit_matrix(slip, ladder) * weight[:, None], 1e-4 * np.eye(n)])
     weights_of = np.linalg.pinv(units)[:, : slip.size] * weight
     phi, _, J = fit.curve_at(np.column_stack([slip, slip]))
-    v_x = float(fit.speeds.mean())
+    v_x = float(fit.reach.speeds.mean())
     zeros = {"steering_zero": 1.0} if i == 0 else {"v_y_bias": 1.0, "v_y_angle": v_x}
     names = (f"compliance_{axle}", f"sway_share_{axle}", *zeros)
     index = [*curve_index(axle), *(INDEX[name] for name in names)]
@@ -579,6 +579,6 @@ def _begun_axle(fit: Any, i: int, ladder: tuple[float, ...]) -> tuple[Array, Arr
     to[n + 2, 11:] = list(zeros.values())
     P, before = (
         to @ whole[np.ix_(index, index)] @ to.T + LEAST_VARIANCE * np.eye(n + 3)
-        for whole in (fit.covariance, fit.covariance_before)
+        for whole in (fit.covariance, fit.band.prior_covariance)
     )
     return weights_of @ phi[:, i], P, before

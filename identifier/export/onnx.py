@@ -219,7 +219,7 @@ def _fitted_curves(model: FittedModel, *, single: bool, with_band: bool) -> byte
     """Return the static curves of a fit, as those of `_curves`."""
     graph, x = _Graph(), ca.SX.sym("x")
     for i, axle in enumerate("fr"):
-        found = curve_function()(ca.DM(model.curve_numbers(axle)), x)
+        found = curve_function()(ca.DM(model.p[curve_index(axle)]), x)
         at_slip = ca.Function("curve", [x], found[: 3 if with_band else 1])
         phi, *slopes = _written(graph, at_slip, _SLIPS[i].name)
         load = graph.number(model.vehicle.axle_loads[i])
@@ -283,7 +283,8 @@ def _band_of_fit(
     """
     node, number, band = graph.node, graph.number, model.band
     index, P = curve_index("fr"[i]), model.covariance
-    shares = {"steering_zero": 1.0 - i, "v_y_bias": 1.0 / model.speeds.mean(), "v_y_angle": 1.0}
+    speed = model.reach.speeds.mean()
+    shares = {"steering_zero": 1.0 - i, "v_y_bias": 1.0 / speed, "v_y_angle": 1.0}
     columns = dict(zip(index, numbers, strict=True)) | {
         INDEX[name]: node("Mul", slope, number(share)) for name, share in shares.items()
     }

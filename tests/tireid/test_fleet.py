@@ -112,7 +112,7 @@ def test_a_row_is_what_identify_says_of_its_log(store, logs):
     )
     assert row.seconds == log.t[-1] - log.t[0] and 3.0 < row.driven < row.seconds
     assert row.valid is judge_identification(tire, log).valid
-    assert row.reach[:2] == pytest.approx(list(tire.driven), rel=0.05)
+    assert row.reach[:2] == pytest.approx(list(tire.reach.slip), rel=0.05)
 
 
 def test_what_is_there_is_not_learnt_again_and_what_is_new_is(store, fleet, tmp_path, capsys):

@@ -114,8 +114,8 @@ def test_a_merged_model_is_the_optimum_of_prior_and_logs():
     assert model["ln_stiffness_f"] == pytest.approx(tires(1.1)[INDEX["ln_stiffness_f"]], abs=0.1)
     k = INDEX["v_y_bias"]
     assert model.covariance[k, k] > sd[CHANGES.index("v_y_bias")] ** 2  # of the next log
-    assert model.driven.tolist() == [0.05, 0.1] and model.speeds.tolist() == [5.0, 20.0]
-    assert model.a_x.tolist() == [-1.0, 0.5] and one.information.seconds == 360.0
+    assert model.reach.slip.tolist() == [0.05, 0.1] and model.reach.speeds.tolist() == [5.0, 20.0]
+    assert model.reach.a_x.tolist() == [-1.0, 0.5] and one.information.seconds == 360.0
 
 
 def test_merged_rows_are_the_fit_of_all_logs_at_once(logs):
@@ -126,7 +126,8 @@ def test_merged_rows_are_the_fit_of_all_logs_at_once(logs):
     ]
     (together,) = merged(rows)
     at_once = fit(drives, CAR, coarse=True).model
-    slips = np.linspace(0.2, 1.0, 5)[:, None] * np.minimum(together.model.driven, at_once.driven)
+    reached = np.minimum(together.model.reach.slip, at_once.reach.slip)
+    slips = np.linspace(0.2, 1.0, 5)[:, None] * reached
     curves = [one.force(slips) for one in (together.model, at_once)]
     assert curves[0] == pytest.approx(curves[1], rel=0.03)
     alone = merged(rows[:1])[0].model

@@ -267,7 +267,7 @@ def learn_recording(row: LogRow, recording: Recording, vehicle: Vehicle) -> LogR
     measured = replace(recording, estimated=())  # an estimated v_y is fitted as one of a sensor
     model, _, parts = fit([measured], vehicle, coarse=True)
     verdict = judge_identification(model, recording)
-    reach = (model.driven, model.speeds, model.a_x, model.unexplained)
+    reach = (*model.reach[:3], model.reach.unexplained)
     return replace(
         row,
         seconds=recording.duration,

@@ -14,9 +14,9 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.estimate.chosen import CHOSEN as ESTIMATE_CHOSEN
-from identifier.estimate.fit import Reach
 from identifier.estimate.information import PLACE, SIZE, Information, coordinates
 from identifier.estimate.model import FittedModel
+from identifier.estimate.posterior import Reach
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import settled
 from identifier.motion.parameters import INDEX
@@ -184,15 +184,7 @@ class _Sum:
         p, covariance = self._settled()
         of_next = [INDEX[name] for name in CHANGES]  # its sensors are off by an error of its own
         covariance[of_next, of_next] += self.errors[1] ** 2
-        model = FittedModel(
-            vehicle=self.vehicle,
-            p=p,
-            covariance=covariance,
-            driven=self.reach.slip,
-            speeds=self.reach.speeds,
-            a_x=self.reach.a_x,
-            unexplained=self.reach.unexplained,
-        )
+        model = FittedModel(vehicle=self.vehicle, p=p, covariance=covariance, reach=self.reach)
         return Merged(key, self.logs, self.elsewhere, self.information, model)
 
 

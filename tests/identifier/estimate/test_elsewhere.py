@@ -13,6 +13,7 @@ from identifier.axle.model import begun
 from identifier.estimate.fit import fit
 from identifier.estimate.method import FitMethod
 from identifier.estimate.model import FittedModel
+from identifier.estimate.posterior import Reach
 from identifier.estimate.priors import Priors
 from identifier.export.compiled import CompiledPackage
 from identifier.export.onnx import onnx_bytes
@@ -49,10 +50,13 @@ def believed(p=PRIORS.mean, **numbers):
         vehicle=CAR,
         p=p,
         covariance=0.01 * COVARIANCE,
-        driven=np.array([0.17, 0.12]),
-        speeds=np.array([16.0, 20.0]),
-        a_x=np.zeros(2),
-        unexplained=np.array([0.6, 0.4]),
+        reach=Reach(
+            np.array([0.17, 0.12]),
+            np.array([16.0, 20.0]),
+            np.zeros(2),
+            np.array([0.6, 0.4]) ** 2,
+            1.0,
+        ),
     )
 
 
@@ -159,7 +163,7 @@ def test_a_network_file_tells_curves_and_band_of_a_fit(fitted):
     out = session.run(None, {"alpha_f": alpha[:, None], "alpha_r": alpha[:, None]})
     loads = np.array(CAR.axle_loads)
     np.testing.assert_allclose(np.hstack(out[:2]), fitted.force(alpha), atol=1e-9 * loads.min())
-    band = fitted.band.half(alpha, v_x=float(fitted.speeds.mean()))
+    band = fitted.band.half(alpha, v_x=float(fitted.reach.speeds.mean()))
     np.testing.assert_allclose(np.hstack(out[2:]), band, rtol=1e-9)
 
 

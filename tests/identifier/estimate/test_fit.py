@@ -91,9 +91,9 @@ def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt):
 
 
 def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
-    assert learnt.model.segments == ()
+    assert learnt.model.reach.segments == ()
     wet = fit([driven(5, scale=0.5, amplitude=0.06, swing=0.0)], sedan()).model
-    (segment,) = wet.segments
+    (segment,) = wet.reach.segments
     begins = segment.begin > 0.0  # else what came before the drop is the segment
     assert (segment.begin if begins else segment.end) == pytest.approx(DROP, abs=1.5)
     ratio = segment.ratio if begins else 1.0 / segment.ratio

@@ -157,7 +157,7 @@ def test_an_accelerometer_behind_a_causal_filter_is_late(exact, hertz, late):
 
 
 def test_a_model_keeps_what_it_says_of_its_log(learnt, tmp_path):
-    doubtful = replace(learnt, parted=2.0 * TRUST.parted, a_y_late=0.1)
+    doubtful = replace(learnt, reach=learnt.reach._replace(parted=2.0 * TRUST.parted, a_y_late=0.1))
     doubtful.save(tmp_path / "weights.json")
     again = FittedModel.load(tmp_path / "weights.json")
     assert isinstance(again, FittedModel)

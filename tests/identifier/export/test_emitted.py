@@ -11,6 +11,7 @@ import pytest
 from identifier.axle.model import begun
 from identifier.band import normal_quantile
 from identifier.estimate.model import FittedModel
+from identifier.estimate.posterior import Reach
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import car_numbers
 from identifier.export.ggv import ggv_text, limits
@@ -43,10 +44,13 @@ def fitted(car=CAR, sd=0.1, **numbers):
         vehicle=car,
         p=p,
         covariance=sd**2 * priors.covariance,
-        driven=np.array([0.2, 0.15]),
-        speeds=np.array([5.0, 30.0]),
-        a_x=np.array([-5.0, 3.0]),
-        unexplained=np.zeros(2),
+        reach=Reach(
+            np.array([0.2, 0.15]),
+            np.array([5.0, 30.0]),
+            np.array([-5.0, 3.0]),
+            np.zeros(2),
+            1.0,
+        ),
     )
 
 
@@ -99,7 +103,7 @@ def level(**numbers):
     low = 1.0 - Z * model.band.load_doubt
     grip = dict(zip(("ln_grip_f", "ln_grip_r"), np.log(1.1 / low), strict=True))
     model = fitted(sd=1e-6, **grip, **numbers)
-    return replace(model, driven=np.array([0.5, 0.5]))
+    return replace(model, reach=model.reach._replace(slip=np.array([0.5, 0.5])))
 
 
 NO_ELLIPSE = dict.fromkeys(("braking_f", "braking_r", "driving_f", "driving_r"), 0.0)
@@ -166,7 +170,8 @@ def test_limits_fall_with_what_is_not_known_and_models_without_a_band_have_none(
     with pytest.raises(ValueError, match="NetworkModel cannot tell how sure it is"):
         limits(network())
     with pytest.raises(ValueError, match="front axle is not known at any slip"):
-        limits(replace(fitted(), driven=np.array([0.0, 0.1])))
+        model = fitted()
+        limits(replace(model, reach=model.reach._replace(slip=np.array([0.0, 0.1]))))
 
 
 def test_raceline_planners_read_the_table(tmp_path):
