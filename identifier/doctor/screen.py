@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identifier.doctor.chosen import CHOSEN
-from identifier.doctor.consistency import Motion
 from identifier.doctor.finding import Finding
 from identifier.doctor.pieces import driven_pieces, driven_windows, looked_at, usual_speed
-from identifier.doctor.readings import ARM, DEGREE, Change, Read, read
+from identifier.doctor.readings import ARM, DEGREE, Change, Motion, Read, read
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.suspects import similar_inertia, usual_inertia
 from identifier.measured import with_doubt
@@ -63,7 +62,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
         return Screened(findings=(*samples, *given), repair=Repair(), blind=blind)
     some, hidden = looked_at(mended)[0], sorted(motion.hidden)
 
-    def possible(changes: tuple[Change, ...]) -> bool:
+    def admissible(changes: tuple[Change, ...]) -> bool:
         try:
             read_so, _ = _repair_of(changes).apply(some, vehicle)
         except RecordingError:  # beyond what a car does
@@ -84,7 +83,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
             without=None if found.without is None else screened(found.without),
         )
 
-    return screened(read(motion, vehicle, possible))
+    return screened(read(motion, vehicle, admissible))
 
 
 def _gross_findings(found: Read, vehicle: Vehicle) -> list[Finding]:

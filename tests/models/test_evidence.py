@@ -74,10 +74,10 @@ def test_window_means_and_slopes_are_those_of_the_signals_at_any_rate(dt):
     w = windows(turning(dt))
     width = max(round(RECORDINGS_CHOSEN.evidence_window / dt), 1) * dt
     stride = max(round(RECORDINGS_CHOSEN.stride / dt), 1) * dt
-    t_mid = np.arange(w.r.size) * stride + 0.5 * width - 0.5 * dt
+    t_mid = np.arange(w.r.size) * stride + 0.5 * width
     shrink = np.sinc(2.0 * width / 2.0 / np.pi)  # of a sine, averaged over the window
-    np.testing.assert_allclose(w.r, 0.5 * shrink * np.sin(2.0 * t_mid), atol=2e-4)
-    np.testing.assert_allclose(w.r_dot, shrink * np.cos(2.0 * (t_mid + 0.5 * dt)), atol=1e-3)
+    np.testing.assert_allclose(w.r, 0.5 * shrink * np.sin(2.0 * t_mid), atol=4e-4)
+    np.testing.assert_allclose(w.r_dot, shrink * np.cos(2.0 * t_mid), atol=1e-3)
     np.testing.assert_allclose(w.v_y_dot, 0.3 * w.r_dot, rtol=1e-9)
     np.testing.assert_allclose(w.v_x_r, 10.0 * w.r, rtol=1e-9)
 

@@ -15,7 +15,6 @@ from models.recordings import (
     read_recording,
     runs,
 )
-from models.recordings.evidence import windows
 
 Array = np.ndarray
 DEGREES = 180.0 / np.pi
@@ -175,20 +174,6 @@ def test_at_every_rate_above_ten_hertz_a_right_recording_passes_and_errors_ring(
         message = refusal(plant(made))
         assert message.startswith(start), error
         assert remedy in message, error
-
-
-@pytest.mark.parametrize("every", [2, 10, 40])
-def test_windows_are_as_long_and_as_far_apart_at_every_rate(every):
-    """Means over 0.2 s every 0.05 s of a parabola, whose differences are known."""
-    made = drive(every=every)
-    t = made.t
-    found = windows(replace(made, v_y=1.0 + 0.3 * t + 0.05 * t**2, r=0.1 * t))
-    starts = 0.05 * np.arange(found.r.size) if every != 40 else 0.04 * np.arange(found.r.size)
-    assert found.r.size == pytest.approx((made.duration - 0.2) / (starts[1] - starts[0]), abs=2)
-    middle = starts + 0.1
-    np.testing.assert_allclose(found.v_y_dot, 0.3 + 0.1 * middle, atol=1e-9)
-    np.testing.assert_allclose(found.r, 0.1 * (middle - 0.5e-3 * every), atol=1e-9)
-    np.testing.assert_allclose(found.r_dot, 0.1, atol=1e-9)
 
 
 def test_one_degree_of_steering_in_degrees_is_found_without_acceleration():

@@ -18,8 +18,8 @@ from benchmarks.random_cars import CLASSES, good_sensors, random_car, random_dri
 from benchmarks.recorded_cars import CARMAKER, DART
 from identifier.doctor import diagnose
 from identifier.doctor.chosen import CHOSEN as DOCTOR_CHOSEN
-from identifier.doctor.consistency import Motion, Reading, unexplained
 from identifier.doctor.pieces import looked_at
+from identifier.doctor.readings import Motion, Reading, unexplained
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import screen, steering_finding
 from models.faults import SensorFault
