@@ -183,7 +183,9 @@ class Search:
 
         That is the gain that it promises, its value, and its deviation.
         """
-        every = self.problem.under(_all_move(self.problem.priors)).residuals(base.p)
+        moves = np.ones(self.problem.priors.moves.size, dtype=bool)
+        all_move = replace(self.problem.priors, moves=moves)
+        every = self.problem.under(all_move).residuals(base.p)
         H, g = normal(self.problem, every, base.scale**2, base.memory)
         before = self.priors(self.wide).cost(base.p)
         for one in self.left(of_model=True):
@@ -388,7 +390,7 @@ class Search:
             free = np.ones(step.size, dtype=bool)
             if zero is not None:
                 fixed = np.isin(problem.index, [INDEX[name] for name in zero.parameters])
-                free, step[held] = ~fixed, -post.p[problem.index[fixed]]
+                free, step[fixed] = ~fixed, -post.p[problem.index[fixed]]
             rest = g[free] + H[np.ix_(free, ~free)] @ step[~free]
             step[free] = -np.linalg.solve(H[np.ix_(free, free)], rest)
             e = (at.e + at.slopes @ step) * problem.size[:, None]
@@ -450,10 +452,6 @@ class Search:
                 if one.code in ("factor", "yaw_inertia"):
                     least = f"a factor of {1.0 + left:.2g}"
                 yield f"{one.name}: {least} is not observable on this drive"
-
-
-def _all_move(priors: Priors) -> Priors:
-    return replace(priors, moves=np.ones(priors.moves.size, dtype=bool))
 
 
 def examine(recording: Recording, vehicle: Vehicle) -> Examination:

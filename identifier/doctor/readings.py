@@ -242,14 +242,6 @@ class Change:
         return {name: factor for name, (_, factor) in pairs}
 
     @property
-    def parts(self) -> "tuple[Change, ...]":
-        """The same, channel by channel."""
-        return tuple(
-            replace(self, channels=(name,), factors=(factor,))
-            for name, factor in zip(self.channels, self.factors, strict=True)
-        )
-
-    @property
     def turned(self) -> "Change":
         """Of a steering angle that is turned and scaled the sign alone; else the same."""
         if self.code == "steering" and self.factors[0][1] < 0.0:
@@ -357,8 +349,8 @@ def read(
     motion: Motion, vehicle: Vehicle, admissible: Callable[[tuple[Change, ...]], bool]
 ) -> Read:
     """Return how a log is best read as the motion of a car.
-    admissible : whether the log breaks no law with some changes; of the best readings those that do
-        are left out, unless all do.
+    admissible : whether the log breaks no law with some changes; of the best readings those that
+        do are left out, unless all do.
     """
     changes = CHANGES + (_ON_ACCELEROMETER if motion.a_y is not None else ())
     changes = tuple(one for one in changes if one.shows_in(motion))
@@ -437,7 +429,9 @@ def _steerings(one: _Explanation, motion: Motion, vehicle: Vehicle) -> list[Chan
         return rest + front_leaves(as_it_is._replace(slip=front), vehicle)
 
     tried = {float(factor): left(float(factor)) for factor in (*STEERING, *-STEERING)}
-    factor = _refined(min(tried, key=lambda one: tried[one]), left)
+    best, step = min(tried, key=lambda one: tried[one]), math.log(STEERING[1] / STEERING[0])
+    finer = _least(lambda by: left(best * math.exp(by)), -step, step, CHOSEN.finest)
+    factor = best * math.exp(finer)
     if factor > 0.0 and abs(math.log(factor)) < CHOSEN.same_steering:
         return []
     return [Change(code="steering", channels=("delta_f",), factors=(("delta", factor),))]
@@ -478,12 +472,6 @@ def _arms(one: _Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
     step = float(_ARMS[1] - _ARMS[0])
     share = _least(left, share - step, share + step, CHOSEN.finer)
     return [Change(code=ARM, channels=("v_y",), arm=share * length)]
-
-
-def _refined(factor: float, left: Callable[[float], float]) -> float:
-    step = math.log(STEERING[1] / STEERING[0])
-    finer = _least(lambda by: left(factor * math.exp(by)), -step, step, CHOSEN.finest)
-    return factor * math.exp(finer)
 
 
 def _least(left: Callable[[float], float], low: float, high: float, sections: int) -> float:

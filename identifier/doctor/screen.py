@@ -88,12 +88,17 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
 
 def _gross_findings(found: Read, vehicle: Vehicle) -> list[Finding]:
     """Return what the best reading says is grossly wrong; a reading is judged as a whole."""
-    gross = [
-        _reading_finding(part, found, vehicle)
-        for change in found.best.gross
-        for part in (change.parts if change.code == "unit" else (change,))
-    ]
-    gross = _one_steering(gross)
+    parts: list[Change] = []
+    for change in found.best.gross:
+        pairs = zip(change.channels, change.factors, strict=True) if change.code == "unit" else ()
+        each = [replace(change, channels=(name,), factors=(factor,)) for name, factor in pairs]
+        parts += each or [change]
+    gross = [_reading_finding(part, found, vehicle) for part in parts]
+    of_steering = [one for one in gross if one.channel == "delta_f" and one.repair is not None]
+    if len(of_steering) > 1:  # one angle: factors multiply
+        factor = math.prod(one.repair.factor["delta_f"] for one in of_steering if one.repair)
+        others = [one for one in gross if one not in of_steering]
+        gross = [steering_finding(factor, of_steering[0].confidence), *others]
     return doubted(gross, gross)
 
 
@@ -185,16 +190,6 @@ def _unlike(vehicle: Vehicle) -> list[Finding]:
             repair=Repair(vehicle={"yaw_inertia": similar}),
         )
     ]
-
-
-def _one_steering(gross: list[Finding]) -> list[Finding]:
-    """Return findings with one of the steering angle where there were several: factors multiply."""
-    of_steering = [one for one in gross if one.channel == "delta_f" and one.repair is not None]
-    if len(of_steering) < 2:
-        return gross
-    factor = math.prod(one.repair.factor["delta_f"] for one in of_steering if one.repair)
-    one = steering_finding(factor, of_steering[0].confidence)
-    return [one, *(other for other in gross if other not in of_steering)]
 
 
 def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:

@@ -44,8 +44,8 @@ class Suspect(NamedTuple):
     parameter : of `motion.parameters` that tells it, or "a_y." and what an accelerometer has.
     code, channel, unit : as in `Finding`.   wide : standard deviation of what it may be, of the
     parameter, of a sedan.   least : what nobody need mend, and what no model of this size tells
-    from a tire.   grows : both with the size of a car.   text : with {size} in `text_unit`, {origin}
-    of a number of the car.   text_unit : of the text.   per_unit : of the text per SI unit.
+    from a tire.   grows : both with the size of a car.   text : with {size} in `text_unit`, and
+    {origin} of a number of the car.   per_unit : unit of the text per SI unit.
     """
 
     parameter: str

@@ -106,7 +106,7 @@ def calibrated(
 
 
 def _model_errors(model: TireModel, recording: Recording, found: Evidence) -> tuple[Array, ...]:
-    """Return error, share, scaled and fixed of `ModelErrors` in all windows, of a model with a band."""
+    """Return what `ModelErrors` has of all windows but its `within`, of a model with a band."""
     assert model.band is not None
     spread = _spread_by_range(model.band, recording, found.windows)
     return found.measured - modelled_force(model, recording, found.windows), *spread

@@ -59,8 +59,9 @@ RULES = _Rules()
 class _Evaluated(NamedTuple):
     """A model and a drive.
 
-    portion : what of the drive is evaluated.   found : what the model explains of it.   taught : whether
-    the drive taught the model.   left_out : a segment that is not judged, from and to [s].
+    portion : what of the drive is evaluated.   found : what the model explains of it.
+    taught : whether the drive taught the model.   left_out : a segment that is not judged, from
+    and to [s].
     """
 
     model: TireModel
@@ -204,8 +205,8 @@ def _left_out(evaluated: _Evaluated) -> Iterator[Objection]:
         begin, end = evaluated.left_out
         text = (
             f"from {begin:.4g} to {end:.4g} s the motion is not explained, elsewhere it is (model "
-            f"error {PERCENT * float(evaluated.found.model_error.max()):.0f} % of the force): a sensor that "
-            "had not settled, or a banked or slippery segment"
+            f"error {PERCENT * float(evaluated.found.model_error.max()):.0f} % of the force): a "
+            "sensor that had not settled, or a banked or slippery segment"
         )
         yield Objection("segment", None, text, False)
 

@@ -126,10 +126,8 @@ class Evidence:
         first, last = self._worst_segment()
         place = np.arange(len(self.windows))
         rest = self.where((place < first) | (place >= last))
-        confined = (
-            rest.model_error
-            <= np.minimum(CHOSEN.rest_missed, CHOSEN.confined * self.model_error.max())
-        ).all()
+        most = min(CHOSEN.rest_missed, CHOSEN.confined * float(self.model_error.max()))
+        confined = (rest.model_error <= most).all()
         if len(rest.windows) >= CHOSEN.fewest and confined:
             return rest, (first, last)
         return self, None

@@ -294,9 +294,15 @@ def _check_steering(w: Means, turn: Steering) -> str | None:
     v = float(np.sqrt(np.mean(w.v_x**2)))
     longest = 7.5 + 0.03 * v**2
     if longest < L and proportional(w):
+        in_degrees = "degrees? multiply it by pi/180"
+        wheel = (
+            "the angle of the steering wheel? divide it by the steering ratio (12 to 20 in cars)"
+        )
+        likely = L * np.pi / 180.0 > (0.1 if v < 8.0 else 1.5)
+        both = (in_degrees, wheel) if likely else (wheel, in_degrees)
         return (
             f"{column} must be in rad, the effective wheelbase v_x delta/r is "
-            f"{L:.4g} m, above {longest:.3g}; {_too_large(L, v)}"
+            f"{L:.4g} m, above {longest:.3g}; {'; or '.join(both)}"
         )
     shortest = min(max(0.015 * v, 0.03), 0.12)
     if shortest > L:
@@ -305,15 +311,6 @@ def _check_steering(w: Means, turn: Steering) -> str | None:
             f"{L:.3g} m, below {shortest:.2g}; degrees per second? multiply r by pi/180"
         )
     return None
-
-
-def _too_large(L: float, v: float) -> str:
-    """Return which angle was taken for that of the road wheels, by the effective wheelbase."""
-    in_degrees = "degrees? multiply it by pi/180"
-    wheel = "the angle of the steering wheel? divide it by the steering ratio (12 to 20 in cars)"
-    shortest = 0.1 if v < 8.0 else 1.5
-    both = (in_degrees, wheel) if L * np.pi / 180.0 > shortest else (wheel, in_degrees)
-    return "; or ".join(both)
 
 
 def _check_lateral_velocity(recording: Recording, w: Means, turn: Steering) -> str | None:
