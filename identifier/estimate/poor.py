@@ -18,7 +18,7 @@ from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.drive import hardest
 from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
-from models.sensors import white_noise
+from models.recordings.samples import white_noise
 from models.vehicle import Vehicle
 
 DELAYS = np.arange(0.0, 0.41, 0.05)  # [s]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from models.recordings import Recording
-from models.sensors import Sensor, SensorError, Sensors, white_noise
+from models.recordings.samples import white_noise
+from models.sensors import Sensor, SensorError, Sensors
 
 N = 20001
 T = 0.01 * np.arange(N)

@@ -61,7 +61,7 @@ def test_a_rear_wheel_without_slip_tells_the_speed_of_the_center_of_gravity_exac
     for name in CORNERS[2:]:
         only = told(run, {name: speeds[name]})
         np.testing.assert_allclose(only.v_x, run.v_x, atol=1e-9)
-        assert only.gated == only.held == 0
+        assert only.gated == only.untrusted == 0
 
 
 def test_without_the_track_an_axle_tells_it_by_its_mean(run):
@@ -96,7 +96,7 @@ def test_slip_costs_a_fraction_of_what_it_costs_the_mean(run, driven, columns, e
 def test_wheels_that_all_agree_are_all_trusted_but_driven_ones_stand_back(run):
     ours, mean, result = against_mean(run, gentle_slip(run))
     assert ours < 1.05 * mean
-    assert result.gated < 0.01 * run.t.size and result.held == 0
+    assert result.gated < 0.01 * run.t.size and result.untrusted == 0
     free, _, _ = against_mean(run, gentle_slip(run), replace(KNOWN, driven="front"))
     assert free < 0.9 * ours  # the sedan drives by its front wheels, and brakes by them more
 
@@ -122,7 +122,7 @@ def test_without_slip_wheels_are_trusted_whatever_the_car_does(size):
         speeds = {name: shows * (v + 0.02 * size * rng.standard_normal(v.size)) for name in CORNERS}
         result = rolled(speeds, still, still, still, Wheels(track=(1.5,)), 0.01)
         assert np.abs(result.v_x - v).max() < 0.7 * size + 0.1
-        assert result.held < 0.01 * v.size
+        assert result.untrusted < 0.01 * v.size
 
 
 def test_no_sample_looks_at_a_later_one(run):

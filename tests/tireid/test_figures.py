@@ -388,6 +388,7 @@ def test_below_the_curve_stands_what_the_model_misses_of_the_truth() -> None:
         )
 
 
+@pytest.mark.heavy
 def test_times_of_a_clock_that_began_long_ago_fit_their_titles_and_axes() -> None:
     recording = made_up().recording
     history = replace(made_up(), recording=replace(recording, t=recording.t + 1.7e9))

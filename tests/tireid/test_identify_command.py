@@ -447,6 +447,7 @@ def test_learning_goes_on_from_stored_weights(result, law, logs, tmp_path, capsy
     assert errors["stored"] < 0.9 * errors["afresh"]
 
 
+@pytest.mark.sweep("axle")
 def test_weights_of_another_structure_are_refused(logs, tmp_path, capsys, result, law):
     words = ["identify", logs / "quick.csv", "--vehicle", logs / "car.toml"]
     words += ["--out", tmp_path / "out"]

@@ -95,8 +95,8 @@ def run(options: argparse.Namespace) -> int:
             "slip": slip_figure(model, recording),
             "forces": prediction_figure(prediction),
         }
-        if verdict.shown is not None:
-            figures["motion"] = motion_figure(verdict.shown, model.vehicle)
+        if verdict.forces is not None:
+            figures["motion"] = motion_figure(verdict.forces, model.vehicle)
         if friction is not None:
             figures["friction"] = friction_figure(friction)
         save_figures(folder, figures)

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.doctor.consistency import Motion, Reading, forces_and_slips
+from identifier.doctor.readings import Motion, Reading, forces_and_slips
 from identifier.prediction import Prediction
 from identifier.reproducibility import Replay, online_error
 from identifier.run import History

@@ -21,7 +21,7 @@ from identifier.run import identify
 from identifier.tire_model import load_model
 from identifier.verdict import calibrated, within_band
 from identifier.verdict.bands import color_of, quantile
-from identifier.verdict.motion import Windows
+from identifier.verdict.motion import brisk_windows
 from models.vehicle import sedan
 from tests.identifier.conftest import steered
 
@@ -329,7 +329,7 @@ def test_the_quantile_leaves_room_for_one_more_window():
 @pytest.mark.parametrize(("time", "low", "high"), [(0.0, 2.5, 6.0), (2.0, 15.0, 90.0)])
 def test_errors_that_stay_alike_count_less(swinging, time, low, high):
     recording = swinging[1][0]
-    windows, rng = Windows.of(recording, 1.0), np.random.default_rng(6)
+    windows, rng = brisk_windows(recording, 1.0), np.random.default_rng(6)
     white = rng.standard_normal(len(recording))
     keep = np.exp(-recording.dt / time) if time else 0.0
     error = np.zeros(len(recording))

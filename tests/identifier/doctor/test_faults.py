@@ -169,9 +169,9 @@ def test_what_leaves_no_car_is_not_believed(driven):
     car, _, _ = driven
     by_code = {one.code: one for one in SUSPECTS}
     center, inertia, lag = (by_code[code] for code in ("center_of_gravity", "yaw_inertia", "lag"))
-    assert center.possible(0.1, car) and not center.possible(0.9 * car.l_f, car)
-    assert inertia.possible(1.3, car) and not inertia.possible(8.0, car)
-    assert lag.possible(0.1, car) and not lag.possible(-0.1, car)
+    assert center.plausible(0.1, car) and not center.plausible(0.9 * car.l_f, car)
+    assert inertia.plausible(1.3, car) and not inertia.plausible(8.0, car)
+    assert lag.plausible(0.1, car) and not lag.plausible(-0.1, car)
 
 
 # When a repair is sure.

@@ -14,7 +14,7 @@ from identifier.motion.parameters import INDEX
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
 from identifier.verdict import judge, judge_prediction
-from identifier.verdict.motion import Windows, clean_rms, measured_force
+from identifier.verdict.motion import brisk_windows, clean_rms, measured_force
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.sensors import Sensor, Sensors
@@ -72,7 +72,7 @@ def test_a_right_answer_is_valid_and_it_is_right(clean, good, drive):
 def test_what_is_measured_is_the_true_force(whole):
     """Newton over windows gives the force that the plant integrated, roll and lag and all."""
     car = sedan()
-    windows = Windows.of(whole, 3.0)
+    windows = brisk_windows(whole, 3.0)
     measured = measured_force(whole, car, windows)
     true = windows.mean(whole.axle_force / np.array(car.axle_loads))
     share = clean_rms(measured - true, np.zeros(2)) / clean_rms(true, np.zeros(2))
