@@ -243,7 +243,6 @@ def _curves(model: AxleModel | FittedModel, *, single: bool, with_band: bool) ->
 
 
 # No runtime has an Atan of double: our own is made of the others.
-_BUILDERS = {**BUILDERS, "tanh": ca.tanh, "exp": ca.exp, "atan": atan}
 _OPERATORS = {
     "add": "Add", "sub": "Sub", "mul": "Mul", "div": "Div", "neg": "Neg", "inv": "Reciprocal",
     "tanh": "Tanh", "exp": "Exp", "sin": "Sin", "cos": "Cos", "sqrt": "Sqrt", "fabs": "Abs",
@@ -253,7 +252,7 @@ _OPERATORS = {
 
 def _written(graph: _Graph, function: ca.Function, argument: str) -> list[str]:
     """Add the operators of an SX function of a scalar; return the names of its results."""
-    plain = function_of(graph_of(function), function, _BUILDERS)
+    plain = function_of(graph_of(function), function, {**BUILDERS, "atan": atan})
     scalars, names = recognized(graph_of(plain), whole=False), dict[int, str]()
     for place in scalars.reached():
         node = scalars.nodes[place]
