@@ -19,6 +19,7 @@ from codegen.graph import (
     Node,
     UnknownOperationError,
     graph_of,
+    rebuilt,
     simplifying,
 )
 
@@ -36,32 +37,21 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
     """Return a graph with choices and our own functions as nodes.
     whole : False leaves our own functions as the scalars that they are made of.
     """
-    if not whole:
-        return _with_choices(graph)
-    result, found = _with_choices(graph), Graph()
-    place_of: dict[int, int] = {}
-    for place, node in enumerate(result.nodes):
-        place_of[place] = _by_sines(found, _mapped(node, place_of))
-        for name, template, leaf in _templates().get(node.op, ()):
+    result = rebuilt(graph, lambda new, _, node, __: _with_choice(new, node))
+
+    def own(new: Graph, place: int, node: Node, place_of: Mapping[int, int]) -> int:
+        made = _by_sines(new, node)
+        for name, template, leaf in _templates().get(result.nodes[place].op, ()):
             argument = _argument(result, place, template, leaf)
             if argument is not None:
-                place_of[place] = found.add(Node(name, (place_of[argument],)))
-    found.outputs = [[place_of[p] for p in entries] for entries in result.outputs]
-    return found
+                made = new.add(Node(name, (place_of[argument],)))
+        return made
+
+    return rebuilt(result, own) if whole else result
 
 
-def _mapped(node: Node, place_of: Mapping[int, int]) -> Node:
-    args = tuple([place_of[a] for a in node.args])
-    return Node(node.op, args, node.value, node.port, node.entry)
-
-
-def _with_choices(graph: Graph) -> Graph:
-    result, place_of = Graph(), dict[int, int]()
-    for place, node in enumerate(graph.nodes):
-        moved = _mapped(node, place_of)
-        place_of[place] = result.add(_choice(result, moved) or _slope(result, moved) or moved)
-    result.outputs = [[place_of[p] for p in entries] for entries in graph.outputs]
-    return result
+def _with_choice(graph: Graph, node: Node) -> int:
+    return graph.add(_choice(graph, node) or _slope(graph, node) or node)
 
 
 def _choice(graph: Graph, node: Node) -> Node | None:
@@ -117,7 +107,8 @@ def _templates() -> Mapping[str, list[tuple[str, Graph, int]]]:
         with simplifying(on):
             for name, own in OWN.items():
                 x = ca.SX.sym("x")
-                graph = _with_choices(graph_of(ca.Function(name, [x], [own(x)])))
+                function = ca.Function(name, [x], [own(x)])
+                graph = recognized(graph_of(function), whole=False)
                 leaf = next(i for i, node in enumerate(graph.nodes) if node.op == "input")
                 last = graph.nodes[graph.outputs[0][0]].op
                 found.setdefault(last, []).append((name, graph, leaf))
