@@ -1,15 +1,15 @@
 """What `tireid identify` found, and its files: numbers as JSON, curves as CSV, figures as PNG."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from codegen.arrays import Array, blocks, thinning
+from codegen.arrays import Array, thinning
 from codegen.escape import visible
 from identifier.compare.course import side_slip
 from identifier.frozen import vehicle_numbers
@@ -34,7 +34,14 @@ from tireid.figures.paper import error_figure, weights_figure
 from tireid.figures.side_slip import side_slip_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import learnt_axles_figure, slip_figure
-from tireid.output import axle_columns, text_table, write_csv, write_json, write_long_csv
+from tireid.output import (
+    axle_columns,
+    force_columns,
+    text_table,
+    write_csv,
+    write_json,
+    write_long_csv,
+)
 from tireid.progress import Progress, say
 
 _OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
@@ -44,7 +51,7 @@ _ESTIMATED = {  # columns of forces.csv by the outputs of methods that estimate 
     "side_slip_observable": "side_slip_observable",
 }
 _WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
-_OWN_PAST = "  its past, against online"
+_NO_TRUTH, _ONLINE = "(no truth)", "(against online, no truth)"
 _WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
 _CURVE_POINTS = 201
 _FARTHER = 1.25  # than the slip that was driven, or is known
@@ -87,10 +94,10 @@ class Results:
         learnt, others = runs[0], [*parts, *runs[1:]]
         models = {freeze_key(t): learnt.freeze(t) for t in times[:-1]}
         models[freeze_key(times[-1])] = tire
-        frozen = {
-            key: {learnt.recording.name: reproduce(learnt, t)} | _replays(model, others)
-            for t, (key, model) in zip(times, models.items(), strict=True)
-        }
+        frozen: dict[str, dict[str, Replay]] = {}
+        for t, (key, model) in zip(times, models.items(), strict=True):
+            frozen[key] = {learnt.recording.name: reproduce(learnt, t)}
+            frozen[key] |= {run.recording.name: replay(model, run) for run in others}
         found: Any = {"models": models, "frozen": frozen, "verdict": verdict, "asked": asked}
         return cls(method=method, runs=runs, parts=parts, **found)
 
@@ -104,11 +111,6 @@ class Results:
         """Those of the last, by recording."""
         return list(self.frozen.values())[-1]
 
-    @property
-    def by_label(self) -> dict[str, Mapping[str, Replay]]:
-        """The replays by what a table calls their model."""
-        return {f"{key} s": replays for key, replays in self.frozen.items()}
-
     def table(self) -> str:
         """Return a table of the errors per axle, and as a share of the force where there is truth.
 
@@ -117,16 +119,15 @@ class Results:
         """
         runs = {run.recording.name: run for run in (*self.runs, *self.parts)}
         rows = [["frozen at", "replayed on", "front", "rear"]]
-        for label, replays in self.by_label.items():
+        for key, replays in self.frozen.items():
             for name, result in replays.items():
                 size, sides = force_rms(runs[name]), result.reproduction
-                errors = {(label, visible(name)): result.against_truth or result.against_online}
-                if sides is not None:
-                    errors["", _OWN_PAST] = sides.past_against_online
-                for number, (words, error) in enumerate(errors.items()):
-                    if number == 0 or error is not None:
-                        note = _no_truth(error, size) if words[0] else ""
-                        rows.append([*words, *error_cells(error, size), note])
+                error = result.against_truth or result.against_online
+                note = "" if size else _NO_TRUTH if error is None else _ONLINE
+                rows.append([f"{key} s", visible(name), *error_cells(error, size), note])
+                if sides and sides.past_against_online:
+                    past = error_cells(sides.past_against_online, size)
+                    rows.append(["", "  its past, against online", *past, ""])
         return text_table(rows, "><>>")
 
     def summary(self) -> dict[str, Any]:
@@ -141,23 +142,24 @@ class Results:
         design = learnt.method
         certificate = None if design.whole else certify(design, learnt.vehicle)
 
-        def of_frozen(of: Callable[[Replay], AxleRmse | None]) -> dict[str, Any]:
+        def of_frozen(measure: str) -> dict[str, Any]:
             return {
-                key: {name: _numbers(of(one)) for name, one in replays.items()}
+                key: {name: getattr(one, measure) for name, one in replays.items()}
                 for key, replays in self.frozen.items()
             }
 
+        split = of_frozen("reproduction")
         return {
             "verdict": self.verdict.to_dict(),
             "replay_verdicts": {name: one.to_dict() for name, one in self.asked.items()},
-            "rms_force_N": {h.recording.name: _numbers(force_rms(h)) for h in runs},
+            "rms_force_N": {h.recording.name: force_rms(h) for h in runs},
             "rmse_N": {
-                "online": {h.recording.name: _numbers(online_error(h)) for h in runs},
-                "frozen": of_frozen(lambda one: one.against_truth),
-                "frozen_against_online": of_frozen(lambda one: one.against_online),
+                "online": {h.recording.name: online_error(h) for h in runs},
+                "frozen": of_frozen("against_truth"),
+                "frozen_against_online": of_frozen("against_online"),
                 "reproducibility": {
-                    key: {n: asdict(r.reproduction) for n, r in replays.items() if r.reproduction}
-                    for key, replays in self.frozen.items()
+                    key: {n: one for n, one in by_name.items() if one}
+                    for key, by_name in split.items()
                 },
             },
             "law": self.method,
@@ -183,25 +185,36 @@ class Results:
             model.save(folder / f"weights{end}.json", valid=valid)
             columns = _curve_columns(model, [run.recording for run in self.runs])
             write_csv(folder / f"curve{end}.csv", columns)
-        self._write_curves(folder, progress or Progress("curves"))
-        say("drawing figures")
-        return save_figures(folder, self._figures())
-
-    def _write_curves(self, folder: Path, progress: Progress) -> None:
-        learnt, count = self.runs[0], len(self.runs)
+        learnt, progress = self.runs[0], progress or Progress("curves")
         for k, run in enumerate(self.runs):
-            replays = {
-                f"frozen_{key}s": by_name[run.recording.name]
-                for key, by_name in self.frozen.items()
-            }
             end = "" if run is learnt else f"_{file_name(run.recording)}"
-            share = progress.within(_WRITING * k / count, _WRITING * (k + 1) / count)
-            write_long_csv(folder / f"forces{end}.csv", _force_columns(run, replays, share))
+            write_csv(folder / f"forces{end}.csv", self._force_columns(run))
+            progress(_WRITING * (k + 1) / len(self.runs))
         if _OBSERVED in learnt.outputs:
             found = (_error_columns(learnt, one) for one in learnt.blocks())
             write_long_csv(folder / "errors.csv", found)
         if learnt.online:
             write_long_csv(folder / "weights.csv", _weight_columns(learnt))
+        say("drawing figures")
+        return save_figures(folder, self._figures())
+
+    def _force_columns(self, run: History) -> dict[str, Array]:
+        """Return the columns of forces.csv: slip angles, true, online and frozen forces."""
+        recording, car, outputs = run.recording, run.vehicle, run.outputs
+        forces = {"true": recording.axle_force, "online": run.axle_force if run.online else None}
+        for key, by_name in self.frozen.items():
+            forces[f"frozen_{key}s"] = by_name[recording.name].axle_force
+        return {
+            "t_s": recording.t,
+            "v_x_m_s": recording.v_x,
+            "v_y_m_s": recording.needed("v_y"),
+            "r_rad_s": recording.r,
+            "delta_f_rad": recording.delta_f,
+            "delta_r_rad": recording.delta_r,
+            **axle_columns("alpha_{}_rad", recording.alpha(car.l_f, car.l_r)),
+            **{name: outputs[port].ravel() for name, port in _ESTIMATED.items() if port in outputs},
+            **force_columns(forces),
+        }
 
     def _figures(self) -> dict[str, Figure]:
         learnt, model = self.runs[0], self.model
@@ -209,7 +222,7 @@ class Results:
         own = {float(key): replays[name] for key, replays in self.frozen.items()}
         figures = {
             "inputs": inputs_figure(recording),
-            "slip": slip_figure(model, recording, _beside(learnt)),
+            "slip": slip_figure(model, recording, learnt if learnt.online else None),
             "forces": force_figure(learnt, own),
         }
         slip = side_slip(learnt, learnt.method.min_speed, recording.logged_v_y)
@@ -221,36 +234,14 @@ class Results:
         if learnt.tracks_over(next(learnt.blocks())):
             figures["learnt"] = learnt_axles_figure(learnt, list(own))
         for run in self.runs[1:]:
-            drawn = prediction_figure(self.replays[run.recording.name], _beside(run))
+            beside = run if run.online else None
+            drawn = prediction_figure(self.replays[run.recording.name], beside)
             figures[f"replay_{file_name(run.recording)}"] = drawn
         return figures
 
 
-def _replays(model: TireModel, runs: Sequence[History]) -> dict[str, Replay]:
-    return {run.recording.name: replay(model, run) for run in runs}
-
-
-def _numbers(error: AxleRmse | None) -> dict[str, float] | None:
-    return None if error is None else asdict(error)
-
-
-def _beside(run: History) -> History | None:
-    """Return a run where it has forces of its own to compare with."""
-    return run if run.online else None
-
-
 def file_name(recording: Recording) -> str:
     return re.sub(r"[^\w.-]+", "_", recording.name)
-
-
-def _no_truth(error: AxleRmse | None, size: AxleRmse | None) -> str:
-    """Return the note beside an error: against what, where there is no true force.
-
-    error : None where there is none.   size : rms of the true forces [N], None without truth.
-    """
-    if size is not None:
-        return ""
-    return "(no truth)" if error is None else "(against online, no truth)"
 
 
 def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str]:
@@ -260,10 +251,9 @@ def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str
     """
     if error is None:
         return "-", "-"
-    forces = (0.0, 0.0) if size is None else (size.front, size.rear)
     front, rear = (
         f"{newtons:8.4g} N{f' {100 * newtons / force:.0f} %' if force > 0.0 else '':>6}"
-        for newtons, force in zip((error.front, error.rear), forces, strict=True)
+        for newtons, force in zip(astuple(error), astuple(size) if size else (0, 0), strict=True)
     )
     return front, rear
 
@@ -289,47 +279,13 @@ def _weight_columns(learnt: History) -> Iterator[dict[str, Array]]:
         yield weights
 
 
-def _force_columns(
-    run: History, replays: Mapping[str, Replay], progress: Callable[[float], None]
-) -> Iterator[dict[str, Array]]:
-    """Yield the columns of forces.csv: slip angles, true, online and frozen forces.
-
-    progress : called now and then with the share that is done, 0 to 1.
-    """
-    recording, car, n = run.recording, run.vehicle, len(run.recording)
-    outputs = run.outputs
-    given = {
-        column: outputs[port].ravel() for column, port in _ESTIMATED.items() if port in outputs
-    }
-    curves = {} if recording.axle_force is None else {"true": recording.axle_force}
-    curves |= {"online": run.axle_force} if run.online else {}
-    curves |= {label: replay.axle_force for label, replay in replays.items()}
-    for part in blocks(n):
-        columns = {
-            "t_s": recording.t[part],
-            "v_x_m_s": recording.v_x[part],
-            "v_y_m_s": recording.needed("v_y")[part],
-            "r_rad_s": recording.r[part],
-            "delta_f_rad": recording.delta_f[part],
-            "delta_r_rad": recording.delta_r[part],
-            **axle_columns("alpha_{}_rad", recording.alpha(car.l_f, car.l_r, part)),
-        }
-        columns |= {name: values[part] for name, values in given.items()}
-        for name, force in curves.items():
-            columns |= axle_columns(f"Fy{{}}_{name}_N", force[part])
-        yield columns
-        progress(part.stop / n)
-
-
 def _curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str, Array]:
     """Return curve.csv: the steady force of each axle over slip, and whether it is known there."""
     car, known = model.vehicle, model.known_slip
     reach = [0.0 if known is None else float(known.max())]
-    for recording in recordings:
-        for part in blocks(len(recording)):
-            moving = recording.v_x[part] >= model.min_speed
-            slip = np.abs(recording.alpha(car.l_f, car.l_r, part)[moving])
-            reach.append(float(slip.max(initial=0.0)))
+    for one in recordings:
+        moving = one.v_x >= model.min_speed
+        reach.append(float(np.abs(one.alpha(car.l_f, car.l_r)[moving]).max(initial=0.0)))
     end = min(_FARTHER * max(reach) or 0.1, 0.5)
     slip = np.linspace(-end, end, _CURVE_POINTS)
     force = model.force(slip)

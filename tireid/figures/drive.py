@@ -268,15 +268,10 @@ _INNER_WIDTH = CHOSEN.page - 0.75  # what labels leave of the page [in]
 
 @style.styled
 def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
-    """Draw the path, its cones and where every car drove; the first with its outlines.
-
-    Beside a path too large for cars to be seen stands the place of the largest deviation.
-    """
+    """Draw the path, its cones and where every car drove; the first with its outlines."""
     path = next(iter(drives.values())).path
     low, high = _extent(path, drives)
     width, height = high - low
-    if width <= CHOSEN.narrow * height and max(width, height) > CHOSEN.small:
-        return _large(path, drives)
     rows = 1
     if width > CHOSEN.narrow * height:
         rows = min(CHOSEN.most_rows, max(1, round(width / CHOSEN.row_length)))
@@ -311,32 +306,13 @@ def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
     return low, high
 
 
-def _large(path: "Path", drives: Mapping[str, "Drive"]) -> Figure:
-    figure = style.new_figure(CHOSEN.page, 3.6)
-    whole, part = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
-    worst = max(drives.values(), key=lambda drive: float(np.abs(drive.e_y).max()))
-    k = int(np.abs(worst.e_y).argmax())
-    X0, Y0, _ = (float(value) for value in path.pose(worst.s[k]))
-    half = 0.5 * CHOSEN.zoom
-    for axes in (whole, part):
-        _draw(axes, path, drives, outlines=axes is part)
-        axes.set(xlabel="X [m]", ylabel="Y [m]", aspect="equal")
-    whole.plot(X0, Y0, marker="s", markersize=9.0, markerfacecolor="none", color="#AA4499")
-    part.set(xlim=(X0 - half, X0 + half), ylim=(Y0 - half, Y0 + half))
-    part.set_title(f"the largest deviation, {abs(worst.e_y[k]):.2f} m")
-    style.legend_above(figure, order=tuple(drives))
-    return figure
-
-
-def _draw(
-    axes: Axes, path: "Path", drives: Mapping[str, "Drive"], *, outlines: bool = True
-) -> None:
+def _draw(axes: Axes, path: "Path", drives: Mapping[str, "Drive"]) -> None:
     axes.plot(path.X, path.Y, **PATH)
     if len(path.cones):
         axes.plot(*path.cones.T, **CONES)
     label, drive = next(iter(drives.items()))
     color, every = tire_look(label)["color"], CHOSEN.cars_every * drive.vehicle.wheelbase
-    at = np.searchsorted(drive.s, np.arange(drive.s[0], drive.s[-1] if outlines else 0.0, every))
+    at = np.searchsorted(drive.s, np.arange(drive.s[0], drive.s[-1], every))
     shapes = [
         car_shape(drive.vehicle, drive.X[k], drive.Y[k], drive.psi[k], drive.delta[k])
         for k in at[at < drive.s.size]

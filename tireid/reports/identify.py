@@ -1,6 +1,7 @@
 """The report of `tireid identify`: what was learnt, how well it predicts, where not to ask it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
@@ -245,21 +246,16 @@ def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
 
 def _errors(found: Results, figures: Mapping[str, Figure]) -> list[page.Block]:
     learnt, *others = found.runs
-    rows, online = [], learnt.online
+    rows, online = list[list[page.Cell]](), learnt.online
     for run in (learnt, *found.parts, *others):
         name, size = run.recording.name, force_rms(run)
         if online:
-            rows.append([name, "online", *_cells(online_error(run), size)])
-        for when, replays in found.by_label.items():
+            rows.append([f"{name}, online", *error_numbers(online_error(run), size)])
+        for key, replays in found.frozen.items():
             error = replays[name].against_truth or replays[name].against_online
-            rows.append([name, f"frozen, {when}", *_cells(error, size)])
+            rows.append([f"{name}, frozen, {key} s", *error_numbers(error, size)])
     blocks: list[page.Block] = [
-        page.Table(
-            caption="RMSE of the axle force, and its share of the rms force where there is a "
-            "truth" + ("; without one it is against what was identified online." * online or "."),
-            header=["drive", "", "front [N]", "share", "rear [N]", "share"],
-            rows=rows,
-        )
+        error_table(rows, "; without one it is against what was identified online" * online)
     ]
     if "forces" in figures:
         caption = f"Axle forces over time: {'online, and ' * online}replayed with frozen weights."
@@ -272,12 +268,22 @@ def _errors(found: Results, figures: Mapping[str, Figure]) -> list[page.Block]:
     return blocks
 
 
-def _cells(error: AxleRmse | None, size: AxleRmse | None) -> list[str | float | None]:
+def error_table(rows: Sequence[Sequence[page.Cell]], more: str = "") -> page.Table:
+    """Return a table of errors, of rows of a name and `error_numbers`."""
+    return page.Table(
+        caption="RMSE of the axle force, and its share of the rms force where there is a "
+        f"truth{more}.",
+        header=["drive", "front [N]", "share", "rear [N]", "share"],
+        rows=rows,
+    )
+
+
+def error_numbers(error: AxleRmse | None, size: AxleRmse | None) -> list[page.Cell]:
+    """Return front and rear error, each with its share of the rms force where it is known."""
     if error is None:
         return [None] * 4
-    cells: list[str | float | None] = []
-    for newtons, force in zip(
-        (error.front, error.rear), (size.front, size.rear) if size else (0.0, 0.0), strict=True
-    ):
-        cells += [newtons, f"{100.0 * newtons / force:.1f} %" if force > 0.0 else None]
-    return cells
+    shares = [
+        f"{100.0 * newtons / force:.1f} %" if force > 0.0 else None
+        for newtons, force in zip(astuple(error), astuple(size) if size else (0, 0), strict=True)
+    ]
+    return [error.front, shares[0], error.rear, shares[1]]
