@@ -7,10 +7,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from mpc.handover.certificate import tire_complaint
+from identifier.methods import make_method
+from mpc.handover.certificate import law_complaint, tire_complaint
 from mpc.handover.road import at_friction
 from mpc.handover.supervisor import Excitation
-from mpc.tires import PredictionTire, oracle_tire
+from mpc.tires import PredictionTire, oracle_tire, prediction_tire
 from mpc.tires.tire import TireStructure
 
 
@@ -112,6 +113,14 @@ def test_a_learnt_tire_that_pushes_without_slip_is_refused_to_either_side(tire, 
         assert place == 1 or axle in found  # a bias of v_y is at both axles
 
 
+def test_a_law_without_its_certificate_is_refused(car):
+    design = make_method("integral", car)
+    assert law_complaint(design, car) is None
+    wild = replace(design, gains=replace(design.gains, eta_W=100.0 * design.gains.eta_W))
+    assert "certificate fails" in law_complaint(wild, car)
+    assert law_complaint(make_method("axle", car), car) is None
+
+
 def test_a_tire_must_be_known_where_the_car_is_driven(car, learnt, dry):
     excitation, samples = Excitation(0.01, car, 1.0), np.tile([20.0, 0.0, 0.0, 0.0], (100, 1))
     assert "the front axle was identified for 0.0 s, not 1 s" in excitation.complaint(
@@ -128,6 +137,18 @@ def test_a_tire_must_be_known_where_the_car_is_driven(car, learnt, dry):
     assert "it is known to" in excitation.complaint(learnt, -beyond * [-1.0, 1.0, 1.0, 1.0])
     turned = np.tile([20.0, 0.0, 0.0, -1.5 * known[0]], (100, 1))  # in front alone, to the right
     assert "the front axle slips" in excitation.complaint(learnt, turned)
+
+
+def test_ladders_are_judged_far_others_as_far_as_the_car_slipped(car, tire):
+    excitation = Excitation(0.01, car, 1.0)
+    assert excitation.trusted_slip(tire) == 0.25
+    assert excitation.trusted_slip(prediction_tire(car)) == 0.01
+    right = Excitation(0.01, car, 1.0)
+    for _ in range(100):
+        excitation.add(20.0, -20.0 * np.tan(0.05), 0.0, 0.0)
+        right.add(20.0, 20.0 * np.tan(0.05), 0.0, 0.0)
+    for one in (excitation, right):
+        assert one.trusted_slip(prediction_tire(car)) == pytest.approx(0.06, rel=1e-3)
 
 
 def test_a_tire_of_a_car_with_downforce_is_judged_by_the_load_at_the_speed(car):

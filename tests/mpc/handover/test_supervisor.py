@@ -85,6 +85,15 @@ def test_what_was_not_excited_is_not_handed_over(car, learnt):
     assert "axle was identified for" in supervisor.last.reason
 
 
+@pytest.mark.parametrize("broken", [np.full(4, np.nan), np.zeros(4)])
+def test_many_lost_samples_and_standing_still_decide_nothing(car, learnt, dropped, broken):
+    supervisor = supervisor_of(car, learnt)
+    for k, row in enumerate(samples_of(dropped[1])):
+        supervisor.observe(*(broken if k % 30 < 10 else row))
+    assert supervisor.decisions == []
+    assert supervisor.last.reason == "too few samples"
+
+
 @pytest.mark.parametrize("broken", [np.nan, np.inf, 1e308])
 def test_a_stale_identifier_is_a_fault_and_the_last_good_tire_stays(car, learnt, dropped, broken):
     supervisor = supervisor_of(car, learnt)
