@@ -250,7 +250,8 @@ def _curves(model: AxleModel | FittedModel, *, single: bool, with_band: bool) ->
 _OPERATORS = {
     "add": "Add", "sub": "Sub", "mul": "Mul", "div": "Div", "neg": "Neg", "inv": "Reciprocal",
     "tanh": "Tanh", "exp": "Exp", "sin": "Sin", "cos": "Cos", "sqrt": "Sqrt", "fabs": "Abs",
-    "lt": "Less", "select": "Where", "if_else_zero": "Where", "sq": "Mul", "twice": "Add",
+    "lt": "Less", "not": "Not", "select": "Where", "if_else_zero": "Where", "sq": "Mul",
+    "twice": "Add",
 }  # fmt: skip
 
 
