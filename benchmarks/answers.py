@@ -8,32 +8,25 @@ is kept too. None of them sees a true force.
 
 import logging
 import math
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
-from itertools import count
 from typing import NamedTuple
 
-import numpy as np
-
 import tireid as ti
-from benchmarks.random_cars import Beginning, RandomDrive, random_car, random_drive
 from identifier.doctor import Finding
 from identifier.reproducibility import NeverDrivesError
-from models.plant import PlantError
 from models.recordings import Recording, RecordingError
 from models.vehicle import Vehicle
 
 WRONG, RIGHT = 20.0, 8.0  # % of the rms force, worse axle: no such is valid, and all such
-DEAD = 0.1  # of the true stiffness: an axle below it learnt nothing that is a tire
 REFUSED = "refused"  # in place of a code of the verdict: the log is not let in
 Pair = tuple[float, float]
-NO_FORCE, NO_TIRE = (math.inf, math.inf), (math.nan, math.nan)
+NO_FORCE = (math.inf, math.inf)
 COLUMNS = {  # of a table that is read, by what a recording calls them
     **{"t": "t", "vx": "v_x", "vy": "v_y", "r": "r", "ay": "a_y"},
     **{"delta_f": "delta_f", "delta_r": "delta_r"},
 }
-MakeBeginning = Callable[[Vehicle, np.random.Generator], Beginning]
 
 
 class Answer(NamedTuple):
@@ -41,8 +34,6 @@ class Answer(NamedTuple):
 
     error: Pair
     """Of the force of the frozen model, front and rear [% of the rms force]; inf without model."""
-    stiffness: Pair
-    """That was learnt, front and rear [N/rad]; NaN without model."""
     valid: bool
     """The verdict."""
     codes: tuple[str, ...]
@@ -64,11 +55,6 @@ class Answer(NamedTuple):
     def right(self) -> bool:
         """Whether both axles are so near that a verdict should call it valid."""
         return self.worse <= RIGHT
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the program stopped where it should have answered or refused."""
-        return REFUSED not in self.codes and not all(map(math.isfinite, self.stiffness))
 
 
 def force_error(tire: ti.TireModel, recording: Recording) -> Pair:
@@ -111,17 +97,14 @@ def answer(log: Recording, told: Vehicle, judged: Recording) -> Answer:
             run, let_in = _run(blind(log), told)
         tire = run.freeze()
         verdict = run.verdict if let_in else None
-        stiffness = tire.stiffness
-        assert stiffness is not None
         missed = force_error(tire, judged)
     except NeverDrivesError:  # a car of that size, whoever insists
-        return Answer(NO_FORCE, NO_TIRE, False, (REFUSED,))
+        return Answer(NO_FORCE, False, (REFUSED,))
     except Exception as error:
-        return Answer(NO_FORCE, NO_TIRE, False, (type(error).__name__,))
+        return Answer(NO_FORCE, False, (type(error).__name__,))
     against = {REFUSED} if verdict is None else {x.code for x in verdict.findings if x.refuses}
     return Answer(
         missed if all(map(math.isfinite, missed)) else NO_FORCE,
-        (float(stiffness[0]), float(stiffness[1])),
         verdict is not None and verdict.valid,
         tuple(sorted(against)),
         tuple(sorted({f"{one.code} {one.channel}".strip() for one in said})),
@@ -154,38 +137,3 @@ def _run(log: Recording, told: Vehicle) -> tuple[ti.Run, bool]:
         return ti.identify(read, told), True
     except RecordingError:
         return ti.identify(log, told, check=False), False
-
-
-def is_dead(found: Answer, right: Pair) -> bool:
-    """Return whether an axle was left with next to no stiffness, or no model at all came out.
-
-    A log that was not let in leaves nothing dead.
-
-    Parameters
-    ----------
-    found : the answer.
-    right : stiffness of the axles, front and rear [N/rad].
-    """
-    alive = np.array(found.stiffness) >= DEAD * np.array(right)
-    return REFUSED not in found.codes and not bool(alive.all())
-
-
-def drawn(
-    kind: str, seed: int, beginning: MakeBeginning | None = None, number: int = 0
-) -> RandomDrive:
-    """Return a drive of the car of a seed; where it has no good one, another car is drawn.
-
-    Parameters
-    ----------
-    kind : class of the car.
-    seed : of the car.
-    beginning : makes one from car and generator; None is a straight road.
-    number : of the drive, each another.
-    """
-    for attempt in count():
-        car = random_car(kind, np.random.default_rng([seed, attempt, *kind.encode()]))
-        rng = np.random.default_rng([seed, attempt, number, *kind.encode()])
-        begin = None if beginning is None else beginning(car.vehicle, rng)
-        with suppress(PlantError):
-            return random_drive(car, rng, begin)
-    raise AssertionError("it counts for ever")

@@ -1,41 +1,39 @@
-"""Does the default find tires? Frozen force on drives that taught nothing, beside all rivals.
+"""Does the default find tires? Frozen force on drives that were not identified, beside all rivals.
 
-    python -m benchmarks.estimate [--only PART ...] [--methods NAME ...] [--record]
+    python -m benchmarks.estimate [--quick] [--record] [--only PART ...]
 
 By the road of a user: `ti.identify`, `freeze`, `ti.replay`; rivals are all methods of `compare`
-but the paper's laws. The error is that of both axles in
-percent of their rms force; where a drive has no measured force, against what its motion shows
-(inverse single-track forces). Places: random cars of four classes with good sensors, of whose
-drives a full one, a gentle one and a single step teach; CarMaker, either run of what the other
-taught; a real race car, of which 100 s teach and the rest is asked; a real 1:10 car, each run of
-what every other taught. Beside them: several logs together, load transfer and friction circle
-against slip alone, told stiffness, a wrong steering ratio, bands, and the time that it takes.
+that use v_y, but the paper's laws. The error is that of both axles in percent of their rms force;
+where a drive has no measured force, against what its motion shows (inverse single-track forces).
+Places: random cars of four classes with good sensors, identified from a full drive, a gentle one or
+a single step; CarMaker, either run from the other; a real race car, 100 s and the rest; a real 1:10
+car, each run from every other. Beside them: several logs together, load transfer and friction
+circle against slip alone, declared stiffness, a wrong steering ratio, and the time that it takes.
 Recordings are those of `recorded_cars`; without them these parts are skipped.
 """
 
-import argparse
 import sys
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache
-from itertools import combinations, pairwise, permutations
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
 
 import tireid as ti
 from benchmarks.random_cars import CLASSES, FIRST_SEED, random_car, random_drive, random_steering
-from benchmarks.recorded_cars import CARMAKER, DART, DATA
-from benchmarks.targets import Targets, keeps, show
+from benchmarks.recorded_cars import CARMAKER, CARMAKER_RUNS, DART, DATA, FERRARI
+from benchmarks.targets import Table, Targets, Values, parse, show
 from codegen.arrays import Array
 from identifier.estimate.drive import Drive
 from identifier.estimate.fit import fit
-from identifier.estimate.model import FittedModel
 from identifier.estimate.priors import Priors
 from identifier.method import CannotFreezeError
-from identifier.methods import DEFAULT, LIVE, METHODS, make_method
+from identifier.methods import DEFAULT, LIVE, draws_weights, make_method, methods
 from identifier.run import DivergedError
 from identifier.tire_model import STIFFNESS, TireModel
 from models.maneuvers import StepSteer
@@ -43,27 +41,12 @@ from models.plant import PlantError
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
 
-ASKED = tuple(  # the paper's laws are not: `learn_and_extrapolate` has them, at 60 % elsewhere
-    name
-    for name in METHODS
-    if name not in ("integral", "instantaneous", "instantaneous_scaled", "pi_lead")
-)
 CARS = 6  # of each class
 GENTLE = 0.3  # of the steering that reaches the limit
 STEPS = (0.5, 0.35, 0.2, 0.1)  # of it, the first that the car survives
 CORNER = 8.5  # s, when the corners of a random drive have begun
 SLOW = 0.8  # m/s, below which the 1:10 car is not asked
 LIMITS = {"full": 2.7, "gentle": 12.0, "step": 8.5, "carmaker": 5.3}  # %
-CARMAKER_RUNS = ("slalom1_14_5ms", "experiment2_40kmh")
-FERRARI = Vehicle(
-    name="Ferrari 250 LM",
-    mass=982.0,
-    yaw_inertia=1605.0,
-    l_f=1.33,
-    l_r=1.07,
-    cornering_stiffness_front=66e3,
-    cornering_stiffness_rear=105e3,
-)
 PIECES, PIECE = 12, 100.0  # of the race car's drive, and how long one is [s]
 FLOORS = {  # of the real 1:10 car
     "dart": ("dart.csv.gz", ("ramp_steer02", "free_10_02_28", "free_10_12_05")),
@@ -80,20 +63,8 @@ A_X = 2.0  # m/s²
 CIRCLE = ("load_transfer", "braking_f", "braking_r", "driving_f", "driving_r")
 TOLD = (0.25, 4.0)  # times the stiffness of the vehicle file
 RATIO, WRONG_RATIOS = 20.8, (16.0, 30.0)
-LEVEL = 0.9
 BEHIND = 1.1  # times the best of the other methods
-PARTS = (
-    "random",
-    "carmaker",
-    "ferrari",
-    "dart",
-    "together",
-    "circle",
-    "told",
-    "ratio",
-    "bands",
-    "cost",
-)
+PARTS = ("random", "carmaker", "ferrari", "dart", "together", "circle", "told", "ratio", "cost")
 
 
 class Taught(NamedTuple):
@@ -195,10 +166,15 @@ def pieces(recording: Recording, count: int, length: float) -> Iterator[tuple[Re
         yield tuple(recording.between(a, b) for a, b in spans if b - a > 5.0)
 
 
-def of_random_cars() -> dict[str, list[Taught]]:
-    """Return what random cars teach and what is asked of them, by kind of drive."""
+def of_random_cars(count: int = CARS) -> dict[str, list[Taught]]:
+    """Return what is identified of random cars and what is evaluated, by kind of drive.
+
+    Parameters
+    ----------
+    count : of cars of each class.
+    """
     found: dict[str, list[Taught]] = defaultdict(list)
-    for one in random_cars():
+    for one in random_cars(count=count):
         asked = tuple((other,) for other in one.others)
         for kind, log in one.teach.items():
             found[kind].append(Taught(one.told, log, asked, since=CORNER))
@@ -277,70 +253,67 @@ def both(error: Array, size: Array) -> float:
     return 100.0 * float(np.sqrt(error.sum() / size.sum()))
 
 
-def errors_of(one: Taught, name: str) -> list[float]:
-    """Return the errors of a method on what is asked [%]; inf where it diverged.
+def errors_of(one: Taught, name: str) -> list[float] | None:
+    """Return the errors of a method on what is evaluated [%]: inf where it diverged.
 
     Parameters
     ----------
-    one : what teaches and what is asked.
-    name : of the method.
-
-    Raises
-    ------
-    CannotFreezeError
-        Where it learns no tire.
+    one : what is identified and what is evaluated.
+    name : of the method; None is returned of one that identifies no tire.
     """
     try:
         tire = learnt(one.log, one.car, name)
     except DivergedError:
         return [np.inf] * len(one.asked)
+    except CannotFreezeError:
+        return None
     return [both(*missed(tire, logs, since=one.since, slow=one.slow)) for logs in one.asked]
 
 
-def judge_place(
-    targets: Targets, place: str, tasks: Sequence[Taught], names: Sequence[str]
-) -> None:
-    """Judge the default on a place, beside every other method that learns a tire of a v_y.
+def rivals(car: Vehicle) -> list[str]:
+    """Return the methods of `compare` that use v_y, but the paper's laws, the default first."""
+    known = (name for name in methods() if not draws_weights(name))
+    return [name for name in known if "v_y" in make_method(name, car).needs]
+
+
+def judge_place(targets: Targets, place: str, tasks: Sequence[Taught], *, quick: bool) -> None:
+    """Judge the default on a place, beside every other method that identifies a tire with v_y.
 
     Parameters
     ----------
     targets : collects what is missed.
     place : its name.
-    tasks : what teaches and what is asked.
-    names : of the methods.
+    tasks : what is identified and what is evaluated.
+    quick : beside the linear tire alone.
     """
-    print(f"{place}: {len(tasks)} drives teach; mean, median and worst [% of rms force]")
+    print(f"{place}: {len(tasks)} drives identified; mean, median and worst [% of rms force]")
+    names = [DEFAULT, "linear"] if quick else rivals(tasks[0].car)
+    pairs = [(one, name) for name in names for one in tasks]
+    with ProcessPoolExecutor() as pool:
+        answers = list(pool.map(errors_of, *zip(*pairs, strict=True)))
     means: dict[str, float] = {}
-    for name in names:
-        if "v_y" not in make_method(name, tasks[0].car).needs:
-            continue  # it tells v_y: `without_v_y`
-        try:
-            errors = [error for one in tasks for error in errors_of(one, name)]
-        except CannotFreezeError:
+    for k, name in enumerate(names):
+        found = answers[k * len(tasks) : (k + 1) * len(tasks)]
+        errors = [error for some in found if some is not None for error in some]
+        if None in found:
             continue
         means[name] = float(np.mean(errors))
         three = means[name], float(np.median(errors)), max(errors)
         show(name, " ".join(f"{value:7.1f}" for value in three))
-        sys.stdout.flush()
         for what, value in zip(("mean", "median", "worst"), three, strict=True):
             if np.isfinite(value):
-                targets.record(f"{place}/{name}/{what}", value, "%")
+                targets.record(f"{place}/{name}/{what}", value)
         if name == DEFAULT and place in LIMITS:
-            targets.at_most(f"{place}: mean", three[0], LIMITS[place], key=f"{place}/mean")
+            targets.at_most(f"{place}: mean", three[0], LIMITS[place])
         if name == DEFAULT and place == "ferrari":
-            targets.at_most("ferrari: median", three[1], 10.7, key="ferrari/median")
-            targets.at_most("ferrari: worst", three[2], 12.0, key="ferrari/worst")
-    if DEFAULT not in means or len(means) == 1:
-        return
+            targets.at_most("ferrari: median", three[1], 10.7)
+            targets.at_most("ferrari: worst", three[2], 12.0)
     own = means.pop(DEFAULT)
     if LIVE in means and place in FLOORS:
-        label, ratio = f"{place}: over {LIVE}", own / means[LIVE]
-        targets.at_most(label, ratio, 0.82, "-", key=f"{place}/over_live")
+        targets.at_most(f"{place}: over {LIVE}", own / means[LIVE], 0.82, "-")
     best = min(means, key=means.__getitem__)
-    targets.record(f"{place}/best_rival", best)
     limit = 1.0 if place in FLOORS else BEHIND
-    label = f"{place}: over the best rival, {best}"
-    targets.at_most(label, own / means[best], limit, "-", key=f"{place}/over_best")
+    targets.at_most(f"{place}: over the best rival, {best}", own / means[best], limit, "-")
 
 
 def judge_together(targets: Targets) -> None:
@@ -381,8 +354,8 @@ def judge_circle(targets: Targets) -> None:
             show(
                 f"{key}: rear, with load and circle / slip alone", f"{pair[0]:.1f} / {pair[1]:.1f}"
             )
-            targets.record(f"{key}/with", pair[0], "%")
-            targets.record(f"{key}/without", pair[1], "%")
+            targets.record(f"{key}/with", pair[0])
+            targets.record(f"{key}/without", pair[1])
     with_it, without = np.array(rows).T
     ratio = float(with_it.mean() / without.mean())
     targets.at_most("load and circle over slip alone, mean", ratio, 1.0, "-", key="circle/mean")
@@ -446,81 +419,6 @@ def judge_ratio(targets: Targets) -> None:
     targets.at_most("wrong ratios that are valid without the truth", silent, 0, "", "ratio/silent")
 
 
-def held(tire: TireModel, asked: Recording, *, since: float = 0.0, slow: float = 0.0) -> float:
-    """Return the share of samples whose true force lies in the band, mean of both axles [%].
-
-    Parameters
-    ----------
-    tire, since, slow : as of `missed`.
-    asked : a drive with forces.
-    """
-    assert isinstance(tire, FittedModel) and asked.axle_force is not None
-    counts = (asked.t >= since) & (asked.v_x >= max(slow, tire.min_speed))
-    away = np.abs(tire.predict(asked) - asked.axle_force)
-    return 100.0 * float(np.mean((away <= tire.band.over(asked, LEVEL))[counts]))
-
-
-Case = tuple[str, Vehicle, Sequence[Recording], Recording, float, float]
-
-
-def band_cases() -> Iterator[Case]:
-    """Yield place, car, what teaches, what is asked, since when and from what speed."""
-    for one in random_cars():
-        first, second = one.others
-        full = one.teach["full"]
-        yield "random", one.told, [full], first, CORNER, 0.0
-        yield "random", one.told, [full, first], second, CORNER, 0.0
-    if not DATA.is_dir():
-        return
-    groups: dict[str, tuple[Vehicle, Sequence[Recording], float]] = {}
-    halves = []
-    for run in read("carmaker.csv.gz", CARMAKER_RUNS):
-        middle, end = 0.5 * float(run.t[0] + run.t[-1]), float(run.t[-1])
-        halves.append((run.between(float(run.t[0]), middle), run.between(middle, end)))
-    for a, b in ((0, 1), (1, 0)):
-        for whose in halves:
-            yield "carmaker", CARMAKER, [one[a] for one in halves], whose[b], 0.0, 0.0
-    for learn, ask in permutations(read("carmaker.csv.gz", CARMAKER_RUNS)):
-        yield "carmaker", CARMAKER, [learn], ask, 0.0, 0.0
-    whole = read_recording(DATA / "ferrari.csv.gz")
-    edges = np.linspace(float(whole.t[0]), float(whole.t[-1]), 6)
-    laps = [whole.between(a, b) for a, b in pairwise(edges)]
-    groups["ferrari"] = FERRARI, laps, 0.0
-    for place, (file, names) in FLOORS.items():
-        groups[place] = DART, read(file, names), SLOW
-    for place, (car, runs, slow) in groups.items():
-        for count in (1, 2):
-            for teach in combinations(runs, count):
-                for ask in runs:
-                    if not any(ask is one for one in teach):
-                        yield place, car, teach, ask, 0.0, slow
-
-
-def judge_bands(targets: Targets) -> None:
-    """Judge how often bands of 90 % hold the true force of other drives.
-
-    Parameters
-    ----------
-    targets : collects what is missed.
-    """
-    found: dict[tuple[str, int], list[float]] = defaultdict(list)
-    models: dict[tuple[int, ...], tuple[TireModel, Sequence[Recording]]] = {}
-    for place, car, teach, ask, since, slow in band_cases():
-        whose = tuple(id(one) for one in teach)
-        if whose not in models:
-            models[whose] = fit(teach, car).model, teach  # kept, so that no other has its id
-        share = held(models[whose][0], ask, since=since, slow=slow)
-        found[place, len(teach)].append(share)
-    for (place, count), shares in found.items():
-        mean, label = float(np.mean(shares)), f"{place}: band of 90 % of {count} logs holds"
-        key = f"bands/{place}/{count}"
-        if count == 1:
-            targets.at_least(label, mean, 80.0, key=key)
-        else:
-            targets.at_least(label, mean, 85.0, key=f"{key}/least")
-            targets.at_most(label, mean, 95.0, key=f"{key}/most")
-
-
 def judge_cost(targets: Targets) -> None:
     """Judge the CPU time of a minute of log against that of the method of a car.
 
@@ -536,24 +434,64 @@ def judge_cost(targets: Targets) -> None:
         begin = time.process_time()
         learnt(log, one.told, name)
         spent[name] = (time.process_time() - begin) * 60.0 / log.duration
-        targets.record(f"cost/{name}", spent[name], "s")
+        targets.record(f"cost/{name}", spent[name])
     more = spent[DEFAULT] - spent[LIVE]
     targets.at_most("a minute of log, CPU beyond that of a car", more, 1.0, "s", key="cost/more")
 
 
+COLUMNS = {
+    "full": ("24 random cars, full drive", "mean"),
+    "gentle": ("the same, gentle drive", "mean"),
+    "step": ("the same, single step", "mean"),
+    "carmaker": ("CarMaker, 2 pairs", "mean"),
+    "ferrari": ("race car, 12 pieces", "median"),
+    "dart": ("1:10 car, 6 pairs", "mean"),
+    "rubber": ("1:10 car on rubber, 20 pairs", "mean"),
+}
+
+
+def tables(v: Values) -> dict[str, Table]:
+    """Return the tables of the documents.
+
+    Parameters
+    ----------
+    v : recorded values.
+    """
+    names = dict.fromkeys(key.split("/")[1] for key in v if key.endswith("/mean"))
+    names.pop("mean", None)
+    rows = []
+    for name in (one for one in names if f"full/{one}/mean" in v):
+        keys = [f"{place}/{name}/{how}" for place, (_, how) in COLUMNS.items()]
+        rows.append([f"`{name}`", *(f"{v[key]:.1f}" if key in v else "diverged" for key in keys)])
+    header = ("method; error [%]", *(f"{what}, {how}" for what, how in COLUMNS.values()))
+    circle = [
+        [f"{floor}: {run}", f"{v[f'circle/{floor}/{run}/with']:.1f}",
+         f"{v[f'circle/{floor}/{run}/without']:.1f}"]
+        for floor, runs in PULLED.items() for run in runs
+    ]  # fmt: skip
+    cost = [[f"`{name}`", f"{v[f'cost/{name}']:.2f}"] for name in (DEFAULT, LIVE)]
+    return {
+        "estimate": Table(header, rows),
+        "estimate/circle": Table(
+            ("1:10 car, identified run", "rear error [%], load transfer and friction circle",
+             "slip alone"),
+            circle,
+        ),
+        "estimate/cost": Table(("method", "processor time of a minute of log [s]"), cost),
+    }  # fmt: skip
+
+
 def main() -> int:
     """Print every number; return 1 where a target is missed."""
-    targets, record = Targets("estimate"), keeps()
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, metavar="PART")
-    parser.add_argument("--methods", nargs="+", choices=METHODS, default=ASKED, metavar="NAME")
-    told = parser.parse_args()
+    targets, options = Targets("estimate"), parse("estimate", __doc__, PARTS)
+    only = options.only[:2] if options.quick else options.only
     if not DATA.is_dir():
         print(f"skipped recorded cars: the recordings are not there: {DATA} (set TIREID_DATA)")
     for part, drives in PLACES.items():
-        if part in told.only and (part == "random" or DATA.is_dir()):
-            for place, tasks in drives().items():
-                judge_place(targets, place, tasks, list(told.methods))
+        if part in only and (part == "random" or DATA.is_dir()):
+            places = of_random_cars(1) if options.quick and part == "random" else drives()
+            for place, tasks in places.items():
+                judge_place(targets, place, tasks, quick=options.quick)
     recorded = {
         "together": judge_together,
         "circle": judge_circle,
@@ -561,14 +499,11 @@ def main() -> int:
         "ratio": judge_ratio,
     }
     for part, judge in recorded.items():
-        if part in told.only and DATA.is_dir():
+        if part in only and DATA.is_dir():
             judge(targets)
-    if "bands" in told.only:
-        judge_bands(targets)
-    if "cost" in told.only:
+    if "cost" in only:
         judge_cost(targets)
-    whole = tuple(told.only) == PARTS and set(ASKED) <= set(told.methods)
-    return targets.finish(keep=record and whole)
+    return targets.finish(keep=options.record and DATA.is_dir())
 
 
 if __name__ == "__main__":

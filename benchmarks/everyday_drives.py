@@ -6,7 +6,7 @@ changes lanes or drives a slalom, up to half the grip at least. Everything follo
 
 import math
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
@@ -22,7 +22,8 @@ from benchmarks.random_cars import (
 from codegen.arrays import Array
 from models.maneuvers import Maneuver, RandomSteer
 from models.plant import PlantError
-from models.vehicle import GRAVITY
+from models.recordings import Recording
+from models.vehicle import GRAVITY, Vehicle
 
 DURATION = 60.0  # s
 GENTLE = (0.1, 0.25)  # of the grip, that the road's bends take
@@ -136,3 +137,16 @@ def drawn_everyday(kind: str, maneuver: str, seed: int) -> RandomDrive:
         with suppress(PlantError):
             return everyday_drive(car, maneuver, rng)
     raise AssertionError("it counts for ever")
+
+
+def everyday_log(kind: str, seed: int) -> tuple[Recording, Vehicle, Recording]:
+    """Return a log, the car as it is declared, and the drive without noise, with true forces.
+
+    Parameters
+    ----------
+    kind : class of the car.
+    seed : of car, drive and noise; where it is odd, the log has no a_y.
+    """
+    drive = drawn_everyday(kind, KINDS[(seed // 2) % len(KINDS)], seed)
+    log = replace(drive.log(np.random.default_rng([seed, 1])), axle_force=None)
+    return replace(log, a_y=None) if seed % 2 else log, drive.car.told, drive.exact

@@ -1,4 +1,4 @@
-"""What goes wrong with logs of cars, in the sizes in which it does: for tables and at random.
+"""What goes wrong with logs of cars, in the sizes in which it does: at random.
 
 Sizes are those of a sedan, 2.7 m between the axles; a car of another size has them by Froude's
 similarity: lengths with the wheelbase L, speeds with sqrt(g L), times with sqrt(L/g), angles as
@@ -6,7 +6,6 @@ they are. The same sizes so mean the same to a car of 1:10.
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
@@ -156,56 +155,6 @@ class Scale(NamedTuple):
             vehicle.froude_speed / LIKE.froude_speed,
             vehicle.froude_time / LIKE.froude_time,
         )
-
-
-def biased(channel: str, size: float) -> Case:
-    """Return a channel that is off throughout.
-
-    Parameters
-    ----------
-    channel : name of the signal.
-    size : in its unit.
-    """
-    return Case(SensorFault(channel=channel, kind="biased", size=size))
-
-
-def cases(vehicle: Vehicle) -> Mapping[str, Case]:
-    """Return the faults of the table by key, in its order.
-
-    Parameters
-    ----------
-    vehicle : the car that drives, told rightly.
-    """
-    by = Scale.of(vehicle)
-    found = {"clean": Case()}
-    found |= {f"v_y_bias/{size:g}": biased("v_y", size * by.speed) for size in (0.1, 0.3)}
-    found |= {
-        f"mounting/{size:g}": Case(Misaligned(angle=-math.radians(size))) for size in (0.5, 1.0)
-    }
-    found |= {
-        f"ahead/{size:g}": Case(SensorElsewhere(sensor="velocity", x=size * by.length))
-        for size in (0.5, 0.8)
-    }
-    found |= {f"steering/{size:g}": biased("delta_f", math.radians(size)) for size in (0.5, 1.0)}
-    found |= {
-        f"late/{size}": Case(Late(channels=("delta_f",), delay=1e-3 * size * by.time))
-        for size in (20, 50, 80)
-    }
-    found |= {
-        f"bank/{size:g}": Case(Bank(vehicle=vehicle, angle=math.radians(size)))
-        for size in (1.0, 3.0)
-    }
-    found |= {
-        "mass/1.2": Case(told=WrongNumber(field="mass", factor=1.2)),
-        "inertia/1.5": Case(told=WrongNumber(field="yaw_inertia", factor=1.5)),
-        "inertia/10": Case(told=WrongNumber(field="yaw_inertia", factor=10.0)),
-        "center/0.05": Case(told=ShiftedCenter(share=0.05)),
-        "swapped": Case(told=SwappedAxles()),
-        "other_car": Case(told=AnotherCar(declared=other_car(vehicle))),
-        "straight": Case(StraightOnly(sensors=good_sensors(vehicle))),
-        "v_y_zero": Case(SensorFault(channel="v_y", kind="zero")),
-    }
-    return found
 
 
 def random_case(vehicle: Vehicle, rng: np.random.Generator) -> Case:

@@ -1,96 +1,96 @@
 """Cases of the driving benchmarks: what `tireid drive` does with the words that a user would type.
 
 Every case is parsed by the parser of the command and run by the functions behind it, with its
-defaults: its drive to learn on, its methods, its tracker, its noise and 20 ms of delay. What a
-benchmark adds are words only; the seed changes the noise and the drive to learn on.
+defaults: its identification drive, its methods, its tracker, its noise and 20 ms of delay. The seed
+changes the noise and the identification drive.
 """
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 from typing import NamedTuple
+
+import numpy as np
 
 from identifier.tire_model import TireModel
 from tireid.cli import build_parser
 from tireid.commands.drive_case import conditions_of, frozen_tires
-from tireid.driving.runs import FROZEN, LINEAR, ORACLE, Conditions, Run, run_drive
+from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, run_drive
 
-LABELS = {"linear": LINEAR, "paper": FROZEN, "axle": FROZEN, "oracle": ORACLE}
-TIRES = tuple(LABELS)
+TIRES = {"linear": LINEAR, "paper": FROZEN, "axle": FROZEN, "learning": LEARNING, "oracle": ORACLE}
 
 
 class Case(NamedTuple):
-    """One drive: path by name, share of the limit of grip, friction, tires, seed."""
+    """One drive: path by name, speed, friction, tires of `TIRES`, seed, and more words."""
 
     path: str
-    share: float
+    speed: str
     mu: float
     tires: str
     seed: int
-
-    @property
-    def words(self) -> list[str]:
-        """What a user types after `tireid drive`."""
-        return [
-            *("--path", self.path, "--speed", f"{100.0 * self.share:g}%", "--mu", f"{self.mu:g}"),
-            *("--tires", LABELS[self.tires], "--seed", str(self.seed)),
-            *(["--paper"] if self.tires == "paper" else []),
-        ]
+    more: tuple[str, ...] = ()
 
 
-def options_of(words: Sequence[str]) -> argparse.Namespace:
-    """Return what the command makes of its words.
+class Score(NamedTuple):
+    """Rms and peak deviation from the path [m], whether completed, periods without a new plan."""
 
-    Parameters
-    ----------
-    words : after `tireid drive`, but for the folder, which nobody writes here.
-    """
-    line = ["drive", *words, "--film", "none", "--out", "nowhere"]
+    rms: float
+    peak: float
+    completed: bool
+    failures: int
+
+
+def options_of(case: Case) -> argparse.Namespace:
+    """Return what the command makes of the words of a case, which writes no folder here."""
+    words = ["--path", case.path, "--speed", case.speed, "--mu", f"{case.mu:g}"]
+    words += ["--tires", TIRES[case.tires], "--seed", str(case.seed), *case.more]
+    words += ["--paper"] * (case.tires == "paper")
+    line = ["drive", *words, "--out", "nowhere"]
     return build_parser(line).parse_args(line)
 
 
-def run(case: Case) -> Run:
-    """Drive a case.
-
-    Parameters
-    ----------
-    case : what to drive.
-    """
-    conditions = conditions_of(options_of(case.words))
-    label, learnt = LABELS[case.tires], None
-    if label == FROZEN:
-        learnt = learnt_before(case.mu, case.seed, paper=case.tires == "paper")
-    return run_drive(label, conditions, learnt)
+def driven(case: Case) -> Score:
+    """Return what became of a drive."""
+    label, learnt = TIRES[case.tires], None
+    if label in (FROZEN, LEARNING):
+        learnt = identified(case.mu, case.seed, case.tires == "paper", "--caution" in case.more)
+    found = run_drive(label, conditions_of(options_of(case)), learnt).scores
+    bad = sum(found.failures.values())
+    return Score(found.rms_e_y_m, found.peak_e_y_m, found.completed, bad)
 
 
 @cache
-def learnt_before(mu: float, seed: int, *, paper: bool = False, caution: float = 0.0) -> TireModel:
-    """Return what the command learns before it drives: the same on every path.
+def identified(mu: float, seed: int, paper: bool, caution: bool) -> TireModel:
+    """Return what the command identifies before it drives: the same on every path.
 
     Parameters
     ----------
     mu : friction.
     seed : of noise and steering.
     paper : by the network and the law of the paper.
-    caution : of the drive; with it the band of the forces is calibrated.
+    caution : with it the band of the forces is calibrated.
     """
-    words = ["--mu", f"{mu:g}", "--seed", str(seed), "--caution", f"{caution:g}"]
-    words += ["--paper"] if paper else []
-    options = options_of(words)
-    _, learnt = frozen_tires(options, [FROZEN], conditions_of(options))
-    assert learnt is not None
-    return learnt
+    more = ("--caution", "1") if caution else ()
+    options = options_of(Case("slalom", "50%", mu, "paper" if paper else "axle", seed, more))
+    _, model = frozen_tires(options, [FROZEN], conditions_of(options))
+    assert model is not None
+    return model
 
 
-def drive_with(conditions: Conditions, label: str) -> Run:
-    """Drive conditions that have no word of their own on what is learnt on the dry road.
+def all_driven(cases: Sequence[Case]) -> Iterator[tuple[Case, Score]]:
+    """Yield what became of each drive, on all cores; those of one seed and friction together.
 
     Parameters
     ----------
-    conditions : path, car, road and seed.
-    label : of `tireid.driving.runs.TIRES`.
+    cases : to drive.
     """
-    setup, seed, caution = conditions.setup, conditions.seed, conditions.caution
-    known = label in (LINEAR, ORACLE)
-    learnt = None if known else learnt_before(setup.mu, seed, caution=caution)
-    return run_drive(label, conditions, learnt)
+    ordered = sorted(cases, key=lambda case: (case.mu, case.seed))
+    same = sum((one.mu, one.seed) == (ordered[0].mu, ordered[0].seed) for one in ordered)
+    with ProcessPoolExecutor() as pool:
+        yield from zip(ordered, pool.map(driven, ordered, chunksize=same), strict=True)
+
+
+def median_cm(scores: Sequence[Score]) -> float:
+    """Return the median rms deviation [cm]."""
+    return 100.0 * float(np.median([one.rms for one in scores]))

@@ -1,36 +1,30 @@
 """Other ways to solve the problem of `mpc_double_lane_change`, each as well kept as we know.
 
 HPIPM: CasADi's sqpmethod with one iteration, Gauss-Newton, stage by stage, jit -O3. IPOPT: to
-convergence, warm started, jit -O3. DAQP: our own linearization, condensed; see mpc_daqp.c.
+convergence, warm started, jit -O3.
 """
 
-import ctypes
 import time
-from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
 
-from benchmarks.converged import build_errors, iterated, prepare_solution, solve
+from benchmarks.converged import build_errors, prepare_solution, solve
 from benchmarks.mpc_double_lane_change import PROBLEM, SPEED
-from codegen import load_library
 from codegen.arrays import Array
 from mpc.prediction import build_rk4
 from mpc.realtime import Status, Tracker
-from mpc.realtime.instance import FLAGS, tracker_source
 from mpc.tires.tire import ALL, PredictionTire
 
 N, N_X, WIDTH = PROBLEM.horizon, 5, 7  # a stage: x, u and the slack of the deviation behind it
 JIT = {"jit": True, "compiler": "shell", "jit_options": {"flags": ["-O3"], "verbose": False}}
 QUIET = {"print_time": False, "error_on_fail": False}
-WHEEL = Path(ca.__file__).parent
 
 
 class Answer(NamedTuple):
-    """Plan x (N + 1, 5) and u (N,), thread time of the solver [s], and whether it failed."""
+    """Plan u (N,), thread time of the solver [s], and whether it failed."""
 
-    x: Array
     u: Array
     time: float
     failed: bool
@@ -122,8 +116,8 @@ class Nlp:
         self.call()
         elapsed = time.thread_time() - start
         stages = self.results["x"][: WIDTH * N].reshape(N, WIDTH)
-        x = np.vstack([stages[:, :N_X], self.results["x"][WIDTH * N :]])
-        return Answer(x, stages[:, N_X].copy(), elapsed, not np.isfinite(x).all())
+        failed = not np.isfinite(self.results["x"]).all()
+        return Answer(stages[:, N_X].copy(), elapsed, failed)
 
 
 def hpipm(tire: PredictionTire) -> Nlp:
@@ -153,12 +147,7 @@ class Ours:
     """The tracker, one iteration a step."""
 
     def __init__(
-        self,
-        tire: PredictionTire,
-        *,
-        converged: bool = False,
-        prepared: bool = False,
-        max_active_sets: int = 6,
+        self, tire: PredictionTire, *, prepared: bool = False, max_active_sets: int = 6
     ) -> None:
         self.tracker = Tracker(
             tire,
@@ -167,7 +156,7 @@ class Ours:
             max_active_sets=max_active_sets,
             clock=time.thread_time,
         )
-        self.converged, self.prepared = converged, prepared
+        self.prepared = prepared
         self.ahead: list[float] = []  # times of what is done ahead of a measurement [s]
 
     def step(self, x0: Array, kappa: Array) -> Answer:
@@ -175,37 +164,5 @@ class Ours:
         self.tracker.instance.shift()
         if self.prepared:
             self.ahead.append(prepare_solution(self.tracker, kappa, SPEED))
-        if self.converged:
-            told = iterated(self.tracker, x0, kappa, SPEED)
-        else:
-            told = solve(self.tracker, x0, kappa, SPEED)
-        return Answer(told.plan_x, told.plan_u, told.solve_time_s, told.status != Status.OK)
-
-
-class CondensedDaqp(Ours):
-    """Our linearization, condensed, and DAQP."""
-
-    def __init__(self, tire: PredictionTire) -> None:
-        super().__init__(tire)
-        source = tracker_source(tire.structure, N, single=False)
-        source = f"#include <string.h>\n{source}\n" + Path(__file__).with_name(
-            "mpc_daqp.c"
-        ).read_text(encoding="utf-8")
-        include = [f"-I{WHEEL / 'include'}", f"-I{WHEEL / 'include' / 'daqp'}"]
-        linked = ["-Wl,--no-as-needed", f"-Wl,-rpath,{WHEEL}", str(WHEEL / "libdaqp.so")]
-        flags = (*FLAGS, *include, *linked)
-        library = load_library(source, "tracker_daqp", flags)
-        assert library is not None, "this benchmark needs a C compiler"
-        self.iterate = library.daqp_iterate
-
-    def step(self, x0: Array, kappa: Array) -> Answer:
-        """Return the plan from a state, on the curvature of the stages."""
-        instance = self.tracker.instance
-        instance.shift()
-        instance.start[:] = x0
-        instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, SPEED
-        start = time.thread_time()
-        flag = self.iterate(*instance.solve_arguments)
-        elapsed = time.thread_time() - start
-        x, u = instance.state["x"].copy(), instance.state["u"].copy()
-        return Answer(x, u, elapsed, ctypes.c_int(flag).value < 1)
+        told = solve(self.tracker, x0, kappa, SPEED)
+        return Answer(told.plan_u, told.solve_time_s, told.status != Status.OK)

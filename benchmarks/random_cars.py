@@ -10,8 +10,10 @@ at least `REACHED` of their grip, and no car spins; a drive that does not is dra
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import count
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +22,7 @@ from benchmarks.faults import Fault, Passing, Together
 from codegen.arrays import Array
 from models.faults import SensorFault
 from models.maneuvers import RandomSteer
-from models.plant import Driver, Plant, PlantError, PlantRun
+from models.plant import Plant, PlantError, PlantRun
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.tires import DugoffTire, FialaTire, MagicFormula, Tire
@@ -127,11 +129,6 @@ class RandomCar:
     def plant(self) -> Plant:
         """The car, ready to drive."""
         return Plant(self.vehicle, self.tires[0], rear_tire=self.tires[1])
-
-    def pulling(self, most: float) -> Plant:
-        """Return the car under a driver who brakes and pulls with that acceleration [m/s^2]."""
-        front, rear = self.tires
-        return Plant(self.vehicle, front, rear_tire=rear, driver=Driver(acceleration_limit=most))
 
     @property
     def sensors(self) -> Sensors:
@@ -370,11 +367,7 @@ class RandomDrive:
 
 
 def random_drive(
-    car: RandomCar,
-    rng: np.random.Generator,
-    beginning: Beginning | None = None,
-    *,
-    pull: float = 0.0,
+    car: RandomCar, rng: np.random.Generator, beginning: Beginning | None = None
 ) -> RandomDrive:
     """Return a drive that excites both axles and does not spin.
 
@@ -383,8 +376,6 @@ def random_drive(
     car : that drives.
     rng : source of speed and steering.
     beginning : None is a straight road of `LEAD` seconds.
-    pull : share of the grip with which the driver brakes and pulls in the corners at most; then an
-        accelerometer shows a_x too. With 0 he holds his speed.
 
     Raises
     ------
@@ -392,20 +383,15 @@ def random_drive(
         Where none of `DRAWS` drives is such.
     """
     begin = beginning if beginning is not None else Beginning()
-    vehicle, most = car.vehicle, pull * min(car.friction) * GRAVITY
-    plant = car.pulling(most) if pull else car.plant
     for _ in range(DRAWS):
-        speed = rng.uniform(2.6, 4.5) * vehicle.froude_speed
+        speed = rng.uniform(2.6, 4.5) * car.vehicle.froude_speed
         maneuver = random_steering(car, speed, begin.lead, rng)
         if maneuver is None:
             continue
-        wanted = _speed_over_time(begin, speed)
-        if pull:
-            wanted = changing_speed(wanted, car, speed, most, maneuver, rng)
         try:
-            run = plant.simulate(
+            run = car.plant.simulate(
                 maneuver,
-                speed=wanted,
+                speed=_speed_over_time(begin, speed),
                 bank=lambda t: begin.bank * np.clip(begin.lead - t, 0.0, 1.0),
                 name=f"{car.kind}, {begin.kind}",
             )
@@ -413,8 +399,6 @@ def random_drive(
             continue
         if is_good(car, run, begin, speed):
             exact = _after_rest(run.recording(), begin)
-            if pull and not begin.rest:
-                exact = replace(exact, a_x=run.a_x)
             return RandomDrive(car=car, beginning=begin, exact=exact, speed=speed)
     raise PlantError(f"{DRAWS} drives of a {car.kind} did not excite both axles without a spin")
 
@@ -453,29 +437,6 @@ def _speed_over_time(begin: Beginning, speed: float) -> Callable[[Array], Array]
     if begin.speed in ("standing", "reversing"):
         return lambda t: np.minimum(0.05 * speed + PULL * t, speed)
     return lambda t: np.full(t.size, speed)
-
-
-SLOWER, FASTER = -0.3, 0.15  # of the wanted speed, to which a driver brakes and pulls
-HELD = (1.0, 4.0)  # sqrt(L/g) for which he holds it then
-
-
-def changing_speed(
-    wanted: Callable[[Array], Array],
-    car: RandomCar,
-    speed: float,
-    most: float,
-    maneuver: RandomSteer,
-    rng: np.random.Generator,
-) -> Callable[[Array], Array]:
-    """Return a wanted speed that changes at random in the corners, by at most that [m/s²]."""
-    times, changes = [maneuver.onset], [0.0]
-    while times[-1] < maneuver.duration:
-        change = rng.uniform(SLOWER, FASTER) * speed
-        took = abs(change - changes[-1]) / (rng.uniform(0.5, 1.0) * most)
-        held = rng.uniform(*HELD) * car.vehicle.froude_time
-        times += [times[-1] + took, times[-1] + took + held]
-        changes += [change, change]
-    return lambda t: wanted(t) + np.interp(t, times, changes)
 
 
 def is_good(car: RandomCar, run: PlantRun, begin: Beginning, speed: float) -> bool:
@@ -529,3 +490,125 @@ def _noisier(sensors: Sensors, times: float) -> Sensors:
         v_y=replace(sensors.v_y, noise=times * sensors.v_y.noise),
         r=replace(sensors.r, noise=times * sensors.r.noise),
     )
+
+
+MakeBeginning = Callable[[Vehicle, np.random.Generator], Beginning]
+
+
+def drawn(
+    kind: str, seed: int, beginning: MakeBeginning | None = None, number: int = 0
+) -> RandomDrive:
+    """Return a drive of the car of a seed; where it has no good one, another car is drawn.
+
+    Parameters
+    ----------
+    kind : class of the car.
+    seed : of the car.
+    beginning : makes one from car and generator; None is a straight road.
+    number : of the drive, each another.
+    """
+    for attempt in count():
+        car = random_car(kind, np.random.default_rng([seed, attempt, *kind.encode()]))
+        rng = np.random.default_rng([seed, attempt, number, *kind.encode()])
+        begin = None if beginning is None else beginning(car.vehicle, rng)
+        with suppress(PlantError):
+            return random_drive(car, rng, begin)
+    raise AssertionError("it counts for ever")
+
+
+# Drives without a sensor of v_y, on banked roads, as inertial sensors show them.
+
+BANKS = (0.0, 2.0, 6.0)  # degrees
+INERTIAL_DRAWS = 60  # of a drive of one car, before another is drawn
+
+
+class InertialDrive(NamedTuple):
+    """A drive: the car as declared, what its sensors show, the truth, where inertial ones sit [m].
+
+    kind : class of the car.   shown : with a good sensor of v_y.
+    """
+
+    kind: str
+    told: Vehicle
+    shown: Recording
+    exact: Recording
+    position: tuple[float, float]
+
+
+def random_bank(rng: np.random.Generator, duration: float) -> Callable[[Array], Array]:
+    """Return the angle of a road over time [rad]: it changes every 4 to 9 seconds, smoothly.
+
+    Parameters
+    ----------
+    rng : source of randomness.
+    duration : of the drive [s].
+    """
+    steepest = math.radians(rng.choice(BANKS, p=(0.2, 0.4, 0.4)))
+    step = rng.uniform(4.0, 9.0)
+    heights = rng.uniform(-steepest, steepest, math.ceil(duration / step) + 2)
+
+    def bank(t: Array) -> Array:
+        k = np.clip((t / step).astype(np.int64), 0, heights.size - 2)
+        part = 0.5 - 0.5 * np.cos(np.pi * (t / step - k))
+        return np.asarray(heights[k] + (heights[k + 1] - heights[k]) * part)
+
+    return bank
+
+
+def inertial_drive(kind: str, seed: int) -> InertialDrive:
+    """Return a random drive of a random car, as inertial sensors show it.
+
+    Parameters
+    ----------
+    kind : one of `CLASSES`.
+    seed : of everything.
+
+    Raises
+    ------
+    PlantError
+        Where no car of this seed keeps on the road.
+    """
+    rng = np.random.default_rng(seed)
+    for _ in range(20):
+        car = random_car(kind, rng)
+        found = _inertial(car, rng)
+        if found is not None:
+            return found
+    raise PlantError(f"no {kind} of seed {seed} drives without a spin")
+
+
+def _inertial(car: RandomCar, rng: np.random.Generator) -> InertialDrive | None:
+    vehicle, begin = car.vehicle, Beginning(lead=LEAD)
+    for _ in range(INERTIAL_DRAWS):
+        speed = rng.uniform(2.6, 4.5) * vehicle.froude_speed
+        maneuver = random_steering(car, speed, begin.lead, rng)
+        if maneuver is None:
+            continue
+        bank = random_bank(rng, LEAD + DRIVEN)
+        try:
+            run = car.plant.simulate(maneuver, speed=speed, bank=bank, name=car.kind)
+        except PlantError:
+            continue
+        if is_good(car, run, begin, speed):
+            break
+    else:
+        return None
+    exact, L = run.recording(), vehicle.wheelbase
+    size = math.sqrt(L / 2.7)
+    t, n = exact.t, len(exact)
+    x, y = rng.uniform(-0.15, 0.15) * L, rng.uniform(-0.05, 0.05) * L
+    felt = run.a_y * np.cos(run.roll) + GRAVITY * np.sin(run.roll)
+    felt = felt + x * np.gradient(run.r, t) - y * run.r**2
+    bias_a, bias_r, zero = rng.normal(0, 0.15), rng.normal(0, 0.003) / size, rng.normal(0, 0.003)
+    late_r, late_a = rng.uniform(-0.005, 0.005, 2)
+    shown = replace(
+        exact,
+        v_x=exact.v_x * (1 + rng.normal(0, 0.005)) + 0.03 * size * rng.normal(size=n),
+        v_y=exact.needed("v_y") + 0.03 * size * rng.normal(size=n),  # for learning with v_y alone
+        r=np.interp(t - late_r, t, exact.r) + bias_r + 0.003 / size * rng.normal(size=n),
+        a_y=np.interp(t - late_a, t, felt) + bias_a + rng.uniform(0.05, 0.3) * rng.normal(size=n),
+        delta_f=exact.delta_f - zero + 5e-4 * rng.normal(size=n),
+        axle_force=None,
+    )
+    told = (x + 0.01 * L * rng.normal(), y + 0.01 * L * rng.normal())
+    return InertialDrive(car.kind, car.told, shown, exact, told)

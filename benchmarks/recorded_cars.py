@@ -9,21 +9,25 @@ in percent of the rms axle force, front / rear, median over seeds. Run it by
 
 import os
 import sys
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.targets import Targets, keeps
+from benchmarks.targets import Table, Targets, Values, parse, without
 from identifier.methods import make_method
 from identifier.paper.design import VARIANTS
 from identifier.reproducibility import AxleRmse, force_rms, online_error, replay
 from identifier.run import identify
-from models.recordings import read_recording
+from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
 DATA = Path(os.environ.get("TIREID_DATA", BESIDE))
 SEEDS = 10
+PARTS = ("online", "frozen", "other")
 CARMAKER = Vehicle(
     name="CarMaker sedan, effective",
     mass=2027.0,
@@ -42,6 +46,16 @@ DART = Vehicle(
     cornering_stiffness_front=40.0,
     cornering_stiffness_rear=40.0,
 )
+FERRARI = Vehicle(
+    name="Ferrari 250 LM",
+    mass=982.0,
+    yaw_inertia=1605.0,
+    l_f=1.33,
+    l_r=1.07,
+    cornering_stiffness_front=66e3,
+    cornering_stiffness_rear=105e3,
+)
+CARMAKER_RUNS = ("slalom1_14_5ms", "experiment2_40kmh")
 TASKS = {
     "hard": (CARMAKER, "carmaker.csv.gz", "slalom1_14_5ms", "experiment2_40kmh"),
     "mild": (CARMAKER, "carmaker.csv.gz", "experiment2_40kmh", "slalom1_14_5ms"),
@@ -50,54 +64,101 @@ TASKS = {
 }
 
 
+OWN = ("vx_encoder", "r_imu", "ay_imu")  # sensors of the 1:10 car
+LATE = 6  # samples by which their fresh numbers are late
+
+
+def own_sensors() -> dict[str, tuple[Recording, Recording]]:
+    """Return what the 1:10 car's own sensors and Vicon show of each run, by its name."""
+    table = np.genfromtxt(
+        DATA / "dart_imu.csv.gz", delimiter=",", names=True, dtype=None, encoding="utf-8"
+    )
+    found = {}
+    for name in dict.fromkeys(table["run"]):
+        run = table[table["run"] == name]
+        late = {key: np.append(run[key][LATE:], np.full(LATE, run[key][-1])) for key in OWN}
+        vicon = Recording(
+            name=str(name),
+            t=run["t"] - run["t"][0],
+            v_x=run["vx"],
+            v_y=run["vy"],
+            r=run["r"],
+            delta_f=run["delta_f"],
+            delta_r=np.zeros(len(run)),
+            a_y=run["ay"],
+            axle_force=np.column_stack((run["Fyf_inv"], run["Fyr_inv"])),
+        )
+        own = replace(
+            vicon, v_x=late["vx_encoder"], r=late["r_imu"], a_y=late["ay_imu"], axle_force=None
+        )
+        found[str(name)] = (own, vicon)
+    return found
+
+
 def percent(error: AxleRmse | None, size: AxleRmse | None) -> tuple[float, float]:
     """Return an error in percent of the rms force, front and rear."""
     assert error is not None and size is not None
     return 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
 
 
-def measure(targets: Targets) -> None:
-    """Print one table for each task; record its medians.
+def errors_of(task: str, law: str, seed: int) -> tuple[float, ...]:
+    """Return three errors, each front and rear [%]: online, frozen, frozen on the other drive.
 
     Parameters
     ----------
-    targets : collects what is recorded.
+    task : one of `TASKS`.
+    law : of the paper.
+    seed : of the initial weights.
     """
-    for task, (car, log, learn, other) in TASKS.items():
-        learnt, unseen = (read_recording(DATA / log, run=run) for run in (learn, other))
-        print(f"{car.name}: learnt on {learn}, frozen, replayed on {other} [% of rms force]")
-        for law in VARIANTS:
-            rows = []
-            for seed in range(SEEDS):
-                design = make_method(law, car, seed)
-                history = identify(learnt, car, design)
-                model = history.freeze(float(learnt.t[-1]))
-                elsewhere = identify(unseen, car, design)
-                own, there = replay(model, history), replay(model, elsewhere)
-                rows.append(
-                    percent(online_error(history), force_rms(history))
-                    + percent(own.against_truth, force_rms(history))
-                    + percent(there.against_truth, force_rms(elsewhere))
-                )
-            medians = np.median(rows, axis=0).tolist()
-            for k, part in enumerate(("online", "frozen", "other")):
-                targets.record(f"{task}/{law}/{part}/front", medians[2 * k], "%")
-                targets.record(f"{task}/{law}/{part}/rear", medians[2 * k + 1], "%")
-            cells = [f"{value:5.1f}" for value in medians]
-            print(
-                f"  {law:22} online {cells[0]} /{cells[1]}   frozen {cells[2]} /{cells[3]}   "
-                f"other drive {cells[4]} /{cells[5]}"
-            )
+    car, log, learn, other = TASKS[task]
+    known, unknown = (read_recording(DATA / log, run=run) for run in (learn, other))
+    method = make_method(law, car, seed)
+    history, elsewhere = (identify(one, car, method) for one in (known, unknown))
+    model = history.freeze(float(known.t[-1]))
+    own, there = replay(model, history), replay(model, elsewhere)
+    return (
+        *percent(online_error(history), force_rms(history)),
+        *percent(own.against_truth, force_rms(history)),
+        *percent(there.against_truth, force_rms(elsewhere)),
+    )
+
+
+def tables(v: Values) -> dict[str, Table]:
+    """Return the table of the documents.
+
+    Parameters
+    ----------
+    v : recorded values.
+    """
+    rows = [
+        [
+            f"{car.name}: {learn}",
+            other,
+            law,
+            *(f"{v[f'{task}/{law}/{part}/front']:.0f} / {v[f'{task}/{law}/{part}/rear']:.0f}"
+              for part in PARTS),
+        ]
+        for (task, (car, _, learn, other)), law in product(TASKS.items(), VARIANTS)
+        if f"{task}/{law}/online/front" in v
+    ]  # fmt: skip
+    errors = ("online [%]", "frozen [%]", "frozen, other drive [%]")
+    return {"recorded_cars": Table(("identified", "other drive", "law", *errors), rows)}
 
 
 def main() -> int:
-    """Measure where the recordings are there."""
-    targets = Targets("recorded_cars")
+    """Print medians over the seeds, front / rear."""
+    targets, options = Targets("recorded_cars"), parse("recorded_cars", __doc__)
     if not DATA.is_dir():
-        print(f"skipped: the recordings are not there: {DATA} (set TIREID_DATA)")
-        return 0
-    measure(targets)
-    return targets.finish(keep=keeps())
+        without(f"the recordings are not there: {DATA} (set TIREID_DATA)")
+    seeds = range(1 if options.quick else SEEDS)
+    with ProcessPoolExecutor() as pool:
+        for task, law in product(TASKS, VARIANTS):
+            rows = list(pool.map(errors_of, *zip(*product([task], [law], seeds), strict=True)))
+            medians = np.median(rows, axis=0).tolist()
+            for k, (part, axle) in enumerate(product(PARTS, ("front", "rear"))):
+                targets.record(f"{task}/{law}/{part}/{axle}", medians[k])
+            print(f"  {task:6}{law:22}", *(f"{value:6.1f}" for value in medians), flush=True)
+    return targets.finish(keep=options.record)
 
 
 if __name__ == "__main__":

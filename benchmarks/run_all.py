@@ -1,9 +1,9 @@
 """Every benchmark in turn: `make bench`. What it prints is kept in OUT, one text file each.
 
-    python -m benchmarks.run_all [--record] [--only NAME ...] [--out OUT]
+    python -m benchmarks.run_all [--record] [--quick] [--only NAME ...] [--out OUT]
 
-Ends with a table of scripts, targets met and missed, and seconds; returns 1 where a target was
-missed or a script failed, and names each. `--record` lets every script write what it measured to
+Ends with a table of scripts, targets met and missed, and minutes; returns 1 where a target was
+missed or a script failed. `--record` lets every script write what it measured to
 benchmarks/results; `python -m benchmarks.documents` then writes it into README and docs.
 """
 
@@ -12,72 +12,25 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
-APART = ("mutants", "fuzz", "fuzz_c")  # have targets of make of their own: they take longest
-BENCHMARKS: Mapping[str, Sequence[str]] = {  # and the words of each command
-    "front_door": [],
-    "speed": [],
-    "long_logs": ["--long"],
-    "recorded_cars": [],
-    "estimate": [],
-    "learn_and_extrapolate": [],
-    "sensor_faults": [],
-    "beginnings": [],
-    "inertial": [],
-    "without_v_y": [],
-    "latent": [],
-    "noisy_runs": [],
-    "several_rates": [],
-    "fault_table": ["{out}"],
-    "doctor_gross": [],
-    "verdicts": [],
-    "verdicts_without_v_y": [],
-    "bands": [],
-    "plan": [],
-    "fleet": [],
-    "guaranteed": [],
-    "guaranteed_faster": [],
-    "road_friction": [],
-    "live": [],
-    "braking": [],
-    "doctor": [],
-    "plant_against_commonroad": ["{out}"],
-    "paper_gains": [],
-    "stability_formulas": [],
-    "gain_limit": [],
-    "bounds_monte_carlo": [],
-    "forgetting": [],
-    "hostile_certificates": [],
-    "hostile_axle": [],
-    "export_cost": [],
-    "kill_and_fill": [],
-    "mpc_speed": [],
-    "mpc_optimality": [],
-    "mpc_stress": [],
-    "mpc_deadline": [],
-    "mpc_worth": ["{out}"],
-    "mpc_friction_drop": ["{out}"],
-    "mpc_caution": ["{out}"],
-    "mpc_sensor_faults": ["{out}"],
-    "mpc_without_v_y": ["{out}"],
-}
+BENCHMARKS = (
+    *("speed", "estimate", "fleet", "bands", "recorded_cars", "without_v_y", "verdicts", "doctor"),
+    *("sensor_faults", "road_friction", "paper_gains", "export_cost"),
+    *("mpc_speed", "mpc_worth", "mpc_friction_drop"),
+)
 
 
 class Outcome(NamedTuple):
-    """How a script ended: its exit code, targets met, labels of those missed, and seconds.
-
-    `met` is None where the script said nothing about targets.
-    """
+    """How a script ended: its exit code, targets met, labels of those missed, and minutes."""
 
     script: str
     code: int
-    met: int | None
+    met: int
     missed: tuple[str, ...]
-    seconds: float
+    minutes: float
 
     @property
     def verdict(self) -> str:
@@ -86,65 +39,40 @@ class Outcome(NamedTuple):
             return f"MISSED: {'; '.join(self.missed)}"
         return "ok" if self.code == 0 else f"FAILED with exit code {self.code}"
 
-    @property
-    def good(self) -> bool:
-        """Whether the script ended well and missed nothing."""
-        return self.code == 0 and not self.missed
 
-
-def outcome(script: str, code: int, printed: str, seconds: float) -> Outcome:
-    """Read what `Targets.finish` printed.
-
-    Parameters
-    ----------
-    script : its name.
-    code : its exit code.
-    printed : its output.
-    seconds : how long it took.
-    """
+def outcome(script: str, code: int, printed: str, minutes: float) -> Outcome:
+    """Read what `Targets.finish` printed; a script that was skipped printed nothing of it."""
     found = re.search(rf"^{script}: (\d+) targets met, \d+ missed(?:: (.*))?$", printed, re.M)
-    if found is None:
-        return Outcome(script, code, None, (), seconds)
-    missed = tuple(found[2].split("; ")) if found[2] else ()
-    return Outcome(script, code, int(found[1]), missed, seconds)
+    met, labels = (int(found[1]), found[2]) if found else (0, None)
+    return Outcome(script, code, met, tuple(labels.split("; ")) if labels else (), minutes)
 
 
-def summary(outcomes: Sequence[Outcome]) -> str:
-    """Return the table that ends `make bench`.
-
-    Parameters
-    ----------
-    outcomes : of every script that ran.
-    """
-    lines = [f"{'benchmark':28}{'met':>5}{'missed':>8}{'time [s]':>10}  verdict"]
+def summary(outcomes: list[Outcome]) -> str:
+    """Return the table that ends `make bench`."""
+    lines = [f"{'benchmark':20}{'met':>5}{'missed':>8}{'minutes':>9}  verdict"]
     for one in outcomes:
-        met = "-" if one.met is None else str(one.met)
-        missed = "-" if one.met is None else str(len(one.missed))
-        lines.append(f"{one.script:28}{met:>5}{missed:>8}{one.seconds:10.0f}  {one.verdict}")
-    bad = [one.script for one in outcomes if not one.good]
+        numbers = f"{one.met:5}{len(one.missed):8}{one.minutes:9.1f}"
+        lines.append(f"{one.script:20}{numbers}  {one.verdict}")
+    bad = [one.script for one in outcomes if one.verdict != "ok"]
+    lines.append(f"{sum(one.minutes for one in outcomes):.1f} minutes in all")
     lines.append(f"missed or failed: {', '.join(bad) or 'none'}")
     return "\n".join(lines)
 
 
-def run(script: str, words: Sequence[str], out: Path) -> Outcome:
-    """Run one script; keep what it prints.
-
-    Parameters
-    ----------
-    script : its name.
-    words : of its command.
-    out : folder of the text file.
-    """
+def run(script: str, words: list[str], out: Path) -> Outcome:
+    """Run one script; print what it prints and keep it in a file of OUT."""
+    start, printed = time.perf_counter(), []
     command = [sys.executable, "-m", f"benchmarks.{script}", *words]
-    start = time.perf_counter()
-    answer = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    seconds = time.perf_counter() - start
-    (out / f"{script}.txt").write_text(answer.stdout + answer.stderr, encoding="utf-8")
-    print(answer.stdout, end="", flush=True)
-    found = outcome(script, answer.returncode, answer.stdout, seconds)
-    if not found.good and not found.missed:
-        print(*answer.stderr.strip().splitlines()[-1:], flush=True)
-    return found
+    with subprocess.Popen(
+        command, cwd=ROOT, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
+    ) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            print(line, end="", flush=True)
+            printed.append(line)
+    (out / f"{script}.txt").write_text("".join(printed), encoding="utf-8")
+    minutes = (time.perf_counter() - start) / 60.0
+    return outcome(script, process.returncode, "".join(printed), minutes)
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -157,19 +85,21 @@ def main(argv: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(description="Run the benchmarks and judge their targets.")
     parser.add_argument("--out", type=Path, default=Path("out/bench"))
     parser.add_argument("--record", action="store_true", help="write benchmarks/results")
-    parser.add_argument("--only", nargs="+", choices=BENCHMARKS, metavar="NAME", help="these only")
+    parser.add_argument("--quick", action="store_true", help="a few cases of each")
+    parser.add_argument("--only", nargs="+", choices=BENCHMARKS, default=BENCHMARKS, metavar="NAME")
     options = parser.parse_args(argv)
     out = options.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
-    outcomes = []
-    for script in options.only or BENCHMARKS:
-        print(f"== {script}", flush=True)
-        words = [word.format(out=out) for word in BENCHMARKS[script]]
-        outcomes.append(run(script, [*words, *["--record"] * options.record], out))
+    words = ["--record"] * options.record + ["--quick"] * options.quick
+    outcomes: list[Outcome] = []
+    for script in options.only:
+        took = sum(one.minutes for one in outcomes)
+        print(f"== {script}, after {took:.1f} minutes", flush=True)
+        outcomes.append(run(script, words, out))
     table = summary(outcomes)
     (out / "summary.txt").write_text(table + "\n", encoding="utf-8")
     print(table)
-    return 0 if all(one.good for one in outcomes) else 1
+    return 0 if all(one.verdict == "ok" for one in outcomes) else 1
 
 
 if __name__ == "__main__":

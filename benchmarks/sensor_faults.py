@@ -1,6 +1,6 @@
 """A sensor fails for up to 4 s while the default method learns: are the forces right afterwards?
 
-    python -m benchmarks.sensor_faults [--faults N] [--record]
+    python -m benchmarks.sensor_faults [--quick] [--record]
 
 Random faults of every kind, in one channel at a time, on noisy drives of random cars of four
 classes, those of `random_cars`; sizes are those of a sedan, for others by Froude's similarity.
@@ -11,7 +11,6 @@ first sample is not believed or counts half; a drift is small at first and is to
 of the method was chosen on these drives.
 """
 
-import argparse
 import math
 import sys
 from collections.abc import Sequence
@@ -21,10 +20,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.answers import blind, drawn
+from benchmarks.answers import blind
 from benchmarks.fault_cases import Scale
-from benchmarks.random_cars import CLASSES, FIRST_SEED, LEAD
-from benchmarks.targets import Targets, keeps, show
+from benchmarks.random_cars import CLASSES, FIRST_SEED, LEAD, drawn
+from benchmarks.targets import Table, Targets, Values, parse, show
 from codegen.arrays import Array
 from identifier.axle import AxleIdentifier
 from identifier.axle.gate import GateState
@@ -44,7 +43,6 @@ ON, BAD = (GateState._fields.index(name) for name in ("on", "bad"))
 SOON, NEVER = 0.5, 1e9  # s; a time in which no mean of errors moves
 HALF = 2.0**0.5  # fast mean of errors over its trend, where a sample counts half
 NOBODY = 1e4  # m/s: the largest speed that a recording holds, of no car
-PROCESSES = 2
 
 
 class Drive(NamedTuple):
@@ -194,7 +192,7 @@ def run(count: int) -> tuple[dict[str, list[Result]], float]:
     count : number of faults, as many on each.
     """
     jobs = [(kind, count // len(CLASSES)) for kind in CLASSES]
-    with ProcessPoolExecutor(PROCESSES) as pool:
+    with ProcessPoolExecutor() as pool:
         found = dict(zip(CLASSES, pool.map(of_class, jobs), strict=True))
     alarm = float(np.mean([alarm for _, alarm in found.values()]))
     return {kind: results for kind, (results, _) in found.items()}, alarm
@@ -221,72 +219,66 @@ def _result(drive: Drive, rng: np.random.Generator) -> Result:
 
 
 def report(results: dict[str, list[Result]], alarm: float, targets: Targets) -> None:
-    """Print tables, record their numbers and judge them.
+    """Print shares of faults after which forces are right, and judge them.
 
     Parameters
     ----------
-    results : by cars.
+    results : by class of cars.
     alarm : share of time in doubt where nothing fails.
     targets : collects what is missed.
     """
     everything = [one for some in results.values() for one in some]
-    print(f"  {'right [%]':15} cases  doubt  without  harmful  noticed: median, 90 %, longest [s]")
     groups = dict(results)
     groups |= {kind: [one for one in everything if one.fault.kind == kind] for kind in KINDS}
-    groups |= {name: [one for one in everything if one.fault.channel == name] for name in SIZES}
     for name, some in groups.items():
         if some:
-            print(f"  {name:15} {_row(some, name.replace(' ', '_'), targets)}")
-    harmful = [one for one in everything if one.trusting > RIGHT]
-    print("Targets")
-    right = float(100.0 * np.mean([one.error <= RIGHT for one in everything]))
-    targets.record("cases", len(everything))
-    targets.at_least("forces right 3 s after the fault", right, 99.0, "%", key="right")
-    trusting = float(100.0 * np.mean([one.trusting <= RIGHT for one in everything]))
-    targets.record("unwatched", trusting, "%")
-    show("the same without doubt", f"{trusting:.1f} %")
-    at_once = [one.noticed for one in harmful if one.fault.kind != "drifting"]
-    targets.record("harmful", len(harmful))
-    targets.record("at_once", len(at_once))
-    soon = float(100.0 * np.mean(np.array(at_once) <= SOON))
-    label = f"harmful faults that do not grow, noticed within {SOON:g} s"
-    targets.at_least(label, soon, 90.0, "%", key="soon")
+            right, trusting = shares(some)
+            targets.record(f"{name}/faults", len(some))
+            targets.record(f"{name}/right", right)
+            targets.record(f"{name}/unwatched", trusting)
+            show(name, f"{len(some)} faults, right {right:.1f} %, without doubt {trusting:.1f} %")
+    right, trusting = shares(everything)
+    targets.record("faults", len(everything))
+    targets.at_least("forces right 3 s after the fault", right, 99.0, key="right")
+    targets.record("unwatched", trusting)
+    harmful = [one for one in everything if one.trusting > RIGHT and one.fault.kind != "drifting"]
+    if harmful:
+        soon = 100.0 * float(np.mean([one.noticed <= SOON for one in harmful]))
+        label = f"harmful faults that do not grow, noticed within {SOON:g} s"
+        targets.at_least(label, soon, 90.0, key="soon")
     targets.at_most("time in doubt although nothing fails", 100.0 * alarm, 1.0, key="doubt")
-    for one in sorted(everything, key=lambda one: -one.error)[:10]:
-        show(
-            str(one.fault), f"{one.error:.1f} %, {one.trusting:.1f} % without, {one.noticed:.2f} s"
-        )
 
 
-def _row(some: Sequence[Result], key: str, targets: Targets) -> str:
-    """Return a line of the table; its numbers are recorded."""
-    shares = [
-        100.0 * np.mean([value <= RIGHT for value in column])
-        for column in ([one.error for one in some], [one.trusting for one in some])
-    ]
-    noticed = [one.noticed for one in some if one.trusting > RIGHT]
-    targets.record(f"{key}/cases", len(some))
-    targets.record(f"{key}/right", float(shares[0]), "%")
-    targets.record(f"{key}/unwatched", float(shares[1]), "%")
-    text = f"{len(some):5} {shares[0]:6.1f} {shares[1]:8.1f} {len(noticed):8}"
-    if noticed:
-        times = np.quantile(noticed, (0.5, 0.9, 1.0), method="lower")
-        for name, time in zip(("median", "q90", "longest"), times, strict=True):
-            targets.record(f"{key}/noticed/{name}", float(time) if math.isfinite(time) else "never")
-        text += " ".join(f"{time:9.2f}" for time in times)
-    return text
+def shares(some: Sequence[Result]) -> tuple[float, float]:
+    """Return the share of faults after which forces are right [%], and without doubt."""
+    columns = [one.error for one in some], [one.trusting for one in some]
+    right, trusting = (100.0 * float(np.mean(np.array(one) <= RIGHT)) for one in columns)
+    return right, trusting
+
+
+def tables(v: Values) -> dict[str, Table]:
+    """Return the table of the documents.
+
+    Parameters
+    ----------
+    v : recorded values.
+    """
+    rows = [
+        [name, f"{v[f'{name}/faults']}", f"{v[f'{name}/right']:.0f}",
+         f"{v[f'{name}/unwatched']:.0f}"]
+        for name in KINDS if f"{name}/faults" in v
+    ]  # fmt: skip
+    rows.append(["all", f"{v['faults']}", f"{v['right']:.1f}", f"{v['unwatched']:.1f}"])
+    header = ("sensor fault", "faults", "forces right 3 s later [%]", "without detection [%]")
+    return {"sensor_faults": Table(header, rows)}
 
 
 def main() -> int:
     """Run everything; return the exit code."""
-    keep = keeps()
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--faults", type=int, default=FAULTS)
-    count = parser.parse_args().faults
-    targets = Targets("sensor_faults")
-    results, alarm = run(count)
+    targets, options = Targets("sensor_faults"), parse("sensor_faults", __doc__)
+    results, alarm = run(8 if options.quick else FAULTS)
     report(results, alarm, targets)
-    return targets.finish(keep=keep and count == FAULTS)
+    return targets.finish(keep=options.record)
 
 
 if __name__ == "__main__":

@@ -1,92 +1,197 @@
-"""How long things take: a 45 s recording learnt, a 45 s plant run, the first use with compiling.
+"""How long things take: the first command, a long log to its report, a run of each method.
 
-Times are of this process on its processor, so that a busy machine does not count, minimum and
-median of repeated calls; the first use is wall clock, and starts from an empty cache in a process
-of its own. Run it by `python -m benchmarks.speed [--record]`.
+    python -m benchmarks.speed [--quick] [--record]
+
+`import tireid` and `tireid --help` are wall time of fresh processes, medians; a bare Python stands
+beside them. A log of a minute, an hour and ten hours at 100 Hz goes from CSV to the report of
+`tireid identify` in a process of its own: a sedan's drive over and over, with noise of its own on
+every sample. Time is that of the processor; memory what the process alone holds (RssAnon of /proc,
+sampled). Functions compiled before; the minute counts at the second time. A run of 45 s by each
+method that works in a car is the least of many. On a busy machine processor time is up to three
+times as long: record on an idle one. Linux only.
 """
 
-import os
-import platform
+import resource
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.targets import Targets, keeps
+import tireid as ti
+from benchmarks.targets import Table, Targets, Values, parse, show
 from identifier.methods import LIVE, REFERENCE, make_method
-from identifier.run import identify
 from models.maneuvers import Slalom
 from models.plant import Plant
+from models.recordings import Recording
 from models.vehicle import sedan
 
-REPEATS = 30
+STARTS = {"python": ["-c", "pass"], "import": ["-c", "import tireid"],
+          "help": ["-m", "tireid", "--help"]}  # fmt: skip
+LONGEST = 150.0  # ms, of a start
+DT = 0.01  # s
+LASTS = {"60 s": 60.0, "1 h": 3600.0, "10 h": 36000.0}  # s
+SECONDS = {"60 s": 1.5, "1 h": 6.0, "10 h": 40.0}  # of the processor
+GIGABYTES = {"60 s": 0.4, "1 h": 0.4, "10 h": 0.5}
+NOISE = {"v_x": 0.01, "v_y": 0.01, "r": 0.002, "delta_f": 0.0, "a_y": 0.05}  # SI
+ROWS = 100_000  # that are written at once
+POLL = 0.02  # s
 SLALOM = Slalom(amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=44.99)
 
 
-def timed(action: Callable[[], object], repeats: int = REPEATS) -> tuple[float, float, float]:
-    """Return minimum, median and maximum duration [s] of an action that has run once before."""
+def started(words: list[str], runs: int) -> float:
+    """Return the median time of a Python that does something and ends [ms].
+
+    Parameters
+    ----------
+    words : after `python`.
+    runs : how many.
+    """
+    times = []
+    for _ in range(runs):
+        begin = time.perf_counter()
+        subprocess.run([sys.executable, *words], check=True, stdout=subprocess.DEVNULL)
+        times.append(1e3 * (time.perf_counter() - begin))
+    return statistics.median(times)
+
+
+def write_log(path: Path, base: Recording, seconds: float) -> None:
+    """Write a drive over and over as CSV.
+
+    Parameters
+    ----------
+    path : of the file.
+    base : the drive.
+    seconds : that the log lasts.
+    """
+    n = round(seconds / DT)
+    rng = np.random.default_rng(n)
+    with path.open("w", encoding="utf-8") as file:
+        file.write("t,vx,vy,r,delta_f,ay\n")
+        for first in range(0, n, ROWS):
+            k = np.arange(first, min(first + ROWS, n))
+            signals = [
+                getattr(base, name)[k % len(base)] + size * rng.standard_normal(k.size)
+                for name, size in NOISE.items()
+            ]
+            np.savetxt(file, np.column_stack([DT * k, *signals]), fmt="%.9g", delimiter=",")
+
+
+class Took(NamedTuple):
+    """Processor time [s] of a command, and the most that its process held [GB]."""
+
+    processor: float
+    held: float
+
+
+def took(words: list[str]) -> Took:
+    """Run a command of tireid and watch it.
+
+    Parameters
+    ----------
+    words : after `tireid`.
+    """
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [sys.executable, "-m", "tireid", *words]
+    quiet = subprocess.DEVNULL
+    process, held = subprocess.Popen(command, stdout=quiet, stderr=quiet), 0.0
+    status = Path(f"/proc/{process.pid}/status")
+    while process.poll() is None:
+        with suppress(OSError, StopIteration):  # it has ended meanwhile
+            lines = status.read_text(encoding="utf-8").splitlines()
+            line = next(line for line in lines if line.startswith("RssAnon"))
+            held = max(held, float(line.split()[1]) / 1e6)
+        time.sleep(POLL)
+    if process.returncode != 0:
+        raise RuntimeError(f"tireid {' '.join(words)} ended with {process.returncode}")
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return Took(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, held)
+
+
+def long_logs(targets: Targets, lasting: list[str]) -> None:
+    """Judge logs from CSV to the report.
+
+    Parameters
+    ----------
+    targets : collects what is missed.
+    lasting : keys of `LASTS`.
+    """
+    base = ti.sample_recording(sedan())
+    with tempfile.TemporaryDirectory(prefix="tireid-long-") as folder:
+        log, car, out = (str(Path(folder) / name) for name in ("log.csv", "car.toml", "out"))
+        sedan().to_toml(car)
+        words = ["identify", log, "--vehicle", car, "--out", out, "--force"]
+        write_log(Path(log), base, LASTS[lasting[0]])
+        took(words)  # compiles
+        for key in lasting:
+            write_log(Path(log), base, LASTS[key])
+            found, label = took(words), f"{key} of log to the report"
+            targets.at_most(label, found.processor, SECONDS[key], "s", f"log/{key}/processor")
+            targets.at_most(f"{label}, memory", found.held, GIGABYTES[key], "GB", f"log/{key}/held")
+
+
+def least(action: Callable[[], object], repeats: int) -> float:
+    """Return the least processor time of an action that has run once before [ms]."""
     action()
-    durations = []
+    times = []
     for _ in range(repeats):
-        start = time.process_time()
+        begin = time.process_time()
         action()
-        durations.append(time.process_time() - start)
-    return min(durations), statistics.median(durations), max(durations)
+        times.append(1e3 * (time.process_time() - begin))
+    return min(times)
 
 
-def first_use(statement: str) -> float:
-    """Return the duration [s] of the first call in a new process with an empty cache."""
-    code = (
-        "import time\n"
-        "from benchmarks.speed import *\n"
-        f"start = time.perf_counter(); {statement}; print(time.perf_counter() - start)"
-    )
-    with tempfile.TemporaryDirectory() as cache:
-        answer = subprocess.run(
-            [sys.executable, "-c", code],
-            env={**os.environ, "TIREID_CACHE": cache},
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-    return float(answer.stdout.split()[-1])
+def tables(v: Values) -> dict[str, Table]:
+    """Return the table of the documents.
+
+    Parameters
+    ----------
+    v : recorded values.
+    """
+    rows = [
+        [f"{what}, wall clock", f"{v[f'start/{key}']:.0f} ms", ""]
+        for key, what in (("python", "`python -c pass`"), ("import", "`import tireid`"),
+                          ("help", "`tireid --help`"))
+    ]  # fmt: skip
+    rows += [
+        [f"{key} of log at 100 Hz to the report, processor",
+         f"{v[f'log/{key}/processor']:.1f} s", f"{v[f'log/{key}/held']:.2f} GB"]
+        for key in LASTS
+    ]  # fmt: skip
+    rows += [[f"run of 45 s, 4500 steps, `{name}`, processor", f"{v[f'run/{name}']:.1f} ms", ""]
+             for name in (REFERENCE, LIVE)]  # fmt: skip
+    rows.append(["45 s of the plant at 1 ms, processor", f"{v['run/plant']:.0f} ms", ""])
+    return {"speed": Table(("task", "time", "memory"), rows)}
 
 
 def main() -> int:
-    """Print the table; record minimum and median of each."""
-    car, targets = sedan(), Targets("speed")
+    """Print the times; return 1 where one is too long."""
+    targets, options = Targets("speed"), parse("speed", __doc__)
+    runs, repeats = (1, 2) if options.quick else (15, 30)
+    for name, words in STARTS.items():
+        label, value = f"{name}, a fresh process", started(words, runs)
+        targets.at_most(label, value, LONGEST, "ms", f"start/{name}")
+    long_logs(targets, list(LASTS)[: 1 if options.quick else None])
+    car = sedan()
     plant = Plant(car)
     recording = plant.simulate(SLALOM, speed=20.0).recording()
-    methods = {name: make_method(name, car) for name in (REFERENCE, LIVE)}
-    print(f"{platform.processor() or platform.machine()}, Python {platform.python_version()}")
-    actions: dict[str, tuple[Callable[[], object], int]] = {
-        name: (partial(identify, recording, car, method), REPEATS)
-        for name, method in methods.items()
+    actions: dict[str, Callable[[], object]] = {
+        name: partial(ti.identify, recording, car, make_method(name, car), check=False)
+        for name in (REFERENCE, LIVE)
     }
-    actions["plant"] = (lambda: plant.simulate(SLALOM, speed=20.0), 5)
-    for name, (action, repeats) in actions.items():
-        low, median, high = (1e3 * value for value in timed(action, repeats))
-        cells = f"min {low:8.2f}  median {median:8.2f}  max {high:8.2f}"
-        print(f"{name + ', 45 s':44} [ms] {cells} of {repeats}")
-        targets.record(f"{name}/least", low, "ms")
-        targets.record(f"{name}/median", median, "ms")
-    simulate = "Plant(sedan()).simulate(SLALOM, speed=20.0)"
-    for name, statement in {
-        "plant": simulate,
-        "plant_and_identifier": f"identify({simulate}.recording(), sedan(), "
-        f"make_method({REFERENCE!r}, sedan()))",
-        "plant_and_default": f"identify({simulate}.recording(), sedan(), "
-        f"make_method({LIVE!r}, sedan()))",
-    }.items():
-        duration = first_use(statement)
-        print(f"{name + ', first use with compiling':44} {duration:8.2f} s")
-        targets.record(f"first_use/{name}", duration, "s")
-    return targets.finish(keep=keeps())
+    actions["plant"] = partial(plant.simulate, SLALOM, speed=20.0)
+    for name, action in actions.items():
+        value = least(action, repeats if name != "plant" else 5)
+        targets.record(f"run/{name}", value)
+        show(f"45 s, {name}", f"{value:.2f} ms")
+    return targets.finish(keep=options.record)
 
 
 if __name__ == "__main__":

@@ -1,21 +1,34 @@
 """What a benchmark measured: numbers by key beside their targets, printed, and recorded.
 
-A number that README or docs quote is recorded here first: `Targets("mpc_worth")` collects under the
-name of the script, `finish` writes benchmarks/results/mpc_worth.json where it is asked to, with a
-hash of the code that it measured, and the documents name script and key. A missed target is
-printed, recorded, and an exit code of 1.
+`Targets("mpc_worth")` collects under the name of the script; with `--record` it writes
+benchmarks/results/mpc_worth.json, with the date and a hash of the code that it measured. The
+script's `tables` make the tables of the documents of it. A missed target is printed, recorded, and
+an exit code of 1.
 """
 
+import argparse
 import json
 import platform
 import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 from benchmarks.fingerprint import fingerprint
 
 RESULTS = Path(__file__).resolve().parent / "results"
 MISSED = 1
+Value = float | int | str
+Values = Mapping[str, Value]
+
+
+class Table(NamedTuple):
+    """A table of a document: the header says units and how many cars; cells as they are printed."""
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
 
 
 @dataclass(slots=True)
@@ -25,28 +38,23 @@ class Targets:
     Parameters
     ----------
     script : name of the benchmark, without its ending.
-    values : by key; what documents may quote, at full precision.
-    units : by key.
-    limits : by key, what a target asks for, and whether it was reached.
+    values : by key, at full precision.
     missed : labels of the targets that were not reached so far.
     met : how many were reached.
     """
 
-    script: str = ""
-    values: dict[str, float | int | str] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
-    limits: dict[str, tuple[float, bool]] = field(default_factory=dict)
+    script: str
+    values: dict[str, Value] = field(default_factory=dict)
     missed: list[str] = field(default_factory=list)
     met: int = 0
 
-    def record(self, key: str, value: float | int | str, unit: str = "") -> None:
-        """Keep a number that has no target of its own.
+    def record(self, key: str, value: Value) -> None:
+        """Keep a number.
 
         Parameters
         ----------
         key : words joined by slashes, `course/97/0.5/axle/rms`.
         value : at full precision.
-        unit : of it.
 
         Raises
         ------
@@ -55,72 +63,46 @@ class Targets:
         """
         if key in self.values:
             raise ValueError(f"{self.script}: the key {key!r} is recorded twice")
-        self.values[key], self.units[key] = value, unit
+        self.values[key] = value
 
     def at_most(
         self, label: str, value: float, limit: float, unit: str = "%", key: str = ""
     ) -> None:
-        """Print a value beside the largest that is good.
-
-        Parameters
-        ----------
-        label : what it is.
-        value : measured.
-        limit : largest that is good.
-        unit : of both.
-        key : under which it is recorded too; none where empty.
-        """
-        self._judge(label, value, "<=", limit, unit, key, value <= limit)
+        """Print a value beside the largest that is good; record it too where it has a key."""
+        self._judge(label, value, f"<= {limit:g} {unit}", unit, key, value <= limit)
 
     def at_least(
         self, label: str, value: float, limit: float, unit: str = "%", key: str = ""
     ) -> None:
-        """Print a value beside the smallest that is good.
+        """Print a value beside the smallest that is good; record it too where it has a key."""
+        self._judge(label, value, f">= {limit:g} {unit}", unit, key, value >= limit)
 
-        Parameters
-        ----------
-        label : what it is.
-        value : measured.
-        limit : smallest that is good.
-        unit : of both.
-        key : under which it is recorded too; none where empty.
-        """
-        self._judge(label, value, ">=", limit, unit, key, value >= limit)
-
-    def _judge(
-        self, label: str, value: float, side: str, limit: float, unit: str, key: str, good: bool
-    ) -> None:
+    def _judge(self, label: str, value: float, limit: str, unit: str, key: str, good: bool) -> None:
+        if key:
+            self.record(key, value)
         if good:
             self.met += 1
         else:
-            self.missed.append(label)
-        if key:
-            self.record(key, value, unit)
-            self.limits[key] = float(limit), bool(good)
+            self.missed.append(f"{label} ({limit.strip()})")
         verdict = "ok" if good else "MISSED"
-        print(f"  {label:66} {value:8.2f} {unit:3} target {side} {limit:g} {unit}  {verdict}")
+        print(f"  {label:66} {value:8.2f} {unit:3} target {limit}  {verdict}", flush=True)
 
     def finish(self, *, keep: bool) -> int:
         """Say how many targets were met; return the exit code, 1 where one was missed.
 
         Parameters
         ----------
-        keep : write the numbers to benchmarks/results, for the documents to quote: only a run
-            with the defaults of the script may.
+        keep : write the record.
         """
         if keep:
-            RESULTS.mkdir(exist_ok=True)
             path = RESULTS / f"{self.script}.json"
             text = {
                 "script": f"benchmarks/{self.script}.py",
+                "date": datetime.now(UTC).date().isoformat(),
                 "machine": f"{platform.machine()}, Python {platform.python_version()}",
                 "code": fingerprint(self.script),
                 "missed": self.missed,
                 "met": self.met,
-                "units": self.units,
-                "targets": {
-                    key: {"limit": limit, "met": good} for key, (limit, good) in self.limits.items()
-                },
                 "values": self.values,
             }
             path.write_text(json.dumps(text, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
@@ -130,25 +112,34 @@ class Targets:
         return MISSED if self.missed else 0
 
 
-def keeps(argv: list[str] = sys.argv) -> bool:
-    """Return whether the words of the command ask to record, taking `--record` out of them.
+def parse(script: str, doc: str | None, parts: Sequence[str] = ()) -> argparse.Namespace:
+    """Return the words of a benchmark's command: `quick`, `record`, and `only` where it has parts.
 
     Parameters
     ----------
-    argv : words of the command.
+    script : its name.
+    doc : its docstring.
+    parts : that `--only` chooses from; what is left out is not recorded.
     """
-    if "--record" in argv:
-        argv.remove("--record")
-        return True
-    return False
+    parser = argparse.ArgumentParser(
+        prog=f"python -m benchmarks.{script}", description=(doc or "").partition("\n")[0]
+    )
+    parser.add_argument("--quick", action="store_true", help="a few cases, to see that it runs")
+    parser.add_argument("--record", action="store_true", help="write benchmarks/results")
+    if parts:
+        parser.add_argument("--only", nargs="+", choices=parts, default=parts, metavar="PART")
+    options = parser.parse_args()
+    if options.record and (options.quick or len(getattr(options, "only", parts)) < len(parts)):
+        parser.error("only all of the cases are recorded")
+    return options
 
 
 def show(label: str, text: str) -> None:
-    """Print a value that has no target of its own.
+    """Print a value that has no target of its own."""
+    print(f"  {label:66} {text}", flush=True)
 
-    Parameters
-    ----------
-    label : what it is.
-    text : the value.
-    """
-    print(f"  {label:66} {text}")
+
+def without(what: str) -> None:
+    """End a benchmark that needs what is not there, and has nothing to judge then."""
+    print(f"skipped: {what}")
+    sys.exit(0)

@@ -1,34 +1,42 @@
-"""Is the verdict right? 500 answers, clean and faulty: none that is far off may be called valid.
+"""Is the verdict right? Answers to clean and faulty logs: no bad model may be accepted.
 
-    python -m benchmarks.verdicts [--each N] [--first SEED] [--record]
+    python -m benchmarks.verdicts [--quick] [--record]
 
-A hundred answers to logs of random cars of each of four classes, and a hundred to parts of the
-recordings, where they are there: a third with nothing wrong, a third with a beginning of any kind,
-a third with faults of the log or of what is told. An answer is wrong above `WRONG` in an axle's
-force on a drive with the same sensors, and right below `RIGHT` in both. Constants of the verdict
-are chosen with `--first` below `FIRST_SEED`, where there are no recordings.
+With v_y: sixty answers to logs of random cars of each of four classes, and sixty to parts of the
+recordings, where they are there: a third with nothing wrong, a third with a beginning of any
+kind, a third with faults of the log or of what is declared. Without v_y: drives on banked roads
+with what inertial sensors add; the first part of each is identified, the rest evaluated, with the
+same sensors; beside each clean log stands one with a fault. A model is bad above `WRONG` in an
+axle's force on the evaluated drive, and good below `RIGHT` in both. Constants of the verdict were
+chosen on seeds below `FIRST_SEED`, without recordings.
 """
 
-import argparse
 import sys
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.answers import REFUSED, RIGHT, WRONG, Answer, answer, drawn
+import tireid as ti
+from benchmarks.answers import RIGHT, WRONG, Answer, answer, force_error
 from benchmarks.fault_cases import Case, random_case
-from benchmarks.random_cars import BEGINNINGS, CLASSES, FIRST_SEED, random_beginning
+from benchmarks.random_cars import (
+    BEGINNINGS,
+    CLASSES,
+    FIRST_SEED,
+    drawn,
+    inertial_drive,
+    random_beginning,
+)
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
-from benchmarks.targets import Targets, keeps, show
-from models.recordings import Recording, read_recording
+from benchmarks.targets import Table, Targets, Values, parse, show
+from models.recordings import Recording, Repair, read_recording
 from models.vehicle import Vehicle
 
-EACH, PER_CAR = 100, 5  # answers of each class and of recordings; of one plant car
+EACH, PER_CAR = 60, 5  # answers of each class and of recordings; of one plant car
 OWN_SENSORS = {"r": "r_imu", "ay": "ay_imu", "vx": "vx_encoder"}  # 90 ms late, as they come
 FREE = ("free_10_02_28", "free_10_12_05")
 BY_CAMERA = (
@@ -45,17 +53,25 @@ RUNS: tuple[tuple[str, Vehicle, tuple[str, ...], Mapping[str, str]], ...] = (
     ("dart_imu.csv.gz", DART, BY_CAMERA, OWN_SENSORS),
 )
 LASTS, DRIVING = (20.0, 40.0), 0.6  # s; share of a part in which the car drives
-PROCESSES = 2
+
+# Without v_y.
+DRIVES, FIRST = 10, 7000  # of each class; first seed
+SHARE = 0.7  # of a drive, that is identified
+SCALES = (0.8, 1.25)  # of a channel
+LATE = (0.05, 0.1)  # s
+INERTIA = (0.4, 2.5)  # times the declared yaw inertia
+SCALED, DELAYED = ("v_x", "r", "delta_f", "a_y"), ("r", "delta_f", "a_y")
+FAULTS = (*(f"{name} scaled" for name in SCALED), *(f"{name} late" for name in DELAYED),
+          "yaw inertia", "l_f and l_r swapped")  # fmt: skip
 
 
 class Judged(NamedTuple):
-    """An answer: group of drives, seed, what was wrong, what came out, and if nothing was wrong."""
+    """An answer: group of drives, seed, what was wrong, and what came out."""
 
     group: str
     seed: int
     what: str
     found: Answer
-    clean: bool = False
 
 
 def plant_answers(job: tuple[str, int]) -> list[Judged]:
@@ -80,7 +96,7 @@ def plant_answers(job: tuple[str, int]) -> list[Judged]:
         judged = drive.cornering(log) if fate == 1 else drive.exact
         what = str(case) if fate != 1 else f"beginning: {drive.beginning.kind}"
         result = answer(case.log(log), case.car(told), case.judged(judged))
-        found.append(Judged(kind, seed, what, result, fate == 0))
+        found.append(Judged(kind, seed, what, result))
     return found
 
 
@@ -128,120 +144,152 @@ def recorded_answer(seed: int) -> Judged:
     part = part_of(recording, car, rng)
     case = random_case(car, rng) if rng.integers(2) else Case()
     result = answer(case.log(part), case.car(car), case.judged(part))
-    return Judged("recordings", seed, f"{recording.name}: {case}", result, case == Case())
+    return Judged("recordings", seed, f"{recording.name}: {case}", result)
+
+
+def faulty(
+    log: Recording, car: Vehicle, fault: str, rng: np.random.Generator
+) -> tuple[Recording, Vehicle]:
+    """Return a log and its car with a fault of a size that is drawn.
+
+    Parameters
+    ----------
+    log : without.
+    car : as it was declared.
+    fault : one of `FAULTS`, or empty.
+    rng : source of the size.
+    """
+    channel, _, what = fault.partition(" ")
+    if what == "scaled":
+        changed: dict[str, Any] = {channel: rng.choice(SCALES) * getattr(log, channel)}
+        return replace(log, **changed), car
+    if what == "late":
+        signal, k = getattr(log, channel), round(rng.choice(LATE) / log.dt)
+        changed = {channel: np.append(np.full(k, signal[0]), signal[:-k])}
+        return replace(log, **changed), car
+    if fault == "yaw inertia":
+        return log, replace(car, yaw_inertia=rng.choice(INERTIA) * car.yaw_inertia)
+    if fault:
+        return log, replace(car, l_f=car.l_r, l_r=car.l_f)
+    return log, car
+
+
+def blind_answers(job: tuple[str, int]) -> list[Judged]:
+    """Return what is answered to a drive without v_y, clean and with a fault.
+
+    Parameters
+    ----------
+    job : class of the car, and seed.
+    """
+    kind, seed = job
+    drive, rng = inertial_drive(kind, seed), np.random.default_rng(seed)
+    own = replace(drive.shown, v_y=None, axle_force=drive.exact.axle_force)
+    own, car = Repair(acceleration_sensor_x=drive.position[0]).apply(own, drive.told)
+    found = []
+    for fault in ("", str(rng.choice(FAULTS))):
+        log, known = faulty(own, car, fault, rng)
+        end = float(log.t[0]) + SHARE * log.duration
+        run = ti.identify(log.between(log.t[0], end), known, check=False)
+        error = force_error(run.freeze(), log.between(end, log.t[-1]))
+        codes = tuple(one.code for one in run.verdict.findings if one.refuses)
+        group = "without v_y, faulty" if fault else "without v_y, clean"
+        found.append(
+            Judged(group, seed, f"{kind} {fault}", Answer(error, run.verdict.valid, codes))
+        )
+    return found
 
 
 def report(found: Sequence[Judged], targets: Targets) -> None:
-    """Print tables, record their numbers and judge them.
+    """Print the counts of each group of answers, and record them.
 
     Parameters
     ----------
     found : all answers.
-    targets : collects what is missed.
+    targets : records.
     """
-    head = "answers  wrong  called valid  right  refused  at the door  valid in between"
-    print(f"  {'group':14} {head}")
-    everything = Counts(found)
-    groups = {name: Counts([one for one in found if one.group == name]) for name in CLASSES}
-    groups["plants"] = Counts([one for one in found if one.group in CLASSES])
-    groups["recordings"] = Counts([one for one in found if one.group == "recordings"])
-    for name, some in groups.items():
-        if some.all:
-            print(f"  {name:14} {some}")
-            for key, value in some.numbers().items():
-                targets.record(f"{name}/{key}", value)
-    print(f"  {'all':14} {everything}")
-    for key, value in everything.numbers().items():
-        if key not in ("wrong_valid", "wrong_unsaid"):
-            targets.record(key, value)
-    for one in everything.wrong_valid:
-        _show(one, "wrong and called valid")
-    for one in everything.right_refused:
-        _show(one, "right and refused")
-    codes = Counter(code for one in everything.right_refused for code in one.found.codes)
-    for code, number in codes.most_common():
-        show(f"refused right answers: {code}", str(number))
-        targets.record(f"right_refused_by/{code}", number)
-    print("Targets")
-    label = f"answers more than {WRONG:g} % wrong and called valid"
-    targets.at_most(label, len(everything.wrong_valid), 0, "", "wrong_valid")
-    label = "of these, answers of which the doctor says nothing"
-    targets.at_most(label, len(everything.wrong_unsaid), 0, "", "wrong_unsaid")
-    share = 100.0 * len(everything.right_refused) / max(len(everything.right), 1)
-    targets.at_most(f"answers within {RIGHT:g} % and refused", share, 3.0, key="refused_share")
-    for name in ("plants", "recordings"):
-        if groups[name].right:
-            share = 100.0 * len(groups[name].right_refused) / len(groups[name].right)
-            targets.record(f"{name}/refused_share", share, "%")
-    if not everything.right or not everything.wrong:
-        targets.at_least("answers right, and wrong", 0.0, 1.0, "")  # nothing was judged
+    for name in dict.fromkeys(one.group for one in found):
+        some = [one for one in found if one.group == name]
+        bad, good = (
+            [one for one in some if getattr(one.found, what)] for what in ("wrong", "right")
+        )
+        accepted = [one for one in bad if one.found.valid]
+        rejected = [one for one in good if not one.found.valid]
+        silent = [one for one in accepted if not one.found.doctor]
+        counts = {"answers": some, "bad": bad, "accepted": accepted, "silent": silent,
+                  "good": good, "rejected": rejected}  # fmt: skip
+        show(name, ", ".join(f"{len(which)} {what}" for what, which in counts.items()))
+        for what, which in counts.items():
+            targets.record(f"{name}/{what}", len(which))
+        for what, which in (("bad, accepted", accepted), ("good, rejected", rejected)):
+            for one in which:
+                error = f"{one.found.error[0]:.1f} / {one.found.error[1]:.1f} %"
+                said = ", ".join((*one.found.codes, *one.found.doctor))
+                show(f"  {what}: {name} {one.seed}", f"{error}, {one.what}  {said}")
 
 
-class Counts:
-    """How many answers are right and wrong, and what the verdict said.
+def judge(targets: Targets) -> None:
+    """Judge the counts of all groups with v_y, and without.
 
     Parameters
     ----------
-    found : the answers; attributes all, wrong, wrong_valid, wrong_unsaid (of these, where the
-        doctor says nothing), right, right_refused, clean_refused (of these, where nothing was
-        wrong), right_alarmed (valid, but the doctor says something where nothing was wrong), door
-        (logs not let in), between, between_valid.
+    targets : of `report`.
     """
-
-    def __init__(self, found: Sequence[Judged]) -> None:
-        self.all = list(found)
-        self.wrong = [one for one in found if one.found.wrong]
-        self.wrong_valid = [one for one in self.wrong if one.found.valid]
-        self.wrong_unsaid = [one for one in self.wrong_valid if not one.found.doctor]
-        self.right = [one for one in found if one.found.right]
-        self.right_refused = [one for one in self.right if not one.found.valid]
-        self.clean_refused = [one for one in self.right_refused if one.clean]
-        clean = [one for one in self.right if one.clean]
-        self.right_alarmed = [one for one in clean if one.found.doctor]
-        self.door = [one for one in found if REFUSED in one.found.codes]
-        self.between = [one for one in found if not (one.found.wrong or one.found.right)]
-        self.between_valid = [one for one in self.between if one.found.valid]
-
-    def numbers(self) -> dict[str, int]:
-        """Return how many there are of each, by name; all of them as `answers`."""
-        named = {"answers" if key == "all" else key: some for key, some in vars(self).items()}
-        return {key: len(some) for key, some in named.items()}
-
-    def __str__(self) -> str:
-        """Return them as a row."""
-        between = f"{len(self.between_valid)} of {len(self.between)}"
-        return (
-            f"{len(self.all):7}{len(self.wrong):7}{len(self.wrong_valid):14}{len(self.right):7}"
-            f"{len(self.right_refused):9}{len(self.door):13}{between:>18}"
-        )
+    for way, some in WAYS.items():
+        total = {
+            what: sum(int(targets.values.get(f"{name}/{what}", 0)) for name in some)
+            for what in COUNTS
+        }
+        targets.at_most(f"{way}: bad models accepted", total["accepted"], 0, "")
+        share = 100.0 * total["rejected"] / max(total["good"], 1)
+        targets.at_most(f"{way}: good models rejected", share, 3.0)
+        for what, count in total.items():
+            targets.record(f"{way}/{what}", count)
+    silent = int(targets.values["with v_y/silent"])
+    targets.at_most("bad models accepted, and no word of the doctor", silent, 0, "")
 
 
-def _show(one: Judged, what: str) -> None:
-    error = f"{one.found.error[0]:.1f} / {one.found.error[1]:.1f} %"
-    said = [*one.found.codes, *(f"doctor: {finding}" for finding in one.found.doctor)]
-    show(f"{what}: {one.group} {one.seed}", f"{error}, {one.what}  {', '.join(said)}")
+COUNTS = ("answers", "bad", "accepted", "silent", "good", "rejected")
+BLIND = ("without v_y, clean", "without v_y, faulty")
+WAYS = {"with v_y": (*CLASSES, "recordings"), "without v_y": BLIND}
+
+
+def tables(v: Values) -> dict[str, Table]:
+    """Return the table of the documents.
+
+    Parameters
+    ----------
+    v : recorded values.
+    """
+    rows = [
+        [name, *(f"{v[f'{name}/{what}']}" for what in COUNTS)]
+        for name in (*CLASSES, "recordings", "with v_y", *BLIND)
+    ]
+    header = (
+        "logs", "answers", f"bad models (error above {WRONG:g} %)", "of these accepted",
+        "and no word of the doctor", f"good models (below {RIGHT:g} %)", "of these rejected",
+    )  # fmt: skip
+    return {"verdicts": Table(header, rows)}
 
 
 def main() -> int:
     """Run everything; return the exit code."""
-    keep = keeps()
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--each", type=int, default=EACH, help="answers of each group")
-    parser.add_argument("--first", type=int, default=FIRST_SEED, help="seed")
-    options, targets = parser.parse_args(), Targets("verdicts")
-    seeds = range(options.first, options.first + max(options.each // PER_CAR, 1))
-    jobs = [(kind, seed) for seed in seeds for kind in CLASSES]
-    held_out = options.first >= FIRST_SEED
-    parts = range(options.first, options.first + options.each) if held_out else range(0)
-    if held_out and not recordings():
+    targets, options = Targets("verdicts"), parse("verdicts", __doc__)
+    each, drives = (PER_CAR, 1) if options.quick else (EACH, DRIVES)
+    classes = list(CLASSES)[: 1 if options.quick else None]
+    seeds = range(FIRST_SEED, FIRST_SEED + each // PER_CAR)
+    jobs = [(kind, seed) for seed in seeds for kind in classes]
+    first = (FIRST + len(CLASSES) * k for k in range(drives))
+    blind = [(kind, seed + i) for seed in first for i, kind in enumerate(classes)]
+    parts = range(FIRST_SEED, FIRST_SEED + each) if recordings() else range(0)
+    if not recordings():
         print(f"  without recordings: they are not there: {DATA} (set TIREID_DATA)")
-        parts = range(0)
-    with ProcessPoolExecutor(PROCESSES) as pool:
+    with ProcessPoolExecutor() as pool:
         found = [one for some in pool.map(plant_answers, jobs) for one in some]
         found += pool.map(recorded_answer, parts)
+        found += [one for some in pool.map(blind_answers, blind) for one in some]
     report(found, targets)
-    everything = options.each == EACH and options.first == FIRST_SEED and len(parts) > 0
-    return targets.finish(keep=keep and everything)
+    judge(targets)
+    return targets.finish(keep=options.record and bool(recordings()))
 
 
 if __name__ == "__main__":

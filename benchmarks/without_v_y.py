@@ -1,52 +1,51 @@
 """Lateral velocity without its sensor: the inertial identifier beside what it is compared with.
 
-    python -m benchmarks.without_v_y [--record] [--only PART ...] [--cars N]
+    python -m benchmarks.without_v_y [--quick] [--record] [--only PART ...]
 
-A linear Kalman filter on the vehicle's tires, a naive joint filter of state and tires, a washout,
-and moving-horizon estimation, those of benchmarks/rivals, on recordings of CarMaker, the own
-sensors of the real 1:10 car, and random cars on banked roads with what inertial sensors add; all in
-one run. Nobody is shown v_y; the true one scores, from the first sample. Numbers of the baselines
-were chosen on random cars with seeds below `FIRST_SEED`, and on no recording. Where the
-accelerometer sits is told to all: the inertial identifier takes it, for the others a_y is moved to
-the center of gravity. Then the inertial identifier as a car with logs runs it, on tires that an
+Beside it all rivals that are installed and estimate v_y, on random cars on banked roads with what
+inertial sensors add, on CarMaker, and on the own sensors of a real 1:10 car. v_y only scores, from
+the first sample. Where the accelerometer sits is declared to all: the inertial identifier takes it,
+for the others a_y is moved to the center of gravity. Then the inertial identifier on tires that an
 estimate from a log without v_y found, the same log and another: CarMaker and a real race car.
+Numbers of the methods were chosen on random cars with seeds below `FIRST_SEED`, and on no
+recording.
 """
 
-import argparse
 import sys
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
-from benchmarks.estimate import FERRARI
-from benchmarks.inertial import (
-    BRISK,
-    CARMAKER_RUNS,
-    frozen_error,
-    inertial_drive,
-    own_sensors,
-    without_v_y,
-)
-from benchmarks.random_cars import CLASSES, FIRST_SEED
-from benchmarks.recorded_cars import CARMAKER, DART, DATA
-from benchmarks.targets import Targets, keeps
-from identifier.compare.course import side_slip, step_times
-from identifier.estimate.fit import fit
+import tireid as ti
+from benchmarks.answers import force_error
+from benchmarks.random_cars import CLASSES, FIRST_SEED, inertial_drive
+from benchmarks.recorded_cars import CARMAKER, CARMAKER_RUNS, DART, DATA, FERRARI, own_sensors
+from benchmarks.targets import Table, Targets, Values, parse
+from identifier.compare.course import side_slip
 from identifier.inertial import InertialIdentifier
 from identifier.method import CannotFreezeError
-from identifier.methods import continuing, make_method
+from identifier.methods import METHODS, continuing, make_method, methods
 from identifier.run import History, identify
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle
-from tireid_rivals import NAMES
 
 CARS = 80
 OWN = "inertial"
-SLOWEST = 0.3  # m/s, from which a random drive counts
-FAST = 3.0  # m/s, from which the race car's counts
+BRISK = 1.0  # m/s, from which the 1:10 car's side slip counts
+SLOWEST = 0.3  # m/s, from which that of other cars does
+FAST = 3.0  # m/s, from which the race car's does
 MOST = {"slalom1_14_5ms": 0.15, "experiment2_40kmh": 0.05, "ferrari": 0.32}  # degrees
-PARTS = ("carmaker", "dart", "cost", "held", "cars")
+PARTS = ("cars", "carmaker", "dart", "held")
+
+
+@cache
+def rivals() -> tuple[str, ...]:
+    """Return the methods that estimate v_y and are not tireid's own."""
+    installed = [name for name in methods() if name not in METHODS]
+    return tuple(name for name in installed if "v_y" not in make_method(name, CARMAKER).needs)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +57,7 @@ class Told:
     rms : error of side slip from the first sample [degrees].
     share : of that over side slip itself [-].
     within : share of errors of v_y within two standard deviations [%]; None without one.
-    force : frozen force error over the rms force [-]; None of a method without tires.
+    force : frozen force error [% of the rms force], mean of both axles; None without tires.
     """
 
     rms: float
@@ -81,10 +80,29 @@ def judged(history: History, exact: Recording, slowest: float) -> Told:
     counts = exact.v_x >= slowest
     true = float(np.degrees(np.std(np.arctan2(exact.v_y, exact.v_x)[counts])))
     try:
-        force: float | None = frozen_error(history.freeze(), exact)
+        force: float | None = float(np.mean(force_error(history.freeze(), exact)))
     except CannotFreezeError:
         force = None
     return Told(rms=found.rms, share=found.rms / true, within=found.within, force=force)
+
+
+def inertial(
+    recording: Recording, vehicle: Vehicle, position: tuple[float, float], *, roll: bool = True
+) -> History:
+    """Return the run of the inertial identifier, to which v_y is not even given.
+
+    Parameters
+    ----------
+    recording : the log; its v_y is put to zero.
+    vehicle : the car as declared.
+    position : of the accelerometer [m].
+    roll : whether the accelerometer rolls with the body; else a_y is in the plane of the road.
+    """
+    method = InertialIdentifier.for_vehicle(vehicle, dt=recording.dt)
+    method = replace(method, sensor_position=position)
+    if not roll:
+        method = replace(method, beliefs=replace(method.beliefs, roll=1e-6, sd_roll=0.002))
+    return identify(replace(recording, v_y=np.zeros(len(recording))), vehicle, method)
 
 
 def runs(
@@ -105,8 +123,8 @@ def runs(
     central = recording.a_y - x * turning + y * recording.r**2
     blind = replace(recording, v_y=None, a_y=central, axle_force=None)
     return {
-        OWN: without_v_y(recording, vehicle, position, roll=roll),
-        **{name: identify(blind, vehicle, make_method(name, vehicle)) for name in NAMES},
+        OWN: inertial(recording, vehicle, position, roll=roll),
+        **{name: identify(blind, vehicle, make_method(name, vehicle)) for name in rivals()},
     }
 
 
@@ -121,17 +139,17 @@ def record(targets: Targets, key: str, found: Mapping[str, Told]) -> None:
     """
     for name, one in found.items():
         within = "" if one.within is None else f"{one.within:5.0f} % within two sigma"
-        force = "" if one.force is None else f"force {100.0 * one.force:5.1f} %"
+        force = "" if one.force is None else f"force {one.force:5.1f} %"
         print(f"  {key:28} {name:10} {one.rms:7.3f} deg {one.share:6.2f}  {within:24} {force}")
-        targets.record(f"{key}/{name}/rms", one.rms, "deg")
-        targets.record(f"{key}/{name}/share", one.share, "-")
+        targets.record(f"{key}/{name}/rms", one.rms)
+        targets.record(f"{key}/{name}/share", one.share)
         if one.within is not None:
-            targets.record(f"{key}/{name}/within", one.within, "%")
+            targets.record(f"{key}/{name}/within", one.within)
         if one.force is not None:
-            targets.record(f"{key}/{name}/force", 100.0 * one.force, "%")
+            targets.record(f"{key}/{name}/force", one.force)
     if OWN in found:
         best = min(one.rms for name, one in found.items() if name != OWN)
-        targets.record(f"{key}/over_best", found[OWN].rms / best, "-")
+        targets.record(f"{key}/over_best", found[OWN].rms / best)
 
 
 def median(found: Sequence[Told]) -> Told:
@@ -151,29 +169,38 @@ def median(found: Sequence[Told]) -> Told:
     )
 
 
-def random_drives(targets: Targets, cars: int) -> None:
+def of_car(job: tuple[str, int]) -> dict[str, Told]:
+    """Return how every method did on a drive of a random car.
+
+    Parameters
+    ----------
+    job : class of the car, and seed.
+    """
+    drive = inertial_drive(*job)
+    found = runs(drive.shown, drive.told, drive.position)
+    return {name: judged(one, drive.exact, SLOWEST) for name, one in found.items()}
+
+
+def random_drives(targets: Targets, count: int) -> None:
     """Judge all on random cars: medians, of classes and of all.
 
     Parameters
     ----------
     targets : collects what is missed.
-    cars : how many, a multiple of the classes.
+    count : how many cars.
     """
-    print(f"{cars} random cars, medians: error of side slip, over side slip itself, honesty, tires")
-    found: dict[str, dict[str, list[Told]]] = {kind: {} for kind in CLASSES}
-    for k in range(cars):
-        kind = list(CLASSES)[k % len(CLASSES)]
-        drive = inertial_drive(kind, FIRST_SEED + k)
-        for name, history in runs(drive.shown, drive.told, drive.position).items():
-            told = judged(history, drive.exact, SLOWEST)
-            found[kind].setdefault(name, []).append(told)
-    for kind, by_name in found.items():
-        record(targets, f"cars/{kind}", {name: median(one) for name, one in by_name.items()})
-    every = {name: [one for kind in CLASSES for one in found[kind][name]] for name in found[kind]}
-    record(targets, "cars/all", {name: median(one) for name, one in every.items()})
-    for name in NAMES:
-        wins = np.mean([o.rms < b.rms for o, b in zip(every[OWN], every[name], strict=True)])
-        targets.record(f"cars/all/wins_over_{name}", 100.0 * float(wins), "%")
+    print(f"{count} random cars, medians: error of side slip, over side slip itself, tires")
+    jobs = [(list(CLASSES)[k % len(CLASSES)], FIRST_SEED + k) for k in range(count)]
+    with ProcessPoolExecutor() as pool:
+        found = list(pool.map(of_car, jobs))
+    targets.record("cars", count)
+    every = {name: [one[name] for one in found] for name in found[0]}
+    for kind in CLASSES:
+        own = [one for (of, _), one in zip(jobs, found, strict=True) if of == kind]
+        medians = {name: median([one[name] for one in own]) for name in every}
+        record(targets, f"cars/{kind}", medians)
+    record(targets, "cars/all", {name: median(some) for name, some in every.items()})
+    for name in rivals():
         over = median(every[OWN]).share / median(every[name]).share
         label = f"random cars, side slip of {OWN} over {name}"
         targets.at_most(label, over, 1.0, "-", key=f"cars/all/over_{name}")
@@ -194,8 +221,8 @@ def carmaker(targets: Targets) -> None:
             for name, history in runs(recording, CARMAKER, (0.0, 0.0), roll=False).items()
         }
         record(targets, f"carmaker/{run}", found)
-        best = min(found[name].rms for name in NAMES)
-        targets.at_most(f"{run}, {OWN} over the best baseline", found[OWN].rms / best, 1.0, "-")
+        best = min(found[name].rms for name in rivals())
+        targets.at_most(f"{run}, {OWN} over the best rival", found[OWN].rms / best, 1.0, "-")
 
 
 def dart(targets: Targets) -> None:
@@ -205,17 +232,12 @@ def dart(targets: Targets) -> None:
     ----------
     targets : collects what is missed.
     """
-    print(f"Real 1:10 car, encoder, IMU and steering, above {BRISK:g} m/s: the same")
+    print(f"Real 1:10 car, encoder, IMU and steering, above {BRISK:g} m/s: the same, medians")
     every: dict[str, list[Told]] = {}
-    for run, (own, vicon) in own_sensors().items():
-        found = {
-            name: judged(history, vicon, BRISK)
-            for name, history in runs(own, DART, (0.0, 0.0)).items()
-        }
-        record(targets, f"dart/{run}", found)
-        for name, one in found.items():
-            every.setdefault(name, []).append(one)
-    record(targets, "dart/all", {name: median(one) for name, one in every.items()})
+    for own, vicon in own_sensors().values():
+        for name, history in runs(own, DART, (0.0, 0.0)).items():
+            every.setdefault(name, []).append(judged(history, vicon, BRISK))
+    record(targets, "dart", {name: median(one) for name, one in every.items()})
 
 
 def held(targets: Targets) -> None:
@@ -248,7 +270,7 @@ def held(targets: Targets) -> None:
         record(targets, key, {"typical": judged(typical, log, slowest)})
         for of, teacher in by_name.items():
             shown = replace(logs[teacher], v_y=None, axle_force=None)
-            model = fit([shown], car).model
+            model = ti.identify(shown, car, check=False).freeze()
             method = continuing(model, car, log.dt, v_y=False)
             found = judged(identify(blind, car, method, model), log, slowest)
             record(targets, key, {of: replace(found, force=None)})
@@ -260,37 +282,61 @@ def held(targets: Targets) -> None:
     targets.at_least("errors within two sigma, mean of these", share, 90.0, key="held/within")
 
 
-def cost(targets: Targets) -> None:
-    """Time a step of each in C on this machine, on a run of CarMaker.
+def tables(v: Values) -> dict[str, Table]:
+    """Return the tables of the documents.
 
     Parameters
     ----------
-    targets : collects what is recorded.
+    v : recorded values.
     """
-    recording = read_recording(DATA / "carmaker.csv.gz", run=CARMAKER_RUNS[0])
-    methods = {name: make_method(name, CARMAKER) for name in (OWN, *NAMES)}
-    for name, seconds in step_times(methods, CARMAKER, recording, repeats=5).items():
-        print(f"  a step of {name:10} {1e6 * seconds:8.2f} us")
-        targets.record(f"step/{name}", 1e6 * seconds, "us")
+    names = [key.split("/")[2] for key in v if key.startswith("cars/all/") and key.endswith("/rms")]
+    slalom, sine = CARMAKER_RUNS
+    places = {
+        f"{v['cars']} random cars, median": "cars/all",
+        "CarMaker, slalom": f"carmaker/{slalom}",
+        "CarMaker, sine": f"carmaker/{sine}",
+        "1:10 car, own sensors, median": "dart",
+    }
+    rows = []
+    for name in names:
+        cells = [f"{v[f'{place}/{name}/rms']:.2f}" for place in places.values()]
+        more = [f"cars/all/{name}/within", f"cars/all/{name}/force"]
+        rows.append([f"`{name}`", *cells, *(f"{v[key]:.0f}" if key in v else "" for key in more)])
+    header = ("method; rms error of side slip [deg]", *places, "random cars: within 2 sd [%]",
+              "frozen force error [%]")  # fmt: skip
+    own = [[kind, *(f"{v[f'cars/{kind}/{OWN}/{key}']:.{n}f}"
+                    for key, n in (("rms", 2), ("share", 2), ("within", 0), ("force", 1)))]
+           for kind in CLASSES]  # fmt: skip
+    held = [
+        [words, *(f"{v[key]:.2f}" if (key := f"held/{log}/{of}/rms") in v else ""
+                for of in ("typical", "itself", "other"))]
+        for log, words in (
+            (slalom, "CarMaker, slalom"), (sine, "CarMaker, sine"), ("ferrari", "race car"),
+            ("second_half", "race car, second half"),
+        )
+    ]  # fmt: skip
+    return {
+        "without_v_y": Table(header, rows),
+        "without_v_y/classes": Table(
+            (f"`{OWN}`, median of {v['cars']} random cars", "side slip error [deg]",
+             "over side slip [-]", "within 2 sd [%]", "frozen force error [%]"), own),
+        "without_v_y/held": Table(
+            ("rms error of side slip [deg]", "typical tires", "tires of the same log",
+             "tires of another log"), held),
+    }  # fmt: skip
 
 
 def main() -> int:
     """Print every table; return the exit code."""
-    keep = keeps()
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--cars", type=int, default=CARS, help="random cars (default: %(default)s)")
-    parser.add_argument("--only", nargs="+", choices=PARTS, default=PARTS, metavar="PART")
-    options = parser.parse_args()
-    targets = Targets("without_v_y")
-    for name, part in (("carmaker", carmaker), ("dart", dart), ("cost", cost), ("held", held)):
-        if name in options.only and DATA.is_dir():
-            part(targets)
+    targets, options = Targets("without_v_y"), parse("without_v_y", __doc__, PARTS)
+    if "cars" in options.only:
+        random_drives(targets, 4 if options.quick else CARS)
     if not DATA.is_dir():
         print(f"no recordings in {DATA}: only random cars are judged")
-    if "cars" in options.only:
-        random_drives(targets, options.cars)
-    whole = options.cars == CARS and DATA.is_dir() and tuple(options.only) == PARTS
-    return targets.finish(keep=keep and whole)
+    for name, part in (("carmaker", carmaker), ("dart", dart), ("held", held)):
+        if name in options.only and DATA.is_dir() and not options.quick:
+            part(targets)
+    return targets.finish(keep=options.record and DATA.is_dir())
 
 
 if __name__ == "__main__":

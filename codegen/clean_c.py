@@ -7,7 +7,7 @@ that one text serves both precisions. Every compound operand is in parentheses.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any
 
 import casadi as ca
 
@@ -19,6 +19,7 @@ from codegen.graph import (
     Node,
     UnknownOperationError,
     graph_of,
+    rebuilt,
     simplifying,
 )
 
@@ -36,32 +37,21 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
     """Return a graph with choices and our own functions as nodes.
     whole : False leaves our own functions as the scalars that they are made of.
     """
-    if not whole:
-        return _with_choices(graph)
-    result, found = _with_choices(graph), Graph()
-    place_of: dict[int, int] = {}
-    for place, node in enumerate(result.nodes):
-        place_of[place] = _by_sines(found, _mapped(node, place_of))
-        for name, template, leaf in _templates().get(node.op, ()):
+    result = rebuilt(graph, lambda new, _, node, __: _with_choice(new, node))
+
+    def own(new: Graph, place: int, node: Node, place_of: Mapping[int, int]) -> int:
+        made = _by_sines(new, node)
+        for name, template, leaf in _templates().get(result.nodes[place].op, ()):
             argument = _argument(result, place, template, leaf)
             if argument is not None:
-                place_of[place] = found.add(Node(name, (place_of[argument],)))
-    found.outputs = [[place_of[p] for p in entries] for entries in result.outputs]
-    return found
+                made = new.add(Node(name, (place_of[argument],)))
+        return made
+
+    return rebuilt(result, own) if whole else result
 
 
-def _mapped(node: Node, place_of: Mapping[int, int]) -> Node:
-    args = tuple([place_of[a] for a in node.args])
-    return Node(node.op, args, node.value, node.port, node.entry)
-
-
-def _with_choices(graph: Graph) -> Graph:
-    result, place_of = Graph(), dict[int, int]()
-    for place, node in enumerate(graph.nodes):
-        moved = _mapped(node, place_of)
-        place_of[place] = result.add(_choice(result, moved) or _slope(result, moved) or moved)
-    result.outputs = [[place_of[p] for p in entries] for entries in graph.outputs]
-    return result
+def _with_choice(graph: Graph, node: Node) -> int:
+    return graph.add(_choice(graph, node) or _slope(graph, node) or node)
 
 
 def _choice(graph: Graph, node: Node) -> Node | None:
@@ -117,7 +107,8 @@ def _templates() -> Mapping[str, list[tuple[str, Graph, int]]]:
         with simplifying(on):
             for name, own in OWN.items():
                 x = ca.SX.sym("x")
-                graph = _with_choices(graph_of(ca.Function(name, [x], [own(x)])))
+                function = ca.Function(name, [x], [own(x)])
+                graph = recognized(graph_of(function), whole=False)
                 leaf = next(i for i, node in enumerate(graph.nodes) if node.op == "input")
                 last = graph.nodes[graph.outputs[0][0]].op
                 found.setdefault(last, []).append((name, graph, leaf))
@@ -140,66 +131,12 @@ def _argument(graph: Graph, place: int, template: Graph, leaf: int) -> int | Non
     return bound[leaf] if fits(place, template.outputs[0][0]) else None
 
 
-# In which order statements are written, so that few numbers wait at a time.
-#
-# A compiler keeps straight-line code nearly in the order in which it is written, and has few
-# registers: a number that is needed much later goes to the stack and back. So what a result needs
-# is written depth first, and whatever frees as many numbers as it makes is written at once.
-
-Unit = TypeVar("Unit")
-
-
-def _in_order(needs: Mapping[Unit, Sequence[Unit]], results: Sequence[Unit]) -> list[Unit]:
-    """Return the units, each after those that it needs.
-    needs : of each unit that is written, which others, each once; there is no circle.
-    results : units that nobody needs, in the order in which they are wanted.
-    """
-    readers: dict[Unit, list[Unit]] = {unit: [] for unit in needs}
-    for unit, needed in needs.items():
-        for one in needed:
-            readers[one].append(unit)
-    ends = set(results)
-    unread = {unit: len(listed) for unit, listed in readers.items()}
-    missing = {unit: len(needed) for unit, needed in needs.items()}
-    order: dict[Unit, None] = {}
-
-    def is_free(unit: Unit) -> bool:
-        made = unit not in ends
-        return missing[unit] == 0 and made <= sum(unread[one] == 1 for one in needs[unit])
-
-    def write(first: Unit) -> None:
-        waiting = [first]
-        while waiting:
-            unit = waiting.pop()
-            if unit in order:
-                continue
-            order[unit] = None
-            for one in needs[unit]:
-                unread[one] -= 1
-            for one in readers[unit]:
-                missing[one] -= 1
-            near = dict.fromkeys(r for one in (unit, *needs[unit]) for r in readers[one])
-            waiting += reversed([one for one in near if one not in order and is_free(one)])
-
-    for result in results:
-        wanted = [result]
-        while wanted:
-            absent = [one for one in needs[wanted[-1]] if one not in order]
-            if absent:
-                wanted += reversed(absent)
-            else:
-                write(wanted.pop())
-    return list(order)
-
-
 # The statements.
 
 Place = Callable[[int, int], str]  # (port, entry by columns) -> C expression
 
 _FLOAT_MIN, _FLOAT_MAX = 1.2e-38, 3.4e38  # normal numbers of float
 LONGEST = 72  # characters of an expression that is not given a name
-FEW = 150  # results, of which compilers keep or write several at once in any order
-LARGEST = 6  # operations in one of more results that is computed only where it is read
 _ATOMIC = ("const", "input")  # they are read where they stand
 TWICE = ("sq", "fmin", "fmax", "sign")  # they write an argument twice
 
@@ -262,7 +199,6 @@ class Statements:
                     self.uses[argument] += 1
         results = [place for entries in graph.outputs for place in entries]
         self.results = {place for place in results if self.uses[place] == 1}  # named by their place
-        self.large = self._large()
         self.text: dict[int, str] = {}
         self.lines: list[str] = []
         self.groups = _groups(graph)
@@ -272,65 +208,16 @@ class Statements:
         if returns:
             self.lines.append(f"return {_bare(self._condition(graph.outputs[0][0]))};")
             return
-        for place, at in self._order():
-            if at is None:
-                self._expression(place)
-                continue
+        # Results that need least come first: few numbers wait for the others meanwhile.
+        needed, outputs = graph.needed(), enumerate(graph.outputs)
+        wanted = [(place, port, entry) for port, row in outputs for entry, place in enumerate(row)]
+        for place, *at in sorted(wanted, key=lambda one: needed[one[0]]):
             self.lines.append(f"{write(*at)} = {_bare(self._real(place))};")
             if sums:
                 self.lines.append(f"sum += {write(*at)};")
         if sums:
             self.lines.insert(0, f"{prefix}_real sum = {literal(0.0, prefix)};")
             self.lines.append("return sum;")
-
-    def _are_few(self) -> bool:
-        return sum(map(len, self.graph.outputs)) <= FEW
-
-    def _large(self) -> set[int]:
-        """Return what is read once, and is computed when it frees more than it makes."""
-        operations, large = dict[int, int](), set[int]()
-        if self._are_few():
-            return large
-        for place, uses in self.uses.items():
-            node = self.graph.nodes[place]
-            size = 0 if node.op in _ATOMIC else 1 + sum(operations[a] for a in node.args)
-            if size >= LARGEST and uses == 1 and place not in self.results:
-                large.add(place)
-            operations[place] = 0 if uses > 1 or place in large else size
-        return large
-
-    def _order(self) -> list[tuple[int, tuple[int, int] | None]]:
-        """Return what is written one after the other: places, and port and entry of results.
-
-        Results that need least come first: few numbers wait for the others meanwhile. Where there
-        are few results, those that lie side by side are written together, most of them first.
-        """
-        results: list[tuple[int, tuple[int, int] | None]] = []
-        for port, entries in sorted(enumerate(self.graph.outputs), key=lambda port: -len(port[1])):
-            results += [(place, (port, entry)) for entry, place in enumerate(entries)]
-        if not self._are_few():
-            needed = self.graph.needed()
-            results.sort(key=lambda result: needed[result[0]])
-        named = {p for p, n in self.uses.items() if n > 1 and self.graph.nodes[p].op not in _ATOMIC}
-        named |= self.large
-        first_of = {p: p for p in named} | {p: self.members[p][0] for p in self.members}
-        needs: dict[tuple[int, tuple[int, int] | None], list[tuple[int, None]]] = {
-            (unit, None): self._units(self._needs(unit), first_of) for unit in first_of.values()
-        }
-        needs |= {result: self._units(result[:1], first_of) for result in results}
-        return _in_order(needs, results)
-
-    def _units(self, places: Sequence[int], first_of: Mapping[int, int]) -> list[tuple[int, None]]:
-        """Return what is written on its own of what places are made of, each once."""
-        found: dict[tuple[int, None], None] = {}
-        waiting = [*reversed(places)]
-        while waiting:
-            place = waiting.pop()
-            if place in first_of:
-                found[first_of[place], None] = None
-            else:
-                waiting += reversed(self.graph.nodes[place].args)
-        return list(found)
 
     def block(self, indent: int = 4) -> str:
         """Return the statements, one a line."""
@@ -378,7 +265,7 @@ class Statements:
             return
         text = self._plain(node)
         long = len(text) > LONGEST and place not in self.results
-        if node.op not in _ATOMIC and (self.uses[place] > 1 or long or place in self.large):
+        if node.op not in _ATOMIC and (self.uses[place] > 1 or long):
             kind = "bool" if node.op in CONDITIONS else f"{self.prefix}_real"
             name = self._new("c" if node.op in CONDITIONS else "t")
             self.lines.append(f"const {kind} {name} = {_bare(text)};")

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
 from typing import Any, NamedTuple
 
 import casadi as ca
@@ -14,34 +13,21 @@ from codegen.errors import TireidError
 OPERATIONS: Mapping[int, str] = {
     getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")
 }
+
+
+def _as_casadi(number: int) -> Callable[..., Any]:
+    def build(*arguments: Any) -> Any:  # in a seventh of the time of a + b
+        make = ca.SX.unary if len(arguments) == 1 else ca.SX.binary
+        return make(number, *arguments)
+
+    return build
+
+
+# Of every operation that CasADi has, and of ours.
 BUILDERS: Mapping[str, Callable[..., Any]] = {
-    "add": partial(ca.SX.binary, ca.OP_ADD),  # in a seventh of the time of a + b
-    "sub": partial(ca.SX.binary, ca.OP_SUB),
-    "mul": partial(ca.SX.binary, ca.OP_MUL),
-    "div": partial(ca.SX.binary, ca.OP_DIV),
-    "neg": lambda a: -a,
-    "inv": lambda a: 1 / a,
-    "sq": lambda a: a * a,
-    "twice": lambda a: 2 * a,
-    "sqrt": ca.sqrt,
-    "fabs": ca.fabs,
-    "fmin": ca.fmin,
-    "fmax": ca.fmax,
-    "lt": lambda a, b: a < b,
-    "le": lambda a, b: a <= b,
-    "eq": lambda a, b: a == b,
-    "ne": lambda a, b: a != b,
-    "not": ca.logic_not,
-    "and": ca.logic_and,
-    "or": ca.logic_or,
-    "if_else_zero": lambda c, a: ca.if_else(c, a, 0),
+    **{name: _as_casadi(number) for number, name in OPERATIONS.items()},
     "select": ca.if_else,
-    "sign": ca.sign,
-    "floor": ca.floor,
-    "sin": ca.sin,
-    "cos": ca.cos,
-    "tan": ca.tan,
-    "log": ca.log,
+    "if_else_zero": lambda c, a: ca.if_else(c, a, 0),  # no product is drawn into it
 }
 
 
@@ -138,6 +124,19 @@ def graph_of(function: ca.Function) -> Graph:
     return graph
 
 
+def rebuilt(graph: Graph, change: Callable[["Graph", int, Node, Mapping[int, int]], int]) -> Graph:
+    """Return a graph with some nodes changed.
+    change : of the new graph, a place in the old one, its node with arguments in the new one, and
+        new places by old ones; returns the new place.
+    """
+    result, place_of = Graph(), dict[int, int]()
+    for place, node in enumerate(graph.nodes):
+        args = tuple([place_of[a] for a in node.args])
+        place_of[place] = change(result, place, node._replace(args=args), place_of)
+    result.outputs = [[place_of[p] for p in entries] for entries in graph.outputs]
+    return result
+
+
 def _canonical(graph: Graph, op: str, args: tuple[int, ...]) -> Node:
     """Return the one form of operations that CasADi writes in two."""
     if op == "mul" and args[0] == args[1]:
@@ -174,10 +173,8 @@ def function_of(
             made[place] = ca.SX(node.value)
         elif node.op == "input":
             made[place] = entries[node.port][node.entry]
-        elif node.op in builders:
-            made[place] = builders[node.op](*(made[a] for a in node.args))
         else:
-            raise UnknownOperationError(f"{like.name()}: there is no plain C for {node.op}")
+            made[place] = builders[node.op](*(made[a] for a in node.args))
     results = [
         ca.reshape(ca.vertcat(*(made[p] for p in places)), *like.size_out(i))
         for i, places in enumerate(graph.outputs)
@@ -201,9 +198,9 @@ def decision(graph: Graph, ports: set[int]) -> int | None:
         ):
             of_ports.add(place)
         if node.op in ("select", "if_else_zero") and node.args[0] in of_ports:
-            condition = graph.nodes[node.args[0]]
-            if condition.op in CONDITIONS and condition.op != "not" and node.args[0] in of_ports:
-                count[node.args[0]] = count.get(node.args[0], 0) + 1
+            condition = node.args[0]
+            if graph.nodes[condition].op in CONDITIONS[:-1]:
+                count[condition] = count.get(condition, 0) + 1
     return max(count, key=lambda place: (count[place], -place)) if count else None
 
 
@@ -218,40 +215,22 @@ def assumed(graph: Graph, condition: int, holds: bool) -> Graph:
         if node.op == "and" and holds:
             known |= dict.fromkeys(node.args, True)
             waiting += node.args
-    at_least = {graph.nodes[p].args for p, value in known.items() if value and _is_le(graph, p)}
-    result, place_of = Graph(), dict[int, int]()
-    for place, node in enumerate(graph.nodes):
+    at_least = {graph.nodes[p].args for p in known if known[p] and graph.nodes[p].op == "le"}
+
+    def change(result: Graph, place: int, node: Node, place_of: Mapping[int, int]) -> int:
         if place in known:
-            place_of[place] = result.constant(float(known[place]))
-        elif node.op == "fmax" and (node.args in at_least or node.args[::-1] in at_least):
-            larger = node.args[1] if node.args in at_least else node.args[0]
-            place_of[place] = place_of[larger]
-        else:
-            moved = Node(
-                node.op, tuple(place_of[a] for a in node.args), node.value, node.port, node.entry
-            )
-            place_of[place] = result.add(moved)
-    result.outputs = [[place_of[p] for p in entries] for entries in graph.outputs]
-    return result
+            return result.constant(float(known[place]))
+        if node.op == "fmax":
+            one, other = graph.nodes[place].args
+            for smaller, larger in ((one, other), (other, one)):
+                if (smaller, larger) in at_least:
+                    return place_of[larger]
+        return result.add(node)
 
-
-def _is_le(graph: Graph, place: int) -> bool:
-    return graph.nodes[place].op == "le"
+    return rebuilt(graph, change)
 
 
 # A function whose numbers are an input: one library for all cars that are built alike.
-
-
-def _as_casadi(number: int) -> Callable[..., Any]:
-    def build(*arguments: Any) -> Any:
-        make = ca.SX.unary if len(arguments) == 1 else ca.SX.binary
-        return make(number, *arguments)
-
-    return build
-
-
-# Of every operation that CasADi has, and of ours.
-_ALL_BUILDERS = {name: _as_casadi(number) for number, name in OPERATIONS.items()} | dict(BUILDERS)
 
 
 @simplifying(False)
@@ -272,4 +251,4 @@ def lifted(function: ca.Function, port: str = "constants") -> tuple[ca.Function,
     results = [ca.SX(*function.size_out(i)) for i in range(function.n_out())]
     ports.append(ca.SX.sym(port, values.size))
     like = ca.Function(function.name(), ports, results, names, function.name_out())
-    return function_of(graph, like, _ALL_BUILDERS), values
+    return function_of(graph, like), values

@@ -5,13 +5,11 @@ Without a C compiler that works the CasADi virtual machine does the same, more s
 
 import ctypes
 import logging
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple, TypeAlias
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from codegen.compiler import CompilationError, load_library
@@ -58,27 +56,6 @@ int {name}_scan(long n, long every, const double** arg, const long* arg_step,
 """
 
 
-_Longs: TypeAlias = "ctypes.Array[ctypes.c_long]"
-
-
-_ADDRESSES = ("loop", "layout")  # of a scan, found when they are asked for
-
-
-class _Layout(NamedTuple):
-    """What is alike in every call of a compiled loop: places and sizes of ports, for C."""
-
-    arg_step: _Longs
-    carry_arg: _Longs
-    carry_res: _Longs
-    carry_size: _Longs
-    out_res: _Longs
-    out_size: _Longs
-    sz_arg: int
-    sz_res: int
-    sz_iw: int
-    sz_w: int
-
-
 class Scan:
     """A step function run over samples, `carry, outputs = step(carry, sample, constants)`.
     step : a function with named, dense ports. An input `p` named in `carry` has an output `p_next`
@@ -95,33 +72,25 @@ class Scan:
         over: tuple[str, ...],
         flags: tuple[str, ...] | None = None,
     ) -> None:
-        names_in, names_out = list(step.name_in()), list(step.name_out())
+        name = step.name()
+        self._size_in = {p: step.size_in(p) for p in step.name_in()}
+        self._size_out = {p: step.size_out(p) for p in step.name_out()}
         for port in (*carry, *over):
-            if port not in names_in:
-                raise ValueError(f"{step.name()} has no input {port!r}, only {names_in}")
+            if port not in self._size_in:
+                raise ValueError(f"{name} has no input {port!r}, only {[*self._size_in]}")
         for port in carry:
-            if f"{port}_next" not in names_out:
-                raise ValueError(
-                    f"{step.name()} has no output {port + '_next'!r}, only {names_out}"
-                )
-            if step.size_in(port) != step.size_out(f"{port}_next"):
-                raise ValueError(
-                    f"{step.name()}: {port} changes its shape from one step to the next"
-                )
-        for i in range(step.n_in()):
-            if not step.sparsity_in(i).is_dense():
-                raise ValueError(f"{step.name()}: input {names_in[i]!r} must be dense")
-        for i in range(step.n_out()):
-            if not step.sparsity_out(i).is_dense():
-                raise ValueError(f"{step.name()}: output {names_out[i]!r} must be dense")
+            if self._size_out.get(after := f"{port}_next") != self._size_in[port]:
+                known = [*self._size_out]
+                raise ValueError(f"{name} has no output {after!r} as large as {port}, only {known}")
+        ports = [*map(step.sparsity_in, self._size_in), *map(step.sparsity_out, self._size_out)]
+        if not all(port.is_dense() for port in ports):
+            raise ValueError(f"{name}: inputs and outputs must be dense")
         self.step = step
         self.carry = carry
         self.over = over
         self.flags = flags
-        self.constants = tuple(p for p in names_in if p not in carry and p not in over)
-        self.outputs = tuple(p for p in names_out if p.removesuffix("_next") not in carry)
-        self._size_in = {p: step.size_in(p) for p in names_in}
-        self._size_out = {p: step.size_out(p) for p in names_out}
+        self.constants = tuple(p for p in self._size_in if p not in carry and p not in over)
+        self.outputs = tuple(p for p in self._size_out if p.removesuffix("_next") not in carry)
 
     def zeros(self) -> dict[str, Array]:
         """Return zeros of every carried port, in its shape."""
@@ -129,8 +98,8 @@ class Scan:
         return {p: np.zeros(n if m == 1 else (n, m)) for p, (n, m) in sizes.items()}
 
     def __getstate__(self) -> dict[str, object]:
-        """Return what it is made of: what points into this process is loaded anew in another."""
-        return {name: value for name, value in vars(self).items() if name not in _ADDRESSES}
+        """Return what it is made of: the loop of this process is loaded anew in another."""
+        return {name: value for name, value in vars(self).items() if name != "loop"}
 
     @cached_property
     def loop(self) -> "ctypes._NamedFuncPointer | None":
@@ -146,25 +115,6 @@ class Scan:
             log.warning("running in the CasADi virtual machine, more slowly: %s", reason)
             return None
         return None if library is None else library[f"{name}_scan"]
-
-    @cached_property
-    def layout(self) -> _Layout:
-        """Places and sizes of the ports, as the loop wants them."""
-        step = self.step
-        names_in, names_out = list(self._size_in), list(self._size_out)
-        strides = [step.numel_in(p) if p in self.over else 0 for p in names_in]
-        return _Layout(
-            arg_step=_longs([*strides, -1]),
-            carry_arg=_longs([names_in.index(p) for p in self.carry]),
-            carry_res=_longs([names_out.index(f"{p}_next") for p in self.carry]),
-            carry_size=_longs([step.numel_in(p) for p in self.carry]),
-            out_res=_longs([names_out.index(p) for p in self.outputs]),
-            out_size=_longs([step.numel_out(p) for p in self.outputs]),
-            sz_arg=max(step.sz_arg(), len(names_in)),
-            sz_res=max(step.sz_res(), len(names_out)),
-            sz_iw=max(step.sz_iw(), 1),
-            sz_w=max(step.sz_w(), 1),
-        )
 
     def __call__(
         self,
@@ -189,21 +139,22 @@ class Scan:
         1, *shape); for each other output that is recorded its value (n_recorded, *shape). Column
         vectors have the shape (n_recorded, size).
         """
-        packed = self.packed(n, values)
-        if every < 1:
-            raise ValueError(f"every must be at least 1, it is {every}")
+        packed, step = self.packed(n, values), self.step
         recorded = set(self.carry) | set(self.outputs)
         if ports is not None:
             if unknown := sorted(set(ports) - recorded):
-                raise ValueError(
-                    f"{self.step.name()} records no {unknown}, only {sorted(recorded)}"
-                )
+                raise ValueError(f"{step.name()} records no {unknown}, only {sorted(recorded)}")
             recorded &= set(ports)
-        return (
-            self._run_virtual_machine(n, packed, every, recorded)
-            if self.loop is None
-            else self._run_compiled(self.loop, n, packed, every, recorded)
-        )
+        rows = -(-n // every)
+        sizes = {p: (rows + 1, packed[p].size) for p in self.carry}
+        sizes |= {p: (rows, step.numel_out(p)) for p in self.outputs}
+        record = {p: np.empty(size) for p, size in sizes.items() if p in recorded}
+        now = [packed[p].copy() for p in self.carry]
+        following = [np.empty_like(a) for a in now]
+        spare = [np.empty(step.numel_out(p)) for p in self.outputs]
+        self.runner(n, packed, now, following, spare, record, every)()
+        last = dict(zip(self.carry, following if n % 2 else now, strict=True))
+        return self._shape_all(record, last)
 
     def packed(self, n: int, values: Mapping[str, Array]) -> dict[str, Array]:
         """Check shapes; flatten matrices by columns, as CasADi stores them.
@@ -219,18 +170,12 @@ class Scan:
         for port, value in values.items():
             rows, columns = self._size_in[port]
             array = np.asarray(value, dtype=np.float64)
-            expected_shape = (n, rows * columns) if port in self.over else (rows, columns)
-            if (
-                array.ndim < 2
-                and 1 in expected_shape
-                and array.size == expected_shape[0] * expected_shape[1]
-            ):
-                array = array.reshape(expected_shape)  # a column given flat, a scalar given bare
-            if array.shape != expected_shape:
+            shape = (n, rows * columns) if port in self.over else (rows, columns)
+            if array.ndim < 2 and 1 in shape and array.size == shape[0] * shape[1]:
+                array = array.reshape(shape)  # a column given flat, a scalar given bare
+            if array.shape != shape:
                 name = self.step.name()
-                raise ValueError(
-                    f"{name}: {port} must have shape {expected_shape}, not {array.shape}"
-                )
+                raise ValueError(f"{name}: {port} must have shape {shape}, not {array.shape}")
             by_columns = array if port in self.over else array.ravel(order="F")
             packed[port] = np.ascontiguousarray(by_columns)
         return packed
@@ -248,102 +193,89 @@ class Scan:
                 found[port] = _shaped(flat, self._size_out[port])
         return found
 
-    def _run_compiled(
-        self,
-        loop: "ctypes._NamedFuncPointer",
-        n: int,
-        packed: dict[str, Array],
-        every: int,
-        recorded: Collection[str],
-    ) -> dict[str, Array]:
-        n_rows = -(-n // every)
-        now = [packed[p].copy() for p in self.carry]
-        following = [np.empty_like(a) for a in now]
-        record = {
-            p: np.empty((n_rows + 1, a.size))
-            for p, a in zip(self.carry, now, strict=True)
-            if p in recorded
-        } | {p: np.empty((n_rows, self.step.numel_out(p))) for p in self.outputs if p in recorded}
-        scratch = [np.empty(self.step.numel_out(p)) for p in self.outputs]
-        arguments, kept = self.arguments(n, every, packed, now, following, scratch, record)
-        failed = loop(*arguments)
-        del kept  # which the loop alone knows
-        if failed:
-            raise RuntimeError(f"{self.step.name()} reported a failure")
-        last = dict(zip(self.carry, following if n % 2 else now, strict=True))
-        return self._shape_all(record, last)
-
-    def arguments(
+    def runner(
         self,
         n: int,
-        every: int,
         packed: Mapping[str, Array],
         now: Sequence[Array],
         following: Sequence[Array],
-        scratch: Sequence[Array],
+        spare: Sequence[Array],
         record: Mapping[str, Array],
-    ) -> tuple[list[object], list[NDArray[Any]]]:
-        """Return the arguments of the compiled loop, and what must live as long as these.
-        now, following : of carried ports, before and after a sample.   scratch : of the outputs.
+        every: int = 1,
+    ) -> Callable[[], None]:
+        """Return what runs samples in this memory; the next call goes on where one ended.
+        now, following : of carried ports, before and after a sample; they change places at each.
+        spare : of the outputs, where they are not recorded.
         record : of ports that are recorded.
         """
-        layout = self.layout
-        kept: list[NDArray[Any]] = [np.empty(layout.sz_iw, dtype=np.int64), np.empty(layout.sz_w)]
+        step, loop = self.step, self.loop
+        if loop is None:
+            return self._virtual_machine(n, packed, now, following, spare, record, every)
+        carry, outputs = self.carry, self.outputs
+        work = np.empty(max(step.sz_iw(), 1), dtype=np.int64), np.empty(max(step.sz_w(), 1))
+        strides = [step.numel_in(p) if p in self.over else 0 for p in self._size_in]
         arguments: list[object] = [
             ctypes.c_long(n),
             ctypes.c_long(every),
-            _pointers([packed[port] for port in self._size_in]),
-            layout.arg_step,
-            ctypes.c_long(len(self.carry)),
-            layout.carry_arg,
-            layout.carry_res,
-            layout.carry_size,
+            _pointers([packed[p] for p in self._size_in]),
+            _longs([*strides, -1]),
+            ctypes.c_long(len(carry)),
+            _longs([step.index_in(p) for p in carry]),
+            _longs([step.index_out(f"{p}_next") for p in carry]),
+            _longs([step.numel_in(p) for p in carry]),
             _pointers(now),
             _pointers(following),
-            _pointers([record.get(port) for port in self.carry]),
-            ctypes.c_long(len(self.outputs)),
-            layout.out_res,
-            layout.out_size,
-            _pointers([record.get(port) for port in self.outputs]),
-            _pointers(scratch),
-            (ctypes.c_void_p * layout.sz_arg)(),
-            (ctypes.c_void_p * layout.sz_res)(),
-            *(one.ctypes.data_as(ctypes.c_void_p) for one in kept),
+            _pointers([record.get(p) for p in carry]),
+            ctypes.c_long(len(outputs)),
+            _longs([step.index_out(p) for p in outputs]),
+            _longs([step.numel_out(p) for p in outputs]),
+            _pointers([record.get(p) for p in outputs]),
+            _pointers(spare),
+            (ctypes.c_void_p * max(step.sz_arg(), step.n_in()))(),
+            (ctypes.c_void_p * max(step.sz_res(), step.n_out()))(),
+            *(one.ctypes.data_as(ctypes.c_void_p) for one in work),
         ]
-        return arguments, kept
+        memory = (packed, now, following, spare, record, work)  # alive as long as the pointers
 
-    def _run_virtual_machine(
-        self, n: int, packed: dict[str, Array], every: int, recorded: Collection[str]
-    ) -> dict[str, Array]:
+        def run(_memory: object = memory) -> None:
+            if loop(*arguments):
+                raise RuntimeError(f"{step.name()} reported a failure")
+
+        return run
+
+    def _virtual_machine(
+        self,
+        n: int,
+        packed: Mapping[str, Array],
+        now: Sequence[Array],
+        following: Sequence[Array],
+        spare: Sequence[Array],
+        record: Mapping[str, Array],
+        every: int,
+    ) -> Callable[[], None]:
+        """Return what does the same as the compiled loop, statement by statement of `LOOP`."""
         step = self.step
-        specialized = step.mapaccum(
-            f"{step.name()}_{n}",
-            n,
-            [step.index_in(p) for p in self.carry],
-            [step.index_out(f"{p}_next") for p in self.carry],
-        )
-        arguments = []
-        for port in step.name_in():
-            rows, columns = step.size_in(port)
-            value = packed[port]
-            if port in self.over:  # mapaccum lays samples side by side, (rows, n columns)
-                arguments.append(value.reshape(n * columns, rows).T)
-            else:
-                start = value.reshape(columns, rows).T
-                arguments.append(start if port in self.carry else np.tile(start, (1, n)))
-        results = dict(
-            zip(step.name_out(), specialized.call([ca.DM(a) for a in arguments]), strict=True)
-        )
-        record, last = {}, {}
-        for port in self.carry:
-            after = np.array(results[f"{port}_next"]).T.reshape(n, -1)
-            last[port] = after[-1]
-            if port in recorded:
-                before = np.vstack([packed[port][None], after[:-1]])[::every]
-                record[port] = np.vstack([before, after[-1:]])
-        for port in (port for port in self.outputs if port in recorded):
-            record[port] = np.array(results[port]).T.reshape(n, -1)[::every]
-        return self._shape_all(record, last)
+        memory, evaluate = step.buffer()
+
+        def run() -> None:
+            nonlocal now, following
+            for k in range(n):
+                row, skipped = divmod(k, every)
+                for port in (*self.over, *self.constants):
+                    value = packed[port][k] if port in self.over else packed[port]
+                    memory.set_arg(step.index_in(port), memoryview(value))
+                for port, before, after in zip(self.carry, now, following, strict=True):
+                    memory.set_arg(step.index_in(port), memoryview(before))
+                    memory.set_res(step.index_out(f"{port}_next"), memoryview(after))
+                    if not skipped and port in record:
+                        record[port][row] = before
+                for port, other in zip(self.outputs, spare, strict=True):
+                    here = record[port][row] if not skipped and port in record else other
+                    memory.set_res(step.index_out(port), memoryview(here))
+                evaluate()
+                now, following = following, now
+
+        return run
 
 
 def _pointers(arrays: Sequence[Array | None]) -> "ctypes.Array[ctypes.c_void_p]":
@@ -387,40 +319,21 @@ class Stepper:
         step = scan.step
         rows = {port: np.zeros((samples, step.numel_in(port))) for port in scan.over}
         packed = scan.packed(samples, {**values, **rows})
-        self._scan, self._constants = scan, {port: values[port] for port in scan.constants}
         self._sizes = {port: step.size_in(port) for port in scan.carry}
-        self._samples, self._rows = samples, {port: packed[port] for port in scan.over}
+        self._samples = samples
         flat = samples == 1
-        self.inputs = {port: row[0] if flat else row for port, row in self._rows.items()}
+        self.inputs = {p: packed[p][0] if flat else packed[p] for p in scan.over}
         self.outputs = {port: np.zeros(step.numel_out(port)) for port in scan.outputs}
         self._now = {port: packed[port].copy() for port in scan.carry}
         self._before = {port: np.empty_like(array) for port, array in self._now.items()}
-        self._loop = scan.loop
-        if self._loop is not None:
-            now, before, out = (
-                list(one.values()) for one in (self._now, self._before, self.outputs)
-            )
-            self._arguments, kept = scan.arguments(samples, samples, packed, now, before, out, {})
-            self._kept = [*packed.values(), *kept]  # that only the loop knows
+        memory = (list(one.values()) for one in (self._now, self._before, self.outputs))
+        self._run = scan.runner(samples, packed, *memory, record={})
 
     def advance(self) -> None:
         """Take the samples that `inputs` holds; leave what the last one tells in `outputs`."""
-        if self._loop is None:
-            self._advance_slowly()
-            return
-        if self._loop(*self._arguments):
-            raise RuntimeError(f"{self._scan.step.name()} reported a failure")
+        self._run()
         if self._samples % 2:
             self._now, self._before = self._before, self._now
-
-    def _advance_slowly(self) -> None:
-        n = self._samples
-        record = self._scan(n, {**self.state(), **self._rows, **self._constants})
-        for port, array in self.outputs.items():
-            array[:] = record[port][-1].ravel(order="F")
-        for port, array in self._now.items():
-            self._before[port][:] = record[port][-1].ravel(order="F")
-            array[:] = record[f"{port}_final"].ravel(order="F")
 
     def begin(self, port: str, value: Array) -> None:
         """Go on from another value of a carried port.

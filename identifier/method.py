@@ -5,24 +5,20 @@ the same code; they differ in the `Method` that is handed over.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, is_dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar, cast
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar, cast
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
 from identifier.certificate import Certificate
 from identifier.driving import Driving
-from identifier.setup import AXLE_FORCE, HALF_BAND, Block, Port, Setup
+from identifier.setup import AXLE_FORCE, HALF_BAND, Port, Setup
 from identifier.tire_model import Reached, TireModel
 from models.recordings import Recording
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from identifier.axle.guarantee import HalfSpaces
     from identifier.inertial.beliefs import Body
 
 
@@ -55,32 +51,6 @@ class Track(NamedTuple):
     values: Array
 
 
-class Run(Protocol):
-    """A run of a method over a recording, as a method is asked about it."""
-
-    @property
-    def vehicle(self) -> Vehicle:
-        """The car, as far as the method knew it."""
-
-    @property
-    def recording(self) -> Recording:
-        """What it ran over."""
-
-    @property
-    def start(self) -> TireModel | None:
-        """The stored model that it began with; None where it began afresh."""
-
-    def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
-        """Yield state and outputs over parts of the recording.
-        samples : rising indices; blocks without one are left out. None yields all.
-        """
-
-    def state_at(self, t: float) -> dict[str, Array]:
-        """Return the carried values in effect at a time.
-        t : time in the recording's own clock [s].
-        """
-
-
 class Accelerometer(NamedTuple):
     """What of an accelerometer's a_y a method takes for no force of the tires.
 
@@ -96,12 +66,11 @@ class Accelerometer(NamedTuple):
 class Limits(NamedTuple):
     """Where the estimates of a method stay, whatever is measured.
 
-    boxes : least and largest of each number, by name and unit.   curves : weights that the curve of
-    a tire can have.   active : of carried values the estimates at active bounds.
+    boxes : least and largest of each number, by name and unit.   active : of carried values the
+    estimates at active bounds.
     """
 
     boxes: Mapping[str, Any]
-    curves: "HalfSpaces"
     active: Callable[[Mapping[str, Array]], tuple[Reached, ...]] = lambda _: ()
 
 
@@ -180,11 +149,6 @@ class Method(ABC):
         """Return what is proven of it: its limits, where a method does not say more."""
         del vehicle, driving
         return Certificate(limits={} if self.limits is None else self.limits.boxes)
-
-    def certify_along(self, history: Run) -> Certificate:
-        """Return what is proven of what a run of it taught: nothing, where it does not say more."""
-        del history
-        return Certificate()
 
     def numbers(self) -> dict[str, Any]:
         """Return all that was chosen, as plain data: gains, network, the rest and the seed.

@@ -6,13 +6,12 @@ by entry points of the group `tireid.methods`: a name, and a factory. Built-in n
 """
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 from codegen.plugins import installed
 from identifier.axle.design import AxleIdentifier
 from identifier.axle.model import AxleModel
-from identifier.baselines import LaggedEkf, LinearBaseline, magic_formula_ekf
+from identifier.baselines import LaggedEkf, LinearBaseline
 from identifier.certificate import Certificate
 from identifier.driving import Driving
 from identifier.estimate.method import FitMethod
@@ -50,8 +49,6 @@ METHODS: Mapping[str, Factory] = {
     WITHOUT_V_Y: _seedless(InertialIdentifier.for_vehicle),
     **{law: _paper(law) for law in VARIANTS},
     "linear": _seedless(LinearBaseline.for_vehicle),
-    "magic_formula_ekf": _seedless(magic_formula_ekf),
-    "textbook_ekf": _seedless(partial(magic_formula_ekf, textbook=True)),
     "lagged_ekf": _seedless(LaggedEkf.for_vehicle),
 }
 
@@ -68,8 +65,9 @@ LEARNERS: Mapping[str, Callable[[Any, Vehicle, float], Method]] = {
 
 
 GROUP = "tireid.methods"
-# What benchmarks/rivals has, a distribution of its own: who asks for one learns where it is.
-_RIVALS = ("linear_kf", "joint_ekf", "washout", "mhe")
+# What benchmarks/rivals has, a distribution of its own, and how it is installed.
+RIVALS = ("magic_formula_ekf", "textbook_ekf", "linear_kf", "joint_ekf")
+INSTALL = "pip install ./benchmarks/rivals in a clone of the repository"
 
 
 def draws_weights(name: str) -> bool:
@@ -116,9 +114,8 @@ def require_method(name: str) -> None:
     """
     if name in methods():
         return
-    if name in _RIVALS:
-        place = "pip install ./benchmarks/rivals in a clone of the repository"
-        raise ValueError(f"method {name} is not installed: {place}")
+    if name in RIVALS:
+        raise ValueError(f"method {name} is not installed: {INSTALL}")
     raise ValueError(f"method must be one of {', '.join(methods())}, not {name!r}")
 
 

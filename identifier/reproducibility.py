@@ -183,13 +183,13 @@ def _side(force: Array, reference: Array | None, where: NDArray[np.bool_]) -> Ax
 
 def online_error(history: History, *, since: float | None = None) -> AxleRmse | None:
     """Return the error of the forces identified online, None without truth or without such forces.
-    history : an online run; samples below the design's minimum speed do not count.
+    history : an online run; samples below the method's minimum speed do not count.
     since : samples before this time [s] do not count; None counts all.
     """
     truth = history.recording.axle_force
     if truth is None or not history.online:
         return None
-    counted = counted_samples(history.recording, history.design.min_speed, since)
+    counted = counted_samples(history.recording, history.method.min_speed, since)
     return axle_rms(history.axle_force, counted, truth)
 
 
@@ -200,4 +200,4 @@ def force_rms(history: History, *, since: float | None = None) -> AxleRmse | Non
     truth = history.recording.axle_force
     if truth is None:
         return None
-    return axle_rms(truth, counted_samples(history.recording, history.design.min_speed, since))
+    return axle_rms(truth, counted_samples(history.recording, history.method.min_speed, since))

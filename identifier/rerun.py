@@ -4,7 +4,7 @@ Of the numbers of a sample, more than a hundred, a user looks at a dozen; to wri
 memory takes as long as to compute them. Only what was carried into each block is kept of the way.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Literal, NamedTuple
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, large
-from identifier.setup import AXLE_FORCE, Block, Setup
+from identifier.setup import AXLE_FORCE, Block, OnDemand, Setup
 from models.recordings import Recording
 
 Kind = Literal["state", "outputs"]
@@ -67,9 +67,9 @@ class Rerun:
             if len(self.begins) == 1:
                 self._found[k] = found
             of = partial(self._of_block, k, found)
-            state = _OnDemand(self.ports("state"), partial(of, "state"))
-            outputs = _OnDemand(self.ports("outputs"), partial(of, "outputs"))
-            after = _OnDemand(self.ports("state"), partial(_last_row, state))
+            state = OnDemand(self.ports("state"), partial(of, "state"))
+            outputs = OnDemand(self.ports("outputs"), partial(of, "outputs"))
+            after = OnDemand(self.ports("state"), partial(_last, state))
             yield Block(part, state, outputs, after)
 
     def _of_block(self, k: int, found: _Found, kind: Kind, port: str) -> Array:
@@ -112,35 +112,11 @@ def holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
     return bool(first < last)
 
 
-def _last_row(state: Mapping[str, Array], port: str) -> Array:
-    last: Array = state[port][-1]
-    return last
+def _last(state: Mapping[str, Array], port: str) -> Array:
+    return state[port][-1]
 
 
-class _OnDemand(Mapping[str, Array]):
-    """Values by port, each computed when it is asked for."""
-
-    def __init__(self, ports: tuple[str, ...], compute: Callable[[str], Array]) -> None:
-        self._ports, self._compute = ports, compute
-
-    def __getitem__(self, port: str) -> Array:
-        if port not in self._ports:
-            raise KeyError(port)
-        return self._compute(port)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._ports)
-
-    def __len__(self) -> int:
-        """Return how many ports there are."""
-        return len(self._ports)
-
-    def __contains__(self, port: object) -> bool:
-        """Return whether there is such a port, without computing it."""
-        return port in self._ports
-
-
-class Recalled(_OnDemand):
+class Recalled(OnDemand):
     """By port, what a run records: computed again when it is asked for.
     kind : "state" or "outputs".
     """

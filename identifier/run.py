@@ -53,7 +53,7 @@ class History:
     """
 
     vehicle: Vehicle
-    design: Method
+    method: Method
     recording: Recording
     axle_force: Array
     state: Mapping[str, Array]
@@ -65,7 +65,7 @@ class History:
     @property
     def online(self) -> bool:
         """Whether forces were identified sample by sample, not from the whole recording at once."""
-        return not self.design.whole
+        return not self.method.whole
 
     @property
     def diverged_at(self) -> float | None:
@@ -77,24 +77,9 @@ class History:
                 return float(self.recording.t[part][np.argmin(sane)])
         return None
 
-    @property
-    def tracks(self) -> tuple[Track, ...]:
-        """What the method says it had learnt of the axles at each sample."""
-        joined: tuple[Track, ...] = ()
-        for block in self.blocks():
-            tracks = self.tracks_over(block)
-            if block.part == slice(0, len(self.recording)):
-                return tracks
-            if not joined:
-                shape = (len(self.recording), 2)
-                joined = tuple(track._replace(values=large(shape)) for track in tracks)
-            for track, here in zip(joined, tracks, strict=True):
-                track.values[block.part] = here.values
-        return joined
-
     def tracks_over(self, block: Block) -> tuple[Track, ...]:
         """Return what the method says it had learnt of the axles over a block of the run."""
-        return self.design.tracks(self.vehicle, block.before)
+        return self.method.tracks(self.vehicle, block.before)
 
     def blocks(self, samples: NDArray[np.intp] | None = None) -> Iterator[Block]:
         """Yield the run block by block: state and outputs over parts of the recording.
@@ -128,7 +113,7 @@ class History:
         t : time in the recording's own clock [s]; None is the end.
         """
         t = float(self.recording.t[-1]) if t is None else t
-        if (whole := self.design.whole) is not None:
+        if (whole := self.method.whole) is not None:
             n = max(state_index(self.recording, t), 1)
             if n not in self.models:
                 driven = self.recording.taken(slice(0, n))
@@ -138,13 +123,13 @@ class History:
         diverged_at = self.diverged_at
         if diverged_at is not None and diverged_at <= t:
             raise DivergedError(f"the method diverged at {diverged_at:g} s, before {t:g} s")
-        return self.design.frozen(self.vehicle, state)
+        return self.method.frozen(self.vehicle, state)
 
     def asked(self, recording: Recording, t: float | None = None) -> "History":
         """Return what the model frozen at a time says of another recording, which teaches nothing.
         t : time of the freeze in this recording's own clock [s]; None is the end.
         """
-        if (whole := self.design.whole) is None:
+        if (whole := self.method.whole) is None:
             raise ValueError(
                 "a run that learns sample by sample cannot be asked about another drive: "
                 "freeze it and predict"
@@ -167,7 +152,7 @@ class History:
         for one in recordings:
             end = first + len(one)
             whole = self.recording
-            if one.v_y is None or (self.design.whole and not whole.estimated):
+            if one.v_y is None or (self.method.whole and not whole.estimated):
                 v_y = whole.needed("v_y")[first:end]
                 one = replace(one, v_y=v_y, estimated=whole.estimated)
             state, outputs = self.state, self.outputs
@@ -187,47 +172,47 @@ class History:
 
     def __repr__(self) -> str:
         diverged = "" if self.diverged_at is None else f", diverged at {self.diverged_at:g} s"
-        return f"<{type(self.design).__name__} over {self.recording!r}{diverged}>"
+        return f"<{type(self.method).__name__} over {self.recording!r}{diverged}>"
 
 
 # Running a method over a recording, in compiled code.
 
 
-def check_recording(recording: Recording, design: Method) -> None:
+def check_recording(recording: Recording, method: Method) -> None:
     """Refuse a recording that a method cannot run over."""
-    if abs(recording.dt - design.dt) > 1e-6 * design.dt:
+    if abs(recording.dt - method.dt) > 1e-6 * method.dt:
         raise ValueError(
-            f"{recording.name} is sampled at {recording.dt:g} s, the design at {design.dt:g} s"
+            f"{recording.name} is sampled at {recording.dt:g} s, the method at {method.dt:g} s"
         )
-    for name in design.needs if design.whole is None else ():
+    for name in method.needs if method.whole is None else ():
         if getattr(recording, name) is None:
             raise RecordingError(
                 f"{recording.name}: there is no {name.replace('_', '')}, from which "
-                f"{type(design).__name__} learns"
+                f"{type(method).__name__} learns"
             )
 
 
 def identify(
     recording: Recording,
     vehicle: Vehicle,
-    design: Method,
+    method: Method,
     start: TireModel | None = None,
     *,
     progress: Callable[[float], None] | None = None,
 ) -> History:
     """Run a method over a recording, sample by sample.
-    recording : signals, sampled at the design's interval; its forces are not looked at.
-    design : the method: a `PaperIdentifier` of the paper's identifier, or any other.
+    recording : signals, sampled at the method's interval; its forces are not looked at.
+    method : a `PaperIdentifier` of the paper's identifier, or any other.
     start : stored weights to begin with; None begins afresh.
     progress : called now and then with the share that is done, 0 to 1.
     """
-    recording, whole = _read(recording, vehicle, design), design.whole
+    recording, whole = _read(recording, vehicle, method), method.whole
     if whole is not None:
         model = whole.fitted(recording, vehicle, start, progress)
         recording, outputs = _with_v_y(recording, model)
         return History(
             vehicle=vehicle,
-            design=design,
+            method=method,
             recording=recording,
             axle_force=model.predict(recording),
             state={},
@@ -235,7 +220,7 @@ def identify(
             start=start,
             models={len(recording): model},
         )
-    setup = design.setup(vehicle, start)
+    setup = method.setup(vehicle, start)
     v_y = None if recording.v_y is not None else large((len(recording),))
     force, begins = large((len(recording), 2)), []
     following: Mapping[str, Array] = setup.begun(recording)
@@ -263,7 +248,7 @@ def identify(
         recording = replace(recording, v_y=v_y, estimated=("v_y",))
     return History(
         vehicle=vehicle,
-        design=design,
+        method=method,
         recording=recording,
         axle_force=force,
         state=Recalled(run, "state"),
@@ -272,12 +257,12 @@ def identify(
     )
 
 
-def _read(recording: Recording, vehicle: Vehicle, design: Method) -> Recording:
+def _read(recording: Recording, vehicle: Vehicle, method: Method) -> Recording:
     """Return a log as a method reads it; refuse one that it cannot run over."""
     recording = recording.as_logged()
-    if design.whole is not None:
-        recording = design.whole.reads(recording, vehicle)
-    check_recording(recording, design)
+    if method.whole is not None:
+        recording = method.whole.reads(recording, vehicle)
+    check_recording(recording, method)
     return recording
 
 
@@ -297,21 +282,21 @@ def _with_v_y(recording: Recording, model: TireModel) -> tuple[Recording, Mappin
 def learn(
     recording: Recording,
     vehicle: Vehicle,
-    design: Method,
+    method: Method,
     start: TireModel | None = None,
     t: float | None = None,
 ) -> TireModel:
     """Return what a method has learnt, without a record of the way there: `identify` and freeze.
     t : time of the freeze in the recording's own clock [s]; None is the end.
     """
-    recording = _read(recording, vehicle, design)
+    recording = _read(recording, vehicle, method)
     n = len(recording) if t is None else state_index(recording, t)
-    if design.whole is not None:
-        return design.whole.fitted(recording.taken(slice(0, max(n, 1))), vehicle, start, None)
-    state = design.setup(vehicle, start).last(recording, n)
+    if method.whole is not None:
+        return method.whole.fitted(recording.taken(slice(0, max(n, 1))), vehicle, start, None)
+    state = method.setup(vehicle, start).last(recording, n)
     if not all(np.isfinite(value).all() for value in state.values()):
         raise DivergedError(f"the method diverged within {n} samples")
-    return design.frozen(vehicle, state)
+    return method.frozen(vehicle, state)
 
 
 # A method beside a car that drives: sample in, axle forces out, and the model learnt so far.

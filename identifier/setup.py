@@ -195,26 +195,30 @@ class Block(NamedTuple):
     @property
     def before(self) -> Mapping[str, Array]:
         """Carried values in effect at each sample, by port, (k, ...)."""
-        return _Before(self.state)
+        return OnDemand(self.state, lambda port: self.state[port][:-1])
 
 
-class _Before(Mapping[str, Array]):
-    """Carried values in effect at each sample, of those that have a row after the last.
-    state : by port (k + 1, ...).
-    """
+class OnDemand(Mapping[str, Array]):
+    """Values by port, each computed when it is asked for."""
 
-    def __init__(self, state: Mapping[str, Array]) -> None:
-        self._state = state
+    def __init__(self, ports: Iterable[str], compute: Callable[[str], Array]) -> None:
+        self._ports, self._compute = tuple(ports), compute
 
     def __getitem__(self, port: str) -> Array:
-        return self._state[port][:-1]
+        if port not in self._ports:
+            raise KeyError(port)
+        return self._compute(port)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._state)
+        return iter(self._ports)
 
     def __len__(self) -> int:
         """Return how many ports there are."""
-        return len(self._state)
+        return len(self._ports)
+
+    def __contains__(self, port: object) -> bool:
+        """Return whether there is such a port, without computing it."""
+        return port in self._ports
 
 
 class _Shown(NamedTuple):

@@ -31,7 +31,6 @@ from models.schema import Table, read_json
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
-    from identifier.axle.guarantee import Guarantee
     from identifier.estimate.latent import LateralVelocity
 
 # As summaries and verdicts name what is learnt of an axle.
@@ -339,11 +338,6 @@ class TireModel(ABC):
         """How unsure the forces are; None where the model does not know."""
         return None
 
-    @property
-    def guarantee(self) -> "Guarantee | None":
-        """Between which forces the true ones lie under a bound; None where nobody asked for it."""
-        return None
-
     def estimates(self) -> tuple[Estimate, ...]:
         """Return what a verdict tells of each axle: stiffness, without a doubt that is known."""
         declared = self.vehicle.bicycle[4:]
@@ -505,8 +499,8 @@ def drift(vehicle: Vehicle, slope: Any, v_x: Any) -> Any:
 MODELS: Mapping[str, tuple[str, str]] = {  # module and class by kind, imported where one is read
     "network": ("identifier.paper.network", "NetworkModel"),
     "axle": ("identifier.axle.model", "AxleModel"),
+    "linear": ("identifier.baselines.linear", "LinearModel"),
     "curve": ("identifier.baselines.curves", "CurveModel"),
-    "onnx": ("identifier.own_network", "OnnxModel"),
     "fit": ("identifier.estimate.model", "FittedModel"),
 }
 
@@ -517,6 +511,8 @@ def load_model(path: str | PathLike[str]) -> TireModel:
     table = _stored(path)
     _verdict_of(table)
     kind = table.text("kind")
+    if kind == "onnx":
+        table.refuse("kind", "is an ONNX network: make it a method, as examples/own_network.py")
     if kind not in MODELS:
         table.refuse("kind", f"must be one of {list(MODELS)}, it is {shown(kind)}")
     module, name = MODELS[kind]

@@ -4,7 +4,7 @@ EXTRAS = {
     "parquet": ("pyarrow",), "mat": ("h5py",), "mdf": ("asammdf",), "ros": ("rosbags",),
     "can": ("cantools", "python-can"), "onnx": ("onnx", "onnxruntime", "'casadi>=3.8.2'"),
     "cluster": ("dask", "distributed"),
-    "fleet": ("pyarrow", "dask", "distributed", "fsspec", "duckdb"),
+    "fleet": ("pyarrow", "dask", "distributed", "fsspec"),
 }  # fmt: skip
 
 

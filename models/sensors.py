@@ -95,15 +95,3 @@ def is_shown(channel: str, value: float) -> bool:
     channel : one of `LARGEST_SHOWN`.   value : in its SI unit.
     """
     return abs(value) <= LARGEST_SHOWN[channel]
-
-
-_NORMAL_MEDIAN = 0.6745  # of |x|, for x normal with variance one
-
-
-def white_noise(signal: Array) -> float:
-    """Return the standard deviation of the white part of a signal, by its second differences.
-    Their median is taken: steps and outliers are not noise.
-    signal : samples (n,).
-    """
-    bend = signal[2:] - 2.0 * signal[1:-1] + signal[:-2]
-    return float(np.median(np.abs(bend)) / (_NORMAL_MEDIAN * np.sqrt(6.0)))

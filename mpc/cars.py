@@ -38,6 +38,7 @@ class CarState(NamedTuple):
     inner: Any
 
 
+# Who holds the speed: without an integral, which would lag behind a profile.
 _HOLDING = Driver(gain=2.0, integral_gain=0.0, acceleration_limit=4.0)
 
 
@@ -49,7 +50,6 @@ class DoubleTrackCar:
     vehicle : the car; it needs a chassis.
     tire : of all four wheels; None reads the file named by the chassis.
     friction : of the road; None is what the tire was measured on.
-    driver : who holds the speed; the default has no integral, which would lag behind a profile.
     period : for which the inputs are held [s].
     dt : step of the integration [s], a divisor of the period.
     """
@@ -60,17 +60,16 @@ class DoubleTrackCar:
         tire: Tire | None = None,
         *,
         friction: Friction | None = None,
-        driver: Driver = _HOLDING,
         period: float = 0.01,
         dt: float = 1e-3,
     ) -> None:
-        plant = Plant(vehicle, tire, driver=driver)
+        plant = Plant(vehicle, tire, driver=_HOLDING)
         self._plant = StepwisePlant(plant, friction=friction, period=period, dt=dt)
         self.vehicle = vehicle
         self.tire = plant.tire
         self.friction = self._plant.friction
         self.period = period
-        self.speed_gain = driver.gain
+        self.speed_gain = _HOLDING.gain
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
         """Return the car rolling straight ahead.

@@ -1,19 +1,19 @@
-"""What several tests need: recordings beside the checkout, a seeded generator, figures that cost
-little; what is heavy.
-"""
+"""What several tests need: recordings beside the checkout, a seeded generator, cheap figures."""
 
 import gc
 import os
-import time
-import tomllib
 from fnmatch import fnmatchcase
 from pathlib import Path
 
+import hypothesis
 import numpy as np
 import pytest
 
 from tests.optional_tools import listen, unlisted
 
+# The same examples in every run: no outcome hangs on one draw.
+hypothesis.settings.register_profile("fixed", derandomize=True, database=None)
+hypothesis.settings.load_profile("fixed")
 gc.disable()  # until all is collected: what is imported until then stays
 for flag in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL"):  # packages are built as from a shell
     os.environ.pop(flag, None)
@@ -23,43 +23,16 @@ SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 LONGEST = ("tests/tireid/", "tests/benchmarks/")
 ASKED: set[str] = set()  # commands that the test which runs has looked for or run
 listen(ASKED)
-HEAVY = tomllib.loads(Path(__file__).with_name("heavy.toml").read_text(encoding="utf-8"))["heavy"]
-
-
-def kept(case: str, entry: dict) -> str | None:
-    """The pattern by which a case of a heavy test stays quick, if one does."""
-    return next((pattern for pattern in entry.get("keep", ()) if fnmatchcase(case, pattern)), None)
-
-
-def sort_out(items, entries) -> list[str]:
-    """Mark what is heavy; return the entries, and patterns of them, that nothing in a file meets.
-
-    Files without a test are left out: they are skipped where a package is missing.
-    """
-    by_name = {entry["test"]: entry for entry in entries}
-    files = {item.nodeid.partition("::")[0] for item in items}
-    unmet = {
-        (name, pattern)
-        for name, entry in by_name.items()
-        for pattern in (None, *entry.get("keep", ()))
-        if name.partition("::")[0] in files
-    }
-    for item in items:
-        name, _, case = item.nodeid.partition("[")
-        if name in by_name:
-            pattern = kept(case.removesuffix("]"), by_name[name])
-            unmet.discard((name, pattern))
-            if pattern is None:
-                item.add_marker(pytest.mark.heavy)
-    return sorted(name if pattern is None else f"{name}: {pattern}" for name, pattern in unmet)
 
 
 @pytest.hookimpl(tryfirst=True)  # before -m chooses
-def pytest_collection_modifyitems(config, items):
-    unmet = sort_out(items, HEAVY)
+def pytest_collection_modifyitems(items):
+    """Of a sweep all cases are heavy but those that its mark names."""
+    for item in items:
+        sweep = item.get_closest_marker("sweep")
+        if sweep and not any(fnmatchcase(item.callspec.id, quick) for quick in sweep.args):
+            item.add_marker("heavy")
     items.sort(key=lambda item: not item.nodeid.startswith(LONGEST))
-    if unmet and config.args == config.getini("testpaths") and not config.option.keyword:
-        raise pytest.UsageError("tests/heavy.toml names what is not there: " + ", ".join(unmet))
 
 
 def pytest_collection_finish():
@@ -69,12 +42,8 @@ def pytest_collection_finish():
     gc.enable()
 
 
-def pytest_runtest_setup(item):
-    """Leave out what is heavy and begins after a moment that was told, and say so."""
+def pytest_runtest_setup():
     ASKED.clear()
-    until = os.environ.get("TIREID_HEAVY_UNTIL")
-    if until and item.get_closest_marker("heavy") and time.time() > float(until):
-        pytest.skip("no time is left for what is heavy: `make heavy` runs it")
 
 
 @pytest.hookimpl(wrapper=True)

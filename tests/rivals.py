@@ -2,11 +2,10 @@
 
 import pytest
 
-from identifier.methods import methods
+from identifier.methods import RIVALS, methods
 
 REASON = "needs the rivals: pip install ./benchmarks/rivals"
-NAMES = ("linear_kf", "joint_ekf", "washout")
-INSTALLED = set(NAMES) <= set(methods())
+INSTALLED = set(RIVALS) <= set(methods())
 needs_rivals = pytest.mark.skipif(not INSTALLED, reason=REASON)
 
 

@@ -73,6 +73,7 @@ def test_a_warning_would_be_seen(compiler, tmp_path):
     assert "conver" in compiled(compiler, file, 0).stderr
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("single", [0, 1])
 def test_cppcheck_has_nothing_to_say(single):
     flags = (ROOT / "compile_flags.txt").read_text().split()

@@ -176,7 +176,7 @@ def test_the_interface_is_what_tireid_names_with_its_bases():
     named = {name for names in interface().values() for name in names}
     assert named > {"Vehicle", "AxleIdentifier", "Method", "TireModel", "read_recording"}
     assert "Path" in named  # of `tireid.paths`
-    assert named > {"Band", "Guarantee", "Drives"}  # of `tire.band` and so on
+    assert named > {"Band", "Drives"}  # of `tire.band` and so on
     assert not named & {"Tracker", "Scan", "gate"}
 
 
@@ -311,25 +311,3 @@ def test_every_page_is_in_the_table_of_contents():
     files = [*DOCUMENTS[2:], *(ROOT / "docs").rglob("*.ipynb")]
     pages = {p.relative_to(ROOT / "docs").with_suffix("").as_posix() for p in files}
     assert listed == pages - {"index"}
-
-
-def written_twice(text: str) -> list[str]:
-    """Folders that the commands of a document, run in their order, find written by an earlier one.
-
-    A store of a fleet grows; what is forced replaces.
-    """
-    lines = "\n".join(re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S)).splitlines()
-    commands = [re.sub(r"\s#.*", "", line) for line in lines if "--force" not in line]
-    found = [re.search(r"^tireid (?!fleet).* --(?:out|repair) (\S+)", line) for line in commands]
-    names = [match[1] for match in found if match]
-    return sorted({name for name in names if names.count(name) > 1})
-
-
-def test_no_command_of_a_document_meets_the_folder_of_another():
-    for path in DOCUMENTS:
-        assert not written_twice(path.read_text(encoding="utf-8")), path
-    twice = (
-        "```sh\ntireid export --out a\n```\n\n```sh\ntireid export --band --out a  # --force\n```\n"
-    )
-    assert written_twice(twice) == []
-    assert written_twice(twice.replace("  # --force", "")) == ["a"]

@@ -6,7 +6,6 @@ import re
 import shlex
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tireid.cli import build_parser
@@ -47,17 +46,6 @@ def test_what_was_learnt_from_a_log_predicts_another_drive(executed):
     assert prediction.against_truth.both < 0.06 * prediction.true_force.both
     assert prediction.against_truth.both < 0.1 * before.against_truth.both
     assert executed["again"].to_dict() == executed["tire"].to_dict()
-
-
-@pytest.mark.parametrize("executed", ["from_a_tire_to_a_controller"], indirect=True)
-def test_controllers_on_a_learnt_tire_steer_and_its_c_passes_its_own_test(executed):
-    assert 0.0 < executed["furthest"]["identified"] < 0.25 * executed["LANE"]
-    assert abs(executed["Y"][-1]) < 0.01
-    assert executed["rms"]["identified"] < 0.5 * executed["rms"]["linear"]
-    assert (executed["exported"].folder / "include").is_dir()
-    if "test" in executed:
-        assert executed["test"].returncode == 0 and "100% tests passed" in executed["test"].stdout
-    assert np.isfinite(executed["gains"]["identified"]).all()
 
 
 @pytest.fixture
@@ -117,5 +105,5 @@ def test_the_gallery_shows_figures_of_commands_that_there_are(capsys):
     assert strangers(gallery) == []
     planted = gallery.replace("tireid plan --vehicle", "tireid plan --wagon")
     found = strangers(planted)
-    assert len(found) == 3 and found[0].startswith("tireid plan --wagon")
-    assert found[1:] == ["plan/area.png", "plan/band.png"]
+    assert len(found) == 2 and found[0].startswith("tireid plan --wagon")
+    assert found[1:] == ["plan/maneuver.png"]

@@ -59,14 +59,3 @@ def test_a_stranger_that_was_imported_first_is_named(tmp_path, file):
         f"ImportError: {place} hides the package '{name}' of tireid, as it was imported first: "
         "rename it"
     )
-
-
-def test_own_packages_that_were_imported_first_are_fine(tmp_path):
-    ran = run_in(tmp_path, "-c", f"import models.vehicle, codegen; {SEDAN}")
-    assert (ran.stdout, ran.stderr) == ("sedan\n", "")
-
-
-def test_other_modules_are_found_as_ever(tmp_path):
-    (tmp_path / "mine.py").write_text("print('mine')\n")
-    ran = run_in(tmp_path, "-c", "import tireid, mine")
-    assert (ran.stdout, ran.stderr) == ("mine\n", "")

@@ -61,18 +61,6 @@ def test_a_number_that_drifted_or_stands_beside_the_wrong_measure_would_be_seen(
             check_tables("\n".join([*lines[:own], *planted, *lines[own + 2 :]]))
 
 
-WORDS = 700
-
-
-def test_the_readme_is_short_and_begins_with_what_a_visitor_looks_for():
-    assert len(README.split()) <= WORDS
-    first = README.split("## ")[0]
-    assert first.count("![") == 1 and first.count("```sh\nmake demo") == 1
-    (table,) = (part for part in README.split("\n\n") if part.startswith("| task |"))
-    rows = [line for line in table.splitlines() if line.startswith("|")]
-    assert len(rows) == 2 + 5
-
-
 def test_the_example_identifies_the_tire(tmp_path, monkeypatch, capsys):
     """On another drive the model error is below 8 % of either force."""
     monkeypatch.chdir(tmp_path)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from models.extras import EXTRAS, needs
+from models.extras import EXTRAS
 from tests.sources import nodes_of
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -104,37 +104,9 @@ def test_a_dependency_without_a_lower_bound_is_refused():
         lowest({"dependencies": ["numpy"], "optional-dependencies": {}}, [])
 
 
-def test_an_extra_that_names_others_asks_for_all_of_theirs():
-    optional = {"a": ["one>=1"], "b": ["car[a,c]", "two>=2"], "c": ["car[b]", "one>=1", "x[y]>=3"]}
-    project = {"name": "car", "dependencies": ["zero>=0"], "optional-dependencies": optional}
-    found = LOWEST["requirements"](project, ["b"])
-    assert sorted(found) == ["one>=1", "one>=1", "two>=2", "x[y]>=3", "zero>=0"]
-    asked = {name for name, _ in wanted(["test"])}
-    for extra in ("parquet", "mat", "mdf", "ros", "can", "fmu", "onnx", "cluster", "commonroad"):
-        assert {name for name, _ in wanted([extra])} <= asked
-    assert LOWEST["lowest"](PROJECT, ["logs"])[0] == "casadi==3.7.0"
-
-
 @pytest.mark.parametrize("extra", EXTRAS)
 def test_what_a_message_says_to_install_is_the_whole_extra(extra):
     told = {re.fullmatch(r"'?([\w-]+).*", library)[1] for library in EXTRAS[extra]}
     extras = [extra]
     texts = LOWEST["requirements"]({**PROJECT, "dependencies": []}, extras)
     assert told == {re.match(r"[\w-]+", text)[0] for text in texts}
-
-
-def from_an_index(text):
-    """Where a text installs tireid from an index of packages; none has it."""
-    return re.findall(r"pip install [^`#(\n]*\btireid\b", text)
-
-
-def test_nothing_says_to_install_tireid_from_an_index():
-    folders = ["codegen", "models", "identifier", "mpc", "tireid", "examples", "benchmarks", "docs"]
-    files = [path for name in folders for path in (ROOT / name).rglob("*")]
-    texts = [path for path in files if path.suffix in (".py", ".md", ".txt", ".toml", ".ipynb")]
-    assert len(texts) > 100
-    for path in (*texts, *ROOT.glob("*.md"), ROOT / "Makefile"):
-        assert not from_an_index(path.read_text(encoding="utf-8")), path
-    for planted in ("`pip install tireid[ros]`", "pip install 'tireid[can]'", "pip install tireid"):
-        assert from_an_index(planted), planted
-    assert not from_an_index(needs("a bag", "rosbags", "ros"))

@@ -112,6 +112,7 @@ def test_the_wheel_runs_beside_strangers_of_its_packages_names(installed, tmp_pa
     assert done.stdout.split() == ["sedan", f"{packages}/tireid/__init__.py"], done.stderr
 
 
+@pytest.mark.heavy
 def test_a_project_outside_sees_the_types(installed, tmp_path):
     python, _ = installed
     (tmp_path / "mine.py").write_text(OUTSIDE)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from identifier.methods import make_method as make_method
     from identifier.methods import methods as methods
     from identifier.paper.design import PaperIdentifier as PaperIdentifier
+    from identifier.plan import plan as plan
     from identifier.prediction import Prediction as Prediction
     from identifier.tire_model import TireModel as TireModel
     from identifier.verdict import Verdict as Verdict
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from tireid.figures.forces import inputs_figure as _plot
     from tireid.learning import identify as identify
     from tireid.learning import replay as replay
-    from tireid.planning import plan as plan
     from tireid.run import Run as Run
 
     paths, plot = _path, _plot
@@ -59,6 +59,7 @@ _NAMES = {  # by the module that they lie in
     "identifier.method": "Method",
     "identifier.methods": "certify make_method methods",
     "identifier.paper.design": "PaperIdentifier",
+    "identifier.plan": "plan",
     "identifier.prediction": "Prediction",
     "identifier.tire_model": "TireModel",
     "identifier.verdict": "Verdict",
@@ -69,7 +70,6 @@ _NAMES = {  # by the module that they lie in
     "tireid.emitting": "emit",
     "tireid.exporting": "export",
     "tireid.learning": "identify replay",
-    "tireid.planning": "plan",
     "tireid.run": "Run",
 }
 _HOMES = {name: f"{module}:{name}" for module, names in _NAMES.items() for name in names.split()}

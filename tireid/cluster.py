@@ -42,8 +42,7 @@ def cluster(address: str) -> Iterator[Map]:
         raise ClusterError(f"{address}: no Dask scheduler answers there") from error
     try:
         _require_workers(client, address)
-        _tell_of_idle_threads(client, address)
-        yield partial(_map, dask, client, address)
+        yield partial(_map, dask, client)
     finally:
         client.close()
 
@@ -60,14 +59,6 @@ def _require_workers(client: Any, address: str) -> None:
     other = sorted(worker for worker, digest in versions.items() if digest != source_digest())
     if other:
         raise ClusterError(f"{address}: worker {other[0]} has another version of tireid")
-
-
-def _digest() -> str:
-    """Return the digest by a function of tireid, which finds its own packages on a worker."""
-    return source_digest()
-
-
-def _tell_of_idle_threads(client: Any, address: str) -> None:
     threads = {worker: count for worker, count in client.nthreads().items() if count > 1}
     if threads:
         worker, count = next(iter(threads.items()))
@@ -77,25 +68,26 @@ def _tell_of_idle_threads(client: Any, address: str) -> None:
         )
 
 
+def _digest() -> str:
+    """Return the digest by a function of tireid, which finds its own packages on a worker."""
+    return source_digest()
+
+
 def _map(
     dask: Any,
     client: Any,
-    address: str,
     work: Callable[[Any], Any],
     items: Iterable[Any],
-    *,
-    lost: Callable[[Any], None] | None = None,
+    lost: Callable[[Any], None],
 ) -> Iterator[Any]:
-    """Yield results; `lost` gets items that several workers died of, None ends with an error."""
+    """Yield results; `lost` gets items that several workers died of."""
     shared = client.scatter(work, broadcast=True, hash=False)  # once to each worker
     futures = {client.submit(_work_alone, shared, item, pure=False): item for item in items}
     try:
         for future in dask.as_completed(list(futures), loop=client.loop):
             try:
                 result = future.result()
-            except dask.KilledWorker as error:
-                if lost is None:
-                    raise ClusterError(f"{address}: workers die of their work: {error}") from error
+            except dask.KilledWorker:
                 lost(futures[future])
                 continue
             yield result

@@ -6,11 +6,9 @@ Arguments that are wrong in themselves raise plain `TypeError` or `ValueError`.
 from codegen.errors import TireidError as TireidError
 from identifier.frozen import FrozenModelError as FrozenModelError
 from identifier.method import CannotFreezeError as CannotFreezeError
-from identifier.own_network import UnusableNetworkError as UnusableNetworkError
 from identifier.plan import PlanError as PlanError
 from identifier.reproducibility import NeverDrivesError as NeverDrivesError
 from identifier.run import DivergedError as DivergedError
-from identifier.verdict import BoundViolatedError as BoundViolatedError
 from models.plant import PlantError as PlantError
 from models.recordings import RecordingError as RecordingError
 from models.vehicle import VehicleError as VehicleError

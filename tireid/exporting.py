@@ -178,13 +178,14 @@ def _write_onnx(
     *,
     band: bool,
 ) -> None:
-    from identifier.export.onnx import export_onnx
+    from identifier.export.onnx import onnx_bytes
 
     try:
         model = start or method.frozen(vehicle, package.specialized.carry)
     except CannotFreezeError as error:
         raise ValueError(f"--onnx: {error}") from error
-    export_onnx(model, folder / f"{package.specialized.name}.onnx", with_band=band)
+    content = onnx_bytes(model, with_band=band)
+    write_file(folder / f"{package.specialized.name}.onnx", content)
 
 
 _TRACKER = "mpc"  # folder of the package; that of the identifier is `identifier`

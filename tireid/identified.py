@@ -1,24 +1,19 @@
-"""What `tireid identify` found, and its files: numbers as JSON, curves as CSV, figures as PNG.
-
-A network of one's own (`--network`) has the keys of a learnt model, "network" in place of a freeze
-time. What the identifier finds online over the same recordings stands beside it.
-"""
+"""What `tireid identify` found, and its files: numbers as JSON, curves as CSV, figures as PNG."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from codegen.arrays import Array, blocks, thinning
+from codegen.arrays import Array, thinning
 from codegen.escape import visible
 from identifier.compare.course import side_slip
 from identifier.frozen import vehicle_numbers
 from identifier.methods import certify
-from identifier.own_network import OnnxModel
 from identifier.reproducibility import (
     AxleRmse,
     Replay,
@@ -39,10 +34,16 @@ from tireid.figures.paper import error_figure, weights_figure
 from tireid.figures.side_slip import side_slip_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import learnt_axles_figure, slip_figure
-from tireid.output import axle_columns, text_table, write_csv, write_json, write_table
+from tireid.output import (
+    axle_columns,
+    force_columns,
+    text_table,
+    write_csv,
+    write_json,
+    write_long_csv,
+)
 from tireid.progress import Progress, say
 
-_NETWORK = "network"
 _OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
 _ESTIMATED = {  # columns of forces.csv by the outputs of methods that estimate v_y
     "v_y_estimated_m_s": "v_y",
@@ -50,7 +51,7 @@ _ESTIMATED = {  # columns of forces.csv by the outputs of methods that estimate 
     "side_slip_observable": "side_slip_observable",
 }
 _WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
-_OWN_PAST = "  its past, against online"
+_NO_TRUTH, _ONLINE = "(no truth)", "(against online, no truth)"
 _WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
 _CURVE_POINTS = 201
 _FARTHER = 1.25  # than the slip that was driven, or is known
@@ -58,13 +59,13 @@ _FARTHER = 1.25  # than the slip that was driven, or is known
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Results:
-    """Models that were frozen, or a network, over recordings.
+    """Models that were frozen over recordings.
 
     runs : of the method, over the recording that was learnt and over others.
-    models, frozen : by freeze time as text [s], or `_NETWORK`, models and their replays by
-        recording; the last counts.
+    models, frozen : by freeze time as text [s], models and their replays by recording; the last
+        counts.
     verdict : on the last.   asked : on it over the others, by name.
-    parts : of the first run, where it is over several logs.   about : a network, its file.
+    parts : of the first run, where it is over several logs.
     """
 
     method: str
@@ -74,7 +75,6 @@ class Results:
     verdict: Verdict
     asked: Mapping[str, Verdict]
     parts: Sequence[History] = ()
-    about: Mapping[str, Any] = field(default_factory=dict)
 
     @classmethod
     def learnt(
@@ -94,27 +94,12 @@ class Results:
         learnt, others = runs[0], [*parts, *runs[1:]]
         models = {freeze_key(t): learnt.freeze(t) for t in times[:-1]}
         models[freeze_key(times[-1])] = tire
-        frozen = {
-            key: {learnt.recording.name: reproduce(learnt, t)} | _replays(model, others)
-            for t, (key, model) in zip(times, models.items(), strict=True)
-        }
+        frozen: dict[str, dict[str, Replay]] = {}
+        for t, (key, model) in zip(times, models.items(), strict=True):
+            frozen[key] = {learnt.recording.name: reproduce(learnt, t)}
+            frozen[key] |= {run.recording.name: replay(model, run) for run in others}
         found: Any = {"models": models, "frozen": frozen, "verdict": verdict, "asked": asked}
         return cls(method=method, runs=runs, parts=parts, **found)
-
-    @classmethod
-    def of_network(
-        cls,
-        method: str,
-        runs: Sequence[History],
-        model: OnnxModel,
-        source: str,
-        verdict: Verdict,
-        asked: Mapping[str, Verdict],
-    ) -> "Results":
-        found: Any = {"models": {_NETWORK: model}, "frozen": {_NETWORK: _replays(model, runs)}}
-        about = {"inputs": list(model.signals), "slip_sign": model.slip_sign}
-        found["about"] = {"file": source, **about}
-        return cls(method=method, runs=runs, verdict=verdict, asked=asked, **found)
 
     @property
     def model(self) -> TireModel:
@@ -126,32 +111,23 @@ class Results:
         """Those of the last, by recording."""
         return list(self.frozen.values())[-1]
 
-    @property
-    def by_label(self) -> dict[str, Mapping[str, Replay]]:
-        """The replays by what a table calls their model."""
-        return {k if k == _NETWORK else f"{k} s": replays for k, replays in self.frozen.items()}
-
     def table(self) -> str:
         """Return a table of the errors per axle, and as a share of the force where there is truth.
 
         Under the recording that was learnt stands the paper's measure: its past, t < T_freeze,
-        against what was identified online; under a network what learns online beside it.
+        against what was identified online.
         """
         runs = {run.recording.name: run for run in (*self.runs, *self.parts)}
         rows = [["frozen at", "replayed on", "front", "rear"]]
-        for label, replays in self.by_label.items():
+        for key, replays in self.frozen.items():
             for name, result in replays.items():
                 size, sides = force_rms(runs[name]), result.reproduction
-                errors = {(label, visible(name)): result.against_truth or result.against_online}
-                if label == _NETWORK:
-                    words = f"{self.method}, learning online", visible(name)
-                    errors[words] = online_error(runs[name])
-                elif sides is not None:
-                    errors["", _OWN_PAST] = sides.past_against_online
-                for number, (words, error) in enumerate(errors.items()):
-                    if number == 0 or error is not None:
-                        note = _no_truth(error, size) if words[0] else ""
-                        rows.append([*words, *error_cells(error, size), note])
+                error = result.against_truth or result.against_online
+                note = "" if size else _NO_TRUTH if error is None else _ONLINE
+                rows.append([f"{key} s", visible(name), *error_cells(error, size), note])
+                if sides and sides.past_against_online:
+                    past = error_cells(sides.past_against_online, size)
+                    rows.append(["", "  its past, against online", *past, ""])
         return text_table(rows, "><>>")
 
     def summary(self) -> dict[str, Any]:
@@ -163,26 +139,27 @@ class Results:
         `past_against_online` is the measure of the paper's section IV-A.
         """
         learnt, runs = self.runs[0], [self.runs[0], *self.parts, *self.runs[1:]]
-        design = learnt.design
+        design = learnt.method
         certificate = None if design.whole else certify(design, learnt.vehicle)
 
-        def of_frozen(of: Callable[[Replay], AxleRmse | None]) -> dict[str, Any]:
+        def of_frozen(measure: str) -> dict[str, Any]:
             return {
-                key: {name: _numbers(of(one)) for name, one in replays.items()}
+                key: {name: getattr(one, measure) for name, one in replays.items()}
                 for key, replays in self.frozen.items()
             }
 
+        split = of_frozen("reproduction")
         return {
             "verdict": self.verdict.to_dict(),
             "replay_verdicts": {name: one.to_dict() for name, one in self.asked.items()},
-            "rms_force_N": {h.recording.name: _numbers(force_rms(h)) for h in runs},
+            "rms_force_N": {h.recording.name: force_rms(h) for h in runs},
             "rmse_N": {
-                "online": {h.recording.name: _numbers(online_error(h)) for h in runs},
-                "frozen": of_frozen(lambda one: one.against_truth),
-                "frozen_against_online": of_frozen(lambda one: one.against_online),
+                "online": {h.recording.name: online_error(h) for h in runs},
+                "frozen": of_frozen("against_truth"),
+                "frozen_against_online": of_frozen("against_online"),
                 "reproducibility": {
-                    key: {n: asdict(r.reproduction) for n, r in replays.items() if r.reproduction}
-                    for key, replays in self.frozen.items()
+                    key: {n: one for n, one in by_name.items() if one}
+                    for key, by_name in split.items()
                 },
             },
             "law": self.method,
@@ -193,12 +170,9 @@ class Results:
             "vehicle": vehicle_numbers(learnt.vehicle),
             "diverged_at_s": learnt.diverged_at,
             "version": __version__,
-            **({_NETWORK: dict(self.about)} if self.about else {}),
         }
 
-    def write(
-        self, folder: Path, *, curves: str = "csv", progress: Progress | None = None
-    ) -> dict[str, Figure]:
+    def write(self, folder: Path, progress: Progress | None = None) -> dict[str, Figure]:
         """Write everything into a folder; return the figures by the name of their file.
 
         progress : informed how far it is; None informs nobody.
@@ -211,81 +185,63 @@ class Results:
             model.save(folder / f"weights{end}.json", valid=valid)
             columns = _curve_columns(model, [run.recording for run in self.runs])
             write_csv(folder / f"curve{end}.csv", columns)
-        self._write_curves(folder, curves, progress or Progress("curves"))
+        learnt, progress = self.runs[0], progress or Progress("curves")
+        for k, run in enumerate(self.runs):
+            end = "" if run is learnt else f"_{file_name(run.recording)}"
+            write_csv(folder / f"forces{end}.csv", self._force_columns(run))
+            progress(_WRITING * (k + 1) / len(self.runs))
+        if _OBSERVED in learnt.outputs:
+            found = (_error_columns(learnt, one) for one in learnt.blocks())
+            write_long_csv(folder / "errors.csv", found)
+        if learnt.online:
+            write_long_csv(folder / "weights.csv", _weight_columns(learnt))
         say("drawing figures")
         return save_figures(folder, self._figures())
 
-    def _write_curves(self, folder: Path, curves: str, progress: Progress) -> None:
-        learnt, count = self.runs[0], len(self.runs)
-        for k, run in enumerate(self.runs):
-            replays = {
-                key if key == _NETWORK else f"frozen_{key}s": by_name[run.recording.name]
-                for key, by_name in self.frozen.items()
-            }
-            end = "" if run is learnt else f"_{file_name(run.recording)}"
-            share = progress.within(_WRITING * k / count, _WRITING * (k + 1) / count)
-            write_table(folder / f"forces{end}.{curves}", _force_columns(run, replays, share))
-        if _NETWORK in self.models:
-            return
-        if _OBSERVED in learnt.outputs:
-            found = (_error_columns(learnt, one) for one in learnt.blocks())
-            write_table(folder / f"errors.{curves}", found)
-        if learnt.online:
-            write_table(folder / f"weights.{curves}", _weight_columns(learnt))
+    def _force_columns(self, run: History) -> dict[str, Array]:
+        """Return the columns of forces.csv: slip angles, true, online and frozen forces."""
+        recording, car, outputs = run.recording, run.vehicle, run.outputs
+        forces = {"true": recording.axle_force, "online": run.axle_force if run.online else None}
+        for key, by_name in self.frozen.items():
+            forces[f"frozen_{key}s"] = by_name[recording.name].axle_force
+        return {
+            "t_s": recording.t,
+            "v_x_m_s": recording.v_x,
+            "v_y_m_s": recording.needed("v_y"),
+            "r_rad_s": recording.r,
+            "delta_f_rad": recording.delta_f,
+            "delta_r_rad": recording.delta_r,
+            **axle_columns("alpha_{}_rad", recording.alpha(car.l_f, car.l_r)),
+            **{name: outputs[port].ravel() for name, port in _ESTIMATED.items() if port in outputs},
+            **force_columns(forces),
+        }
 
     def _figures(self) -> dict[str, Figure]:
         learnt, model = self.runs[0], self.model
         recording, name = learnt.recording, learnt.recording.name
-        figures = {"inputs": inputs_figure(recording)}
-        asked = self.runs[1:]
-        if _NETWORK in self.models:
-            asked = self.runs
-            for run in self.runs:
-                end = "" if run is learnt else f"_{file_name(run.recording)}"
-                figures[f"slip{end}"] = slip_figure(model, run.recording, _beside(run))
-        else:
-            own = {float(key): replays[name] for key, replays in self.frozen.items()}
-            figures["slip"] = slip_figure(model, recording, _beside(learnt))
-            figures["forces"] = force_figure(learnt, own)
-            slip = side_slip(learnt, learnt.design.min_speed, recording.logged_v_y)
-            if _OBSERVED in learnt.outputs:
-                figures["error"] = error_figure(learnt, freeze_times=list(own))
-                figures["weights"] = weights_figure(learnt, list(own))
-            if slip is not None:
-                figures["side_slip"] = side_slip_figure([recording], {"estimate": {name: slip}})
-            if learnt.tracks_over(next(learnt.blocks())):
-                figures["learnt"] = learnt_axles_figure(learnt, list(own))
-        for run in asked:
-            drawn = prediction_figure(self.replays[run.recording.name], _beside(run))
+        own = {float(key): replays[name] for key, replays in self.frozen.items()}
+        figures = {
+            "inputs": inputs_figure(recording),
+            "slip": slip_figure(model, recording, learnt if learnt.online else None),
+            "forces": force_figure(learnt, own),
+        }
+        slip = side_slip(learnt, learnt.method.min_speed, recording.logged_v_y)
+        if _OBSERVED in learnt.outputs:
+            figures["error"] = error_figure(learnt, freeze_times=list(own))
+            figures["weights"] = weights_figure(learnt, list(own))
+        if slip is not None:
+            figures["side_slip"] = side_slip_figure([recording], {"estimate": {name: slip}})
+        if learnt.tracks_over(next(learnt.blocks())):
+            figures["learnt"] = learnt_axles_figure(learnt, list(own))
+        for run in self.runs[1:]:
+            beside = run if run.online else None
+            drawn = prediction_figure(self.replays[run.recording.name], beside)
             figures[f"replay_{file_name(run.recording)}"] = drawn
         return figures
 
 
-def _replays(model: TireModel, runs: Sequence[History]) -> dict[str, Replay]:
-    return {run.recording.name: replay(model, run) for run in runs}
-
-
-def _numbers(error: AxleRmse | None) -> dict[str, float] | None:
-    return None if error is None else asdict(error)
-
-
-def _beside(run: History) -> History | None:
-    """Return a run where it has forces of its own to compare with."""
-    return run if run.online else None
-
-
 def file_name(recording: Recording) -> str:
     return re.sub(r"[^\w.-]+", "_", recording.name)
-
-
-def _no_truth(error: AxleRmse | None, size: AxleRmse | None) -> str:
-    """Return the note beside an error: against what, where there is no true force.
-
-    error : None where there is none.   size : rms of the true forces [N], None without truth.
-    """
-    if size is not None:
-        return ""
-    return "(no truth)" if error is None else "(against online, no truth)"
 
 
 def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str]:
@@ -295,10 +251,9 @@ def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str
     """
     if error is None:
         return "-", "-"
-    forces = (0.0, 0.0) if size is None else (size.front, size.rear)
     front, rear = (
         f"{newtons:8.4g} N{f' {100 * newtons / force:.0f} %' if force > 0.0 else '':>6}"
-        for newtons, force in zip((error.front, error.rear), forces, strict=True)
+        for newtons, force in zip(astuple(error), astuple(size) if size else (0, 0), strict=True)
     )
     return front, rear
 
@@ -324,47 +279,13 @@ def _weight_columns(learnt: History) -> Iterator[dict[str, Array]]:
         yield weights
 
 
-def _force_columns(
-    run: History, replays: Mapping[str, Replay], progress: Callable[[float], None]
-) -> Iterator[dict[str, Array]]:
-    """Yield the columns of forces.csv: slip angles, true, online and frozen forces.
-
-    progress : called now and then with the share that is done, 0 to 1.
-    """
-    recording, car, n = run.recording, run.vehicle, len(run.recording)
-    outputs = run.outputs
-    given = {
-        column: outputs[port].ravel() for column, port in _ESTIMATED.items() if port in outputs
-    }
-    curves = {} if recording.axle_force is None else {"true": recording.axle_force}
-    curves |= {"online": run.axle_force} if run.online else {}
-    curves |= {label: replay.axle_force for label, replay in replays.items()}
-    for part in blocks(n):
-        columns = {
-            "t_s": recording.t[part],
-            "v_x_m_s": recording.v_x[part],
-            "v_y_m_s": recording.needed("v_y")[part],
-            "r_rad_s": recording.r[part],
-            "delta_f_rad": recording.delta_f[part],
-            "delta_r_rad": recording.delta_r[part],
-            **axle_columns("alpha_{}_rad", recording.alpha(car.l_f, car.l_r, part)),
-        }
-        columns |= {name: values[part] for name, values in given.items()}
-        for name, force in curves.items():
-            columns |= axle_columns(f"Fy{{}}_{name}_N", force[part])
-        yield columns
-        progress(part.stop / n)
-
-
 def _curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str, Array]:
     """Return curve.csv: the steady force of each axle over slip, and whether it is known there."""
     car, known = model.vehicle, model.known_slip
     reach = [0.0 if known is None else float(known.max())]
-    for recording in recordings:
-        for part in blocks(len(recording)):
-            moving = recording.v_x[part] >= model.min_speed
-            slip = np.abs(recording.alpha(car.l_f, car.l_r, part)[moving])
-            reach.append(float(slip.max(initial=0.0)))
+    for one in recordings:
+        moving = one.v_x >= model.min_speed
+        reach.append(float(np.abs(one.alpha(car.l_f, car.l_r)[moving]).max(initial=0.0)))
     end = min(_FARTHER * max(reach) or 0.1, 0.5)
     slip = np.linspace(-end, end, _CURVE_POINTS)
     force = model.force(slip)
@@ -372,9 +293,7 @@ def _curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[st
     if known is not None:
         inside = (np.abs(slip)[:, None] <= known).astype(np.float64)
         columns |= {"front_known": inside[:, 0], "rear_known": inside[:, 1]}
-    band = None if model.band is None else model.band.at(slip)
-    sure = None if model.guarantee is None else model.guarantee.at(slip)
-    for sides, found in (("low", "high"), band), (("least", "most"), sure):
-        for side, bound in zip(sides, found or (), strict=found is not None):
+    if model.band is not None:
+        for side, bound in zip(("low", "high"), model.band.at(slip), strict=True):
             columns |= axle_columns(f"Fy{{}}_{side}_N", bound)
     return columns

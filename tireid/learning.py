@@ -72,11 +72,8 @@ def identify(
     require_kind(Vehicle, _VEHICLE, vehicle=vehicle)
     if isinstance(method, str):
         method = make_method(method, vehicle)
-    if method is not None:
-        require_kind(Method, _METHOD, method=method)
-    if method is None:
-        method = FitMethod.for_vehicle(vehicle, dt=recording.dt)
-    design = method
+    design = FitMethod.for_vehicle(vehicle, dt=recording.dt) if method is None else method
+    require_kind(Method, _METHOD, method=design)
     if check:
         check_against_vehicle(recording, vehicle)
         for finding in diagnose(recording, vehicle).findings:
@@ -89,8 +86,8 @@ def identify(
         log.warning("%s: %s", recording.name, note)
     if history.diverged_at is not None:
         at = freeze_key(history.diverged_at)
-        method = getattr(design, "law", type(design).__name__)
-        raise DivergedError(f"{recording.name}: the method {method} diverged at {at} s")
+        law = getattr(design, "law", type(design).__name__)
+        raise DivergedError(f"{recording.name}: the method {law} diverged at {at} s")
     return Run(history=history)
 
 

@@ -7,13 +7,13 @@ the next run says so.
 """
 
 import hashlib
-import importlib
 import json
 import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import asdict, is_dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,7 +22,6 @@ import numpy as np
 from codegen.arrays import Array
 from codegen.errors import TireidError
 from codegen.writing import naming, write_file
-from models.extras import needs
 from models.files import resolved
 from models.schema import read_json
 from tireid.exchange import ClaimedError, claim, exchange
@@ -278,13 +277,17 @@ def _discard(folder: Path) -> None:
 def write_json(path: Path, data: Any) -> None:
     """Write data as indented JSON; a number that is not finite becomes null.
 
-    data : dictionaries, lists, numbers, strings and None.
+    data : dictionaries, lists, arrays, records (dataclasses), numbers, strings and None.
     """
     write_file(path, json.dumps(finite(data), indent=2, allow_nan=False) + "\n")
 
 
 def finite(data: Any) -> Any:
-    """Return data with null for numbers that are not finite, which JSON cannot say."""
+    """Return data as JSON has it: with null for numbers that are not finite."""
+    if isinstance(data, np.ndarray):
+        data = data.tolist()
+    elif is_dataclass(data) and not isinstance(data, type):
+        data = asdict(data)
     if isinstance(data, dict):
         return {key: finite(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
@@ -307,6 +310,15 @@ def axle_columns(pattern: str, values: Array) -> dict[str, Array]:
     return {pattern.format(axle): values[:, i] for i, axle in enumerate("fr")}
 
 
+def force_columns(forces: Mapping[str, Array | None]) -> dict[str, Array]:
+    """Return the columns of axle forces (n, 2) [N], of those that there are of some."""
+    columns: dict[str, Array] = {}
+    for name, force in forces.items():
+        if force is not None:
+            columns |= axle_columns(f"Fy{{}}_{name}_N", force)
+    return columns
+
+
 _ROWS = 4096  # that are put into words at once
 
 
@@ -317,46 +329,9 @@ def write_long_csv(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
             if k == 0:
                 file.write(",".join(columns) + "\n")
             row = ",".join("%.15g" if name == "t_s" else "%.9g" for name in columns) + "\n"
-            table = np.column_stack(list(columns.values()))  # t_s may be a Unix time
-            for first in range(0, len(table), _ROWS):
-                some = table[first : first + _ROWS]
+            for first in range(0, len(next(iter(columns.values()))), _ROWS):
+                some = np.column_stack([one[first : first + _ROWS] for one in columns.values()])
                 file.write((row * len(some)) % tuple(some.ravel().tolist()))
-
-
-def write_table(path: Path, parts: Iterable[Mapping[str, Array]]) -> None:
-    """Write columns that come part by part: as `write_csv` does, or as Parquet with all digits."""
-    if path.suffix != ".parquet":
-        write_long_csv(path, parts)
-        return
-    pyarrow, parquet = _parquet()
-    with naming(path), ExitStack() as stack:
-        writer: Any = None
-        for columns in parts:
-            arrays = {  # by their buffers: what makes arrays of NumPy's imports pandas
-                name: pyarrow.Array.from_buffers(
-                    pyarrow.float64(),
-                    len(column),
-                    [None, pyarrow.py_buffer(np.ascontiguousarray(column, dtype=np.float64))],
-                )
-                for name, column in columns.items()
-            }
-            table = pyarrow.table(arrays)
-            if writer is None:
-                writer = stack.enter_context(parquet.ParquetWriter(path, table.schema))
-            writer.write_table(table)
-
-
-def require_curves(kind: str) -> None:
-    """Refuse a kind of file for curves that cannot be written here."""
-    if kind == "parquet":
-        _parquet()
-
-
-def _parquet() -> tuple[Any, Any]:
-    try:
-        return importlib.import_module("pyarrow"), importlib.import_module("pyarrow.parquet")
-    except ImportError:
-        raise ValueError(needs("--curves parquet", "pyarrow", "parquet")) from None
 
 
 def text_table(rows: Sequence[Sequence[str]], align: str = "", *, indent: str = "") -> str:

@@ -7,12 +7,11 @@ from os import PathLike
 from pathlib import Path
 
 from codegen.arrays import Array
-from identifier.axle.guarantee import ForceBound
 from identifier.certificate import Certificate
 from identifier.method import Method
 from identifier.run import History
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, calibrated, guaranteed, judge
+from identifier.verdict import Verdict, calibrated, judge
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid.output import output_folder, write_json
@@ -42,7 +41,7 @@ class Run:
     @property
     def method(self) -> Method:
         """The method that ran."""
-        return self.history.design
+        return self.history.method
 
     @property
     def force(self) -> Array:
@@ -97,34 +96,6 @@ class Run:
     def certificate(self) -> Certificate:
         """What is proven of the method for this car."""
         return self.method.certify(self.vehicle)
-
-    def guarantee(self, bound: float | ForceBound | None = None) -> TireModel:
-        """Return the tire with a guaranteed band beside the calibrated one.
-
-        Where |F/F_z - φ| <= e (1 + β) + τ ρ holds of some curve φ at every instant, the true force
-        lies in its `guarantee`, which is None where no lateral velocity was measured or too little
-        is driven.
-
-        Parameters
-        ----------
-        bound : e of both axles [static axle loads], or e and τ of each, as a `ForceBound`; None
-            estimates them from the drive.
-
-        Raises
-        ------
-        BoundViolatedError
-            Where no curve keeps a bound that was given.
-        CannotFreezeError
-            Where the method estimates a signal, not a model.
-        ValueError
-            Where the bound is impossible, or the method has no set of possible weights: "axle" has.
-        """
-        if self.method.limits is None:
-            raise ValueError(
-                f"{type(self.method).__name__} has no set of possible weights, so no guarantee: "
-                'identify with the method "axle"'
-            )
-        return guaranteed(self.history, bound, None, self.tire)
 
     def save(self, folder: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Write weights.json, as `TireModel.load` reads it, and verdict.json into a folder.

@@ -44,15 +44,16 @@ def _marked_number(verdict: Verdict, number: Number | None) -> Marked:
 
 def verdict_text(verdict: Verdict, *, numbers: bool = True) -> str:
     rows = [
-        [title, *(cell for axle in AXLES for cell in _cells(by_axle.get(axle)))]
+        [title]
+        + [
+            cell
+            for one in map(by_axle.get, AXLES)
+            for cell in (("", "") if one is None else (one.words, one.state))
+        ]
         for title, by_axle in _numbers_by_title(verdict).items()
     ]
     table = [text_table([list(HEADER), *rows])] if numbers else []
     return "\n".join([*table, *verdict.lines])
-
-
-def _cells(number: Number | None) -> tuple[str, str]:
-    return ("", "") if number is None else (number.words, number.state)
 
 
 def verdicts_text(verdicts: Mapping[str, Verdict], what: str) -> str:

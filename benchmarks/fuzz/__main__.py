@@ -21,9 +21,7 @@ from pathlib import Path
 
 from benchmarks.fuzz.cases import draw
 from benchmarks.fuzz.doors import DOORS, Door
-from benchmarks.fuzz.judge import KINDS
 from benchmarks.fuzz.session import Outcome, Session, everything
-from benchmarks.targets import Targets, keeps
 
 CASES, SEED = 20_000, 2026
 EVERY = 500  # cases between two lines of progress
@@ -48,13 +46,12 @@ def parse(words: Sequence[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(words)
 
 
-def main(words: Sequence[str] | None = None, *, keep: bool = False) -> int:
+def main(words: Sequence[str] | None = None) -> int:
     """Run the cases; return 1 where anything was found.
 
     Parameters
     ----------
     words : of the command; None takes those of the process.
-    keep : whether the numbers are recorded.
     """
     options = parse(words)
     doors = [door for door in DOORS if options.door is None or options.door in door.name]
@@ -66,7 +63,7 @@ def main(words: Sequence[str] | None = None, *, keep: bool = False) -> int:
     print(f"warm after {session.seconds():.0f} s", flush=True)
     outcomes = list(_progress(options, session, doors))
     found = session.keep_smallest(outcomes, doors)
-    return _report(outcomes, found, doors, keep=keep)
+    return _report(outcomes, found, doors)
 
 
 def _progress(
@@ -94,9 +91,7 @@ def _progress(
             return
 
 
-def _report(
-    outcomes: list[Outcome], found: dict[tuple[str, str], Path], doors: list[Door], *, keep: bool
-) -> int:
+def _report(outcomes: list[Outcome], found: dict[tuple[str, str], Path], doors: list[Door]) -> int:
     """Print what ended how by door, and what was found by kind; return the exit code."""
     heads = ("cases", "exit 0", "exit 1", "exit 2", "other", "found", "s each")
     print("\n" + f"{'door':28}" + "".join(f"{head:>8}" for head in heads))
@@ -110,17 +105,11 @@ def _report(
         print(f"{door.name:28}" + "".join(f"{cell:8}" for cell in cells) + f"{each:8.2f}")
     for (kind, place), folder in list(found.items())[:SHOWN]:
         print(f"{kind}: {place}: {folder}")
-    targets = Targets("fuzz")
-    targets.record("cases", len(outcomes))
-    targets.record("doors", len(doors))
-    targets.record("accepted", sum(outcome.code == 0 for outcome in outcomes))
-    targets.record("longest", max(outcome.cpu for outcome in outcomes), "s")
     kinds = Counter(finding.kind for outcome in outcomes for finding in outcome.findings)
-    for kind in KINDS:
-        targets.at_most(kind, kinds[kind], 0, "", key=f"found/{kind.replace(' ', '_')}")
-    return targets.finish(keep=keep)
+    said = ", ".join(f"{count} of {kind}" for kind, count in kinds.items())
+    print(f"{len(outcomes)} cases at {len(doors)} doors: found {said or 'nothing'}")
+    return 1 if kinds else 0
 
 
 if __name__ == "__main__":
-    recorded = keeps()
-    sys.exit(main(keep=recorded))
+    sys.exit(main())

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 from benchmarks.fuzz.doors import DOORS, WORDS, Door
-from benchmarks.fuzz.networks import onnx_mutated
 from benchmarks.fuzz.raw import bytes_mutated, other_kind
 from benchmarks.fuzz.tables import csv_mutated, gz_mutated, parquet_mutated, tir_mutated
 from benchmarks.fuzz.trees import json_mutated, toml_mutated
@@ -22,7 +21,6 @@ MUTATORS: Mapping[str, Callable[[random.Random, bytes], bytes]] = {
     "toml": toml_mutated,
     "json": json_mutated,
     "tir": tir_mutated,
-    "onnx": onnx_mutated,
 }
 MOST = 3  # mutations of a case
 NOTES = {"notes.txt": b"of the user\n", "data/run.csv": b"1,2,3\n"}  # which no command was told of

@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-CURVE = "curve.json"
 WORDS = ""  # in place of a file: the words of the command are mutated
 
 
@@ -27,7 +26,7 @@ class Door(NamedTuple):
 
 def _files(words: str) -> tuple[str, ...]:
     """Return the words that name files of the seeds; a car brings its tire."""
-    endings = (".csv", ".csv.gz", ".parquet", ".mat", ".toml", ".json", ".onnx")
+    endings = (".csv", ".csv.gz", ".parquet", ".mat", ".toml", ".json")
     found = [word for word in words.split() if word.endswith(endings) and word != "out.toml"]
     return tuple(found) + (("sedan.tir",) if "sedan.toml" in found else ())
 
@@ -46,8 +45,8 @@ IDENTIFY = "identify log.csv --vehicle car.toml --out out"
 LOGGER = IDENTIFY.replace("log.csv", "logger.csv")
 COMPARE = "compare log.csv --vehicle car.toml --out out --method"
 PREDICT = "predict --out out"
-PLAN = "plan --area 60x12 --speed 12 --time 1.5 --out out"
-FILTER = "--method magic_formula_ekf"
+PLAN = "plan --speed 12 --time 3 --out out"
+FILTER = "--method lagged_ekf"
 DRIVE = "drive --path path.csv --speed 12m/s --film none --out out"
 FLEET = "fleet learn log.csv --vehicle car.toml --jobs 1 --out out"
 DOORS = (
@@ -61,10 +60,10 @@ DOORS = (
     _door("identify replay", 3, f"{IDENTIFY} --replay other.csv", "other.csv"),
     _door("compare csv", 4, f"{COMPARE} axle linear", "log.csv"),
     _door(
-        "check log",
+        "check design, car",
         3,
-        "check --design integral.toml --vehicle car.toml --along log.csv",
-        "log.csv car.toml",
+        "check --design integral.toml --vehicle car.toml",
+        "car.toml",
     ),
     # logs as loggers write them, and their map
     _door("channels csv", 6, "channels logger.csv", "logger.csv"),
@@ -78,7 +77,6 @@ DOORS = (
     _door("identify car", 8, IDENTIFY.replace("car.toml", "sedan.toml"), "sedan.toml"),
     _door("check car", 6, "check --paper --vehicle sedan.toml", "sedan.toml"),
     _door("check default", 2, "check --vehicle sedan.toml --out out", "sedan.toml"),
-    _door("check car, tuned", 3, "check --vehicle car.toml --tune out.toml", "car.toml"),
     _door("export car", 5, "export --out out --vehicle sedan.toml", "sedan.toml"),
     _door("export car, FMU", 0.5, "export --out out --vehicle car.toml --fmu --onnx", "car.toml"),
     _door("export tracker", 0.2, "export --out out --mpc --vehicle car.toml", "car.toml"),
@@ -95,13 +93,11 @@ DOORS = (
     # frozen models
     _door("export axle", 6, "export --out out --weights axle.json", "axle.json"),
     _door("export network", 4, "export --out out --weights network.json", "network.json"),
-    _door("identify axle", 6, f"{IDENTIFY} --weights axle.json", "axle.json"),
+    _door("identify axle", 6, f"{IDENTIFY} --method axle --weights axle.json", "axle.json"),
     _door("identify network", 4, f"{IDENTIFY} --paper --weights network.json", "network.json"),
-    _door("identify curve", 2, f"{IDENTIFY} {FILTER} --weights curve.json", CURVE),
     _door("drive axle", 4, f"{DRIVE} --weights axle.json", "axle.json"),
     _door("drive network", 3, f"{DRIVE} --weights network.json", "network.json"),
-    _door("drive curve", 2, f"{DRIVE} --weights curve.json", "curve.json"),
-    _door("drive own", 2, f"{DRIVE} --weights own.json", "own.json"),
+    _door("predict curve", 2, f"{PREDICT} curve.json log.csv", "curve.json"),
     _door("drive learning", 1, f"{DRIVE} --tires learning --weights axle.json", "axle.json"),
     _door("predict axle", 4, f"{PREDICT} axle.json log.csv", "axle.json"),
     _door("predict network", 2, f"{PREDICT} network.json log.csv", "network.json"),
@@ -111,12 +107,6 @@ DOORS = (
     _door("emit network", 1, "emit network.json --tir out.tir", "network.json"),
     # fleets
     _door("fleet learn", 3, FLEET, "log.csv car.toml"),
-    _door("fleet learn, begun", 1, f"{FLEET} --weights fit.json", "fit.json"),
-    # networks of the user's own
-    _door("identify onnx", 8, f"{IDENTIFY} --network slip.onnx", "slip.onnx"),
-    _door("identify onnx, exported", 3, f"{IDENTIFY} --network exported.onnx", "exported.onnx"),
-    _door("compare onnx", 3, f"{COMPARE} linear --network slip.onnx", "slip.onnx"),
-    _door("drive onnx", 2, f"{DRIVE} --network slip.onnx", "slip.onnx"),
     # paths
     _door("drive path", 10, f"{DRIVE} --tires linear", "path.csv"),
     # words
@@ -129,11 +119,6 @@ DOORS = (
         "check --vehicle car.toml --method integral --bandwidth 0.7 --speed 20 --slip 0.1 "
         "--friction 1 --noise-r 0.01",
     ),
-    _door(
-        "words of check, tuned",
-        3,
-        "check --vehicle car.toml --phase-margin 60 --noise-v-x 0.1 --tune out.toml",
-    ),
     _door("words of export", 3, "export --out out --name mine --method integral --single"),
     _door("words of compare", 3, f"{COMPARE} axle linear --seed 0"),
     _door(
@@ -143,11 +128,11 @@ DOORS = (
     ),
     _door("words of predict", 3, f"{PREDICT} axle.json log.csv --columns r=r --vehicle car.toml"),
     _door("plan car", 2, f"{PLAN} --vehicle sedan.toml", "sedan.toml"),
-    _door("plan after", 2, f"{PLAN} --after axle.json", "axle.json"),
-    _door("words of plan", 3, f"{PLAN} --mu 0.8 --grip 80 --margin 1 --steering-ratio 15"),
+    _door("plan weights", 2, f"{PLAN} --weights fit.json", "fit.json"),
+    _door("words of plan", 3, f"{PLAN} --mu 0.8 --grip 80 --area 90 30 --steering-ratio 15"),
     _door("words of init", 2, "init out.toml"),
     _door("words of channels", 3, "channels log.csv --columns r=r --write out.toml"),
     _door("words of doctor", 2, "doctor log.csv --vehicle car.toml --columns r=r"),
-    _door("words of fleet learn", 3, f"{FLEET} --tags {{vehicle}}.* --part 60 --judge none"),
+    _door("words of fleet learn", 3, f"{FLEET} --tags {{vehicle}}.*"),
     _door("words of paper", 0.5, "paper --seeds 0 --out out"),
 )

@@ -127,11 +127,9 @@ def _lost(words: Sequence[str], folder: Path, before: Mapping[str, str]) -> list
 
 
 def _written_file(words: Sequence[str]) -> str:
-    """Return the file that --force lets `check` or `init` replace."""
-    if "--force" in words:
-        for word, command in (("--tune", "check"), ("init", "init")):
-            if command in words and word in words[:-1]:
-                return words[words.index(word) + 1]
+    """Return the file that --force lets `init` replace."""
+    if "--force" in words and "init" in words[:-1]:
+        return words[words.index("init") + 1]
     return ""
 
 

@@ -4,15 +4,12 @@ import json
 from collections.abc import Collection, Mapping
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import scipy.io
 
 from codegen.arrays import Array
-from identifier.export.onnx import export_onnx
 from identifier.methods import make_method
-from identifier.own_network import OnnxModel
 from identifier.paper.design import PaperIdentifier, design_text
 from identifier.run import identify
 from identifier.tire_model import TireModel
@@ -29,7 +26,7 @@ FROZEN = {  # file of weights, and the method that learnt it
     "axle.json": "axle",
     "fit.json": "fit",
     "network.json": "integral",
-    "curve.json": "magic_formula_ekf",
+    "curve.json": "lagged_ekf",
 }
 DESIGNS = {"integral.toml": "integral", "lead.toml": "pi_lead"}
 
@@ -63,11 +60,6 @@ def write_seeds(folder: Path, needed: Collection[str]) -> Mapping[str, bytes]:
     for name, law in FROZEN.items():
         if name in needed:
             _learnt(law, recording, car).save(folder / name)
-    if {"slip.onnx", "own.json"} & set(needed):
-        _write_network(folder / "slip.onnx")
-        OnnxModel.from_onnx(folder / "slip.onnx", car).save(folder / "own.json")
-    if "exported.onnx" in needed:
-        export_onnx(_learnt("integral", recording, car), folder / "exported.onnx")
     return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}
 
 
@@ -145,34 +137,6 @@ def _plain_car(car: Vehicle) -> str:
     lines = [f"{name} = {json.dumps(getattr(car, name))}" for name in FRONT]
     stiffness = [field.name for field in fields(car) if field.name.startswith("cornering")]
     return "\n".join([*lines, *(f"{name} = {getattr(car, name)!r}" for name in stiffness)]) + "\n"
-
-
-def _write_network(path: Path) -> None:
-    """Write a dense network of two slip angles, as other tools write one."""
-    import onnx
-
-    first, second = np.zeros((2, 8)), np.zeros((8, 2))
-    first[0, :4] = first[1, 4:] = (4.0, 6.0, 9.0, 14.0)
-    second[:4, 0], second[4:, 1] = (1200.0, 1500.0, 1800.0, 900.0), (1000.0, 1300.0, 1500.0, 800.0)
-    real = onnx.TensorProto.FLOAT
-    nodes = [
-        onnx.helper.make_node("MatMul", ["input", "first"], ["z"]),
-        onnx.helper.make_node("Tanh", ["z"], ["a"]),
-        onnx.helper.make_node("MatMul", ["a", "second"], ["output"]),
-    ]
-    graph = onnx.helper.make_graph(
-        nodes,
-        "tire",
-        [onnx.helper.make_tensor_value_info("input", real, ["batch", 2])],
-        [onnx.helper.make_tensor_value_info("output", real, ["batch", 2])],
-        [
-            onnx.numpy_helper.from_array(first.astype(np.float32), "first"),
-            onnx.numpy_helper.from_array(second.astype(np.float32), "second"),
-        ],
-    )
-    opset = [onnx.helper.make_opsetid("", 13)]
-    model: Any = onnx.helper.make_model(graph, opset_imports=opset, ir_version=7)
-    path.write_bytes(model.SerializeToString())
 
 
 def _write_path(path: Path) -> None:

@@ -17,7 +17,7 @@ FEW = (
     "2e0",
     "٢",
 )  # more of them is more work, as asked
-PLACES = ("--out", "--tune", "init", "sample")  # what follows is written
+PLACES = ("--out", "init", "sample")  # what follows is written
 OUTS = (
     *(
         "out",
@@ -60,8 +60,6 @@ MORE = (
     *(
         "--freeze nan",
         "--freeze 1e308 -5",
-        "--run x",
-        "--run ",
         "--replay log.csv",
         "--replay :::",
         "--columns x",
@@ -72,22 +70,16 @@ MORE = (
         "--method linear",
         "--method none",
         "--seed -1",
-        "--network slip.onnx",
     ),
     *(
-        "--network-inputs r r",
-        "--network-iso",
         "--weights axle.json",
         "--design integral.toml",
         "--speed 1e999%",
     ),
     *(
-        "--area 1e999x3",
+        "--area 1e999 3",
         "--area x",
         "--steering-ratio 0",
-        "--steering-lag 0",
-        "--after axle.json",
-        "--blind",
         "--speed 0.9",
         "--mu nan",
         "--mu-drop 1e308:1",
@@ -115,7 +107,7 @@ MORE = (
         "--out",
         "--tires all linear",
         "--tires",
-        "--film mp4",
+        "--film gif",
         "--scheduler tcp://[",
     ),
 )

@@ -1,6 +1,6 @@
 """Which faults are planted: drawn by a seed from all that the rules know, nobody chooses.
 
-Packages are folders of two levels, as `identifier/plan`, and what lies beside them, `identifier`.
+Packages are folders of two levels, as `identifier/motion`, and what lies beside them, `identifier`.
 They, and the C files of two, share the faults as they share the lines of code. In a package a kind
 of fault is drawn by the square root of how many there are, so that many swapped arguments do not
 drown few turned conditions; then one of its kind, all alike, none twice.

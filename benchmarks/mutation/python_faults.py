@@ -61,7 +61,7 @@ SPOKEN = {"warn", "warning", "info", "debug", "error", "exception", "say", "prin
 SPOKEN |= {"add_parser", "add_argument_group", "ArgumentParser"}
 HELP = {"help", "description", "metavar", "epilog", "title", "usage"}
 SAME = {"encoding", "strict"}  # UTF-8 is the default here; zip(strict=) guards, it does not compute
-DRAWINGS = ("tireid/figures/", "tireid/animation/")
+DRAWINGS = ("tireid/figures/",)
 PLACED = {"set_ylim", "set_xlim", "tick_params", "legend", "margins", "subplots_adjust", "annotate"}
 PLACED |= {"align_ylabels", "set_title", "set_xlabel", "set_ylabel", "set_label", "set_visible"}
 PLACED |= {"set_position", "set_yticks", "set_xticks", "set_yticklabels", "set_xticklabels"}

@@ -25,8 +25,8 @@ from identifier.axle.chosen import CHOSEN
 from identifier.axle.learning import Regression
 from identifier.band import LEVEL, TINY, BandSpread
 from models.recordings import Recording
+from models.recordings.samples import white_noise
 from models.schema import Table
-from models.sensors import white_noise
 from models.vehicle import Vehicle
 
 RELATIVE = Regression().relative_error  # of the force

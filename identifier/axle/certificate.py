@@ -51,25 +51,20 @@ class Design(Protocol):
         """Slip scales of the units [rad]."""
 
     @property
-    def rising_until(self) -> float | None:
-        """Slip at which force curves do not fall yet [rad]; None bounds no slope."""
-
-    @property
     def dt(self) -> float:
         """Sampling interval [s]."""
 
 
 @cache
-def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | None) -> Array:
+def corners(bounds: Bounds, ladder: tuple[float, ...]) -> Array:
     """Return the corners of the set that weights are kept in, (k, n) [static axle loads].
     ladder : slip scales of the units [rad].
-    rising_until : as of `AxleIdentifier`; None bounds no slope.
     """
     n, most = len(ladder), bounds.weight
-    slabs = [(np.ones(n), (bounds.least_grip, bounds.most_grip))]
-    if rising_until is not None:
-        least = 0.0 if rising_until else bounds.least_stiffness
-        slabs.append((unit_slopes(rising_until, ladder), (least, bounds.most_stiffness)))
+    slabs = [
+        (np.ones(n), (bounds.least_grip, bounds.most_grip)),
+        (1.0 / np.array(ladder), (bounds.least_stiffness, bounds.most_stiffness)),
+    ]
     found = []
     for active in range(len(slabs) + 1):
         for chosen in combinations(slabs, active):
@@ -98,15 +93,13 @@ def corners(bounds: Bounds, ladder: tuple[float, ...], rising_until: float | Non
 
 
 class _CurveFacts(NamedTuple):
-    """What holds of force curves on slips from 0 to `until`, proven cell by cell.
+    """What holds of force curves from zero slip on, proven cell by cell.
     opposes_until, rises_until : slip up to which φ/x and φ' are positive for certain [rad].
-    flattest, steepest : secants φ/x lie between them [static axle loads/rad].
+    steepest : secants φ/x lie below it [static axle loads/rad].
     """
 
-    until: float
     opposes_until: float
     rises_until: float
-    flattest: float
     steepest: float
 
 
@@ -137,10 +130,8 @@ def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> _CurveFact
 
     rising, opposing = least(slopes) > 0.0, least(secants)
     return _CurveFacts(
-        until=until,
         opposes_until=_first(edges, opposing > 0.0),
         rises_until=_first(edges, rising),
-        flattest=float(opposing.min()),
         steepest=float((secants[:-1] @ up + secants[1:] @ down).max()),
     )
 
@@ -219,7 +210,7 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
     Of a car with downforce without the time that a drop of friction takes.
     """
     b, dt = design.bounds, design.dt
-    set_ = corners(b, design.ladder, design.rising_until)
+    set_ = corners(b, design.ladder)
     facts = curve_facts(set_, design.ladder, CHOSEN.largest_slip)
     apart = _widest_range(set_, design.ladder, CHOSEN.largest_slip)
     jump = jump_by_learning(design)
@@ -257,14 +248,12 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
             "slip up to which every possible curve pushes against its slip",
             facts.opposes_until,
             "rad",
-            "for the identified curve on its range: --along LOG",
         ),
         statement(
             "rises_until",
             "slip up to which every possible curve rises",
             facts.rises_until,
             "rad",
-            "for the identified curve on its range: --along LOG",
         ),
         statement("steepest", "steepest secant of any curve", facts.steepest, "static loads/rad"),
         Property(
@@ -310,8 +299,6 @@ def jump_by_learning(design: Design) -> float:
 def _lean_over_rounding(design: Design) -> float:
     """Return how far a limited step leans inwards, over what rounding in float may do to it."""
     n, b = len(design.ladder), design.bounds
-    numbers = b.of_ladder(design.ladder, design.rising_until)
-    per_distance = [numbers.per_grip, numbers.per_weight]
-    if design.rising_until is not None:
-        per_distance += [numbers.per_falling, numbers.per_rising]
-    return float(CHOSEN.lean / max(per_distance) / (8.0 * n * FLOAT * b.weight))
+    inside = b.of_ladder(design.ladder)
+    nearest = max(inside.per_grip, inside.per_weight, inside.per_falling, inside.per_rising)
+    return float(CHOSEN.lean / nearest / (8.0 * n * FLOAT * b.weight))

@@ -6,14 +6,6 @@ from typing import NamedTuple
 class Chosen(NamedTuple):
     """Numbers of this package, by the file that reads them."""
 
-    # along
-    slips: int = 12  # over the range that is known, at which errors are bounded
-    # standard deviations of the prior, within which the truth lies before the drive
-    begin: float = 3.0
-    most_samples: int = 360_000  # samples that are looked at, those at the end
-    smallest: float = 1e-4  # rad: where nothing is known
-    along_tiny: float = 1e-30  # keeps a quotient finite
-    along_rounding: float = 1e-9  # of a bound
     # band
     # rad: ends of the ranges of slip, the last is open
     ranges: tuple[float, ...] = (0.01, 0.02, 0.04, 0.08, 0.16)
@@ -43,21 +35,6 @@ class Chosen(NamedTuple):
     covariance_tiny: float = 1e-30  # keeps quotients of factors finite where one has vanished
     # share of the limit that rounding in float may take in a step
     covariance_rounding: float = 1e-5
-    # guarantee
-    memory: float = 0.3  # s: of the rate, and of slip that was beyond
-    # lateness, over error: chosen as `reserve` of identifier/verdict/chosen.py was
-    unlikely: float = 1.5
-    first: int = 150  # constraints that are tried first
-    more: int = 100  # constraints that are added at a time
-    slack: float = 1e-9  # static axle loads
-    # static axle loads of a ball in the polytope: below it there is no inside
-    least_radius: float = 1e-6
-    # of a size that is divided by: straight ahead nothing is said of the weights
-    guarantee_tiny: float = 1e-12
-    largest_bound: float = 10.0  # static axle loads
-    longest_lateness: float = 1.0  # s
-    most_vertices: int = 100_000  # of a polytope: more take too much memory and time
-    at_once: int = 256  # samples times all vertices: so many products stay in the cache
     # learning
     largest_q: float = 25.0  # of one outlier
     slow_q: float = 4.0  # the slow mean does not follow a change

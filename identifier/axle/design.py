@@ -1,6 +1,5 @@
 """The axle identifier as a method: everything that is chosen before the car drives."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -11,7 +10,6 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.axle.along import certified_along
 from identifier.axle.band import BandCalibration
 from identifier.axle.band_step import band_numbers, hinges
 from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeState, road_push
@@ -21,7 +19,6 @@ from identifier.axle.chosen import CHOSEN
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.gate import Plausibility
-from identifier.axle.guarantee import prior_box
 from identifier.axle.learning import (
     BoundNumbers,
     Bounds,
@@ -41,7 +38,6 @@ from identifier.method import (
     Accelerometer,
     Limits,
     Method,
-    Run,
     Track,
     resumed,
 )
@@ -67,15 +63,12 @@ class AxleIdentifier(Method):
     change : when another friction is accepted, and which errors count less.
     road : what of an accelerometer's a_y tells of a road that is not level.
     ladder : slip scales of the units [rad], rising by powers of two.
-    rising_until : slip at which force curves shall not fall yet [rad]; None leaves them free. At
-        0 the cornering stiffness cannot turn negative, where steering has play or data mislead.
     dt : sampling interval T_s [s].
 
     Raises
     ------
     ValueError
-        Where the ladder does not rise by powers of two, dt is not positive, or rising_until is
-        negative.
+        Where the ladder does not rise by powers of two, or dt is not positive.
     """
 
     prior: Prior
@@ -86,15 +79,12 @@ class AxleIdentifier(Method):
     change: RoadChange = field(default_factory=RoadChange)
     road: RoadSlope = field(default_factory=RoadSlope)
     ladder: tuple[float, ...] = LADDER
-    rising_until: float | None = 0.0
     dt: float = 0.01
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ladder", tuple(self.ladder))  # a list would not hash
         doublings(self.ladder)
         require_positive(ValueError, dt=self.dt)
-        if self.rising_until is not None and not 0.0 <= self.rising_until < math.inf:
-            raise ValueError(f"rising_until must not be negative, it is {self.rising_until}")
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "AxleIdentifier":
@@ -132,10 +122,6 @@ class AxleIdentifier(Method):
             limits=self.limits.boxes,
         )
 
-    def certify_along(self, history: Run) -> Certificate:
-        """Return what is proven of the curves that a run of it taught."""
-        return Certificate(properties=certified_along(self, history))
-
     @property
     def accelerometer(self) -> Accelerometer:
         """What a_y tells of a road that is not level."""
@@ -144,16 +130,14 @@ class AxleIdentifier(Method):
     @property
     def limits(self) -> Limits:
         """Where its estimates stay after every sample."""
-        b, rising = self.bounds, self.rising_until
-        boxes = curve_boxes(b, stiffness=rising == 0.0)
-        if rising is not None:
-            boxes["force_curves_rise_at_slip_rad"] = rising
-        boxes |= {
+        b = self.bounds
+        boxes = curve_boxes(b) | {
+            "force_curves_rise_at_slip_rad": 0.0,
             "sway_share": [0.0, 1.0],
             "v_y_offset_m_s": [-b.v_y, b.v_y],
             "covariance_over_prior": [0.0, self.regression.widest],
         }
-        return Limits(boxes, prior_box(b, self.ladder), self._at_bounds)
+        return Limits(boxes, self._at_bounds)
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -211,10 +195,10 @@ class AxleIdentifier(Method):
                 "regression": np.array(self.regression.at(self.dt)),
                 "changing": np.array(self.change.at(self.dt, self.regression.rate)),
                 "road": np.array(self.road.at(self.dt)),
-                "bounds": np.array(self.bounds.of_ladder(self.ladder, self.rising_until)),
+                "bounds": np.array(self.bounds.of_ladder(self.ladder)),
                 "friction_direction": friction_direction(self.ladder),
                 "per_variance": widest,
-                **self._rising(),
+                "rising": rising_shares(self.ladder),
                 **downforce_numbers(vehicle),
             },
             only_with_a_y=("bank",),
@@ -222,8 +206,7 @@ class AxleIdentifier(Method):
         )
 
     def _scan(self, vehicle: Vehicle, *, bands: bool = False) -> Scan:
-        rises, pressed = self.rising_until is not None, vehicle.has_downforce
-        return _scan(doublings(self.ladder), rises=rises, bands=bands, pressed=pressed)
+        return _scan(doublings(self.ladder), bands=bands, pressed=vehicle.has_downforce)
 
     @property
     def setup_with_band(self) -> Callable[[Vehicle, TireModel | None], Setup]:
@@ -254,22 +237,14 @@ class AxleIdentifier(Method):
         P : covariance of both, (2, n + 3, n + 3): the least move is in its metric.
         """
         n = len(self.ladder)
-        slope = self._rising().get("rising")
-        numbers = self.bounds.of_ladder(self.ladder, self.rising_until)
-        row = np.zeros(n) if slope is None else slope
-        project = _projection(n, slope is not None)
+        numbers, row = self.bounds.of_ladder(self.ladder), rising_shares(self.ladder)
+        project = _projection(n)
         rows = [
             project(np.append(W[i], own[i]), P[i, :n, :n], np.array(numbers), offset, row)
             for i, offset in enumerate((numbers.steering, numbers.v_y))
         ]
         kept = np.array(ca.vertcat(*rows))
         return kept[:, :n], kept[:, n:]
-
-    def _rising(self) -> dict[str, Array]:
-        """Return what the step needs of the slip until which curves shall not fall."""
-        if self.rising_until is None:
-            return {}
-        return {"rising": rising_shares(self.ladder, self.rising_until)}
 
     def tracks(self, vehicle: Vehicle, state: Mapping[str, Array]) -> tuple[Track, ...]:
         """Return cornering stiffness, relaxation length, and the force that curves saturate at.
@@ -342,13 +317,12 @@ def resumed_units(start: TireModel, ladder: tuple[float, ...]) -> AxleModel:
     return resumed(begun(start, ladder), AxleModel, OTHER_STRUCTURE, ladder=ladder)
 
 
-def curve_boxes(b: Bounds, *, stiffness: bool) -> dict[str, Any]:
+def curve_boxes(b: Bounds) -> dict[str, Any]:
     """Return least and largest of what curve, lag and steering have, by name and unit."""
-    bounded_slope = {"stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness]}
     return {
         "grip_static_axle_loads": [b.least_grip, b.most_grip],
         "weight_static_axle_loads": [-b.weight, b.weight],
-        **(bounded_slope if stiffness else {}),
+        "stiffness_static_axle_loads_rad": [b.least_stiffness, b.most_stiffness],
         "compliance_m": [0.0, b.compliance],
         "steering_offset_rad": [-b.steering, b.steering],
     }
@@ -379,7 +353,7 @@ def _within_prior(P: Array, prior: Array, n: int) -> Array:
 
 
 @cache
-def _projection(n: int, rises: bool) -> ca.Function:
+def _projection(n: int) -> ca.Function:
     """Return `bounded` of one axle: [weights, own], P of the weights, numbers, offset, slope."""
     ports, s = symbols(theta=n + 3, P=(n, n), numbers=BoundNumbers, offset=1, slope=n)
     kept = bounded(
@@ -387,12 +361,12 @@ def _projection(n: int, rises: bool) -> ca.Function:
         ca.vertsplit(s.theta),
         {(j, k): s.P[j, k] for j, k in triangle(n)},
         offset=s.offset,
-        slope=ca.vertsplit(s.slope) if rises else None,
+        slope=ca.vertsplit(s.slope),
     )
     return ca.Function("bounded", list(ports.values()), [ca.horzcat(*kept)])
 
 
 @cache
-def _scan(steps: tuple[int, ...], *, rises: bool, bands: bool, pressed: bool) -> Scan:
-    step = build_step(steps, rises=rises, bands=bands, pressed=pressed)
+def _scan(steps: tuple[int, ...], *, bands: bool, pressed: bool) -> Scan:
+    step = build_step(steps, bands=bands, pressed=pressed)
     return Scan(step, carry=CARRY, over=LEARNING_OVER)

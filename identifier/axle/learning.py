@@ -17,7 +17,6 @@ from codegen.arrays import Array
 from identifier.axle.car import larger, reciprocal, smaller, within
 from identifier.axle.chosen import CHOSEN
 from identifier.axle.covariance import Factors, Spread, Symmetric, excited, scaled, updated, width
-from identifier.axle.curve import unit_slopes
 from models.rules import require_positive_fields
 
 
@@ -119,14 +118,12 @@ def filtered(numbers: RegressionNumbers, v: Any, u: Any, first: Any) -> tuple[An
 class Learnt(NamedTuple):
     """Parameters (q entries) and factors of the covariance after an update.
     uncertainty : h'Ph before it.   weights : block of the weights of P before it, by place.
-    gains : Ph/(R + h'Ph), by which the innovation moves the parameters; 0 where nothing is learnt.
     """
 
     theta: list[Any]
     P: Factors
     uncertainty: Any
     weights: Symmetric
-    gains: list[Any]
 
 
 def update(
@@ -172,8 +169,7 @@ def update(
     gain = learns * innovation * a * share
     theta = [one + along * gain for one, along in zip(theta, v, strict=True)]
     after = scaled(updated(P, direction, c), moves * wide)
-    gains = [along * (learns * a * share) for along in v]
-    return Learnt(theta, after, a, spread.weights, gains)
+    return Learnt(theta, after, a, spread.weights)
 
 
 # Another road, and errors that nothing explains.
@@ -356,12 +352,11 @@ class Bounds:
             if not least < most:
                 raise ValueError(f"least_{of} must be below most_{of}, they are {least}, {most}")
 
-    def of_ladder(self, ladder: tuple[float, ...], rising_until: float | None) -> "BoundNumbers":
+    def of_ladder(self, ladder: tuple[float, ...]) -> "BoundNumbers":
         """Return the numbers of a step.
 
         n products of weights that lie in the box sum up to within n + 8 roundings.
         ladder : slip scales of the n units [rad].
-        rising_until : slip at which the slope is bounded [rad]; the least stiffness is one at zero.
 
         Raises
         ------
@@ -369,7 +364,7 @@ class Bounds:
             Where n weights within their box, all equal, cannot carry the middle of the grip, or
             are stiffer or softer than they may.
         """
-        n, slopes = len(ladder), float(unit_slopes(rising_until or 0.0, ladder).sum())
+        n, slopes = len(ladder), float((1.0 / np.array(ladder)).sum())
         rounding = (n + 8) * FLOAT * self.weight
         least, most = self.least_grip + n * rounding, self.most_grip - n * rounding
         center = 0.5 * (least + most) / n
@@ -379,9 +374,9 @@ class Bounds:
                 f"{n} weights up to {self.weight} cannot carry a grip of {self.least_grip} to "
                 f"{self.most_grip}"
             )
-        flattest = (0.0 if rising_until else self.least_stiffness / slopes) + rounding
+        flattest = self.least_stiffness / slopes + rounding
         steepest = self.most_stiffness / slopes - rounding
-        if rising_until is not None and not flattest < center < steepest:
+        if not flattest < center < steepest:
             raise ValueError(
                 f"a ladder of {n} units of equal weight has a stiffness of {center * slopes:g} "
                 f"loads/rad, outside of {self.least_stiffness:g} to {self.most_stiffness:g}"
@@ -402,11 +397,11 @@ class Bounds:
         )
 
 
-def rising_shares(ladder: tuple[float, ...], slip: float) -> Array:
-    """Return the derivatives of the units at a slip over their sum, (n,), as `bounded` wants them.
-    ladder : slip scales of the units [rad].   slip : until which curves shall not fall [rad].
+def rising_shares(ladder: tuple[float, ...]) -> Array:
+    """Return the units' slopes at zero slip over their sum, (n,), as `bounded` wants them.
+    ladder : slip scales of the units [rad].
     """
-    slopes = unit_slopes(slip, ladder)
+    slopes = 1.0 / np.array(ladder)
     return np.asarray(slopes / slopes.sum(), dtype=np.float64)
 
 
@@ -445,19 +440,17 @@ def bounded(
     P: Symmetric,
     *,
     offset: Any,
-    slope: list[Any] | None = None,
+    slope: list[Any],
 ) -> list[Any]:
     """Return [w, s, k, offset] of an axle within its bounds; what is within them is not moved.
     theta : parameters, n + 3 entries.
     P : covariance of the weights, the metric: upper triangle by place.
-    slope : derivatives of the units at a slip over their sum, n entries; the curve's is bounded
-        there.
+    slope : of `rising_shares`, n entries.
     """
     n = len(theta) - 3
     w, (s, k, o) = theta[:n], theta[n:]
-    w = _gripping(numbers, w, P) if slope is None else _rising(numbers, w, P, slope)
     return [
-        *towards_center(numbers, w, slope),
+        *towards_center(numbers, _rising(numbers, w, P, slope), slope),
         within(s, 0, numbers.compliance),
         within(k, 0, 1),
         within(o, -offset, offset),
@@ -476,14 +469,6 @@ def _times(P: Symmetric, row: list[Any]) -> list[Any]:
 def _positive(x: Any) -> Any:
     """Return a size that rounding may have made zero or negative, as a divisor."""
     return larger(x + CHOSEN.learning_tiny, CHOSEN.learning_tiny)
-
-
-def _gripping(numbers: BoundNumbers, w: list[Any], P: Symmetric) -> list[Any]:
-    """Move w by the least, in the metric of P, so that its grip is in range."""
-    along = _times(P, [1] * len(w))
-    grip = sum(w)
-    move = (within(grip, numbers.least_grip, numbers.most_grip) - grip) / _positive(sum(along))
-    return [a + b * move for a, b in zip(w, along, strict=True)]
 
 
 def _rising(numbers: BoundNumbers, w: list[Any], P: Symmetric, slope: list[Any]) -> list[Any]:
@@ -508,13 +493,12 @@ def _rising(numbers: BoundNumbers, w: list[Any], P: Symmetric, slope: list[Any])
     return [a + b * to_grip + c * to_slope for a, b, c in zip(w, by_grip, by_slope, strict=True)]
 
 
-def towards_center(numbers: BoundNumbers, w: list[Any], slope: list[Any] | None) -> list[Any]:
+def towards_center(numbers: BoundNumbers, w: list[Any], slope: list[Any]) -> list[Any]:
     """Move w towards the center of the set until every bound holds."""
     away = [one - numbers.center for one in w]
     over = larger(ca.fabs(sum(away)) * numbers.per_grip, 1)
-    if slope is not None:
-        steep = _dot(slope, away)
-        over = larger(larger(-steep * numbers.per_falling, steep * numbers.per_rising), over)
+    steep = _dot(slope, away)
+    over = larger(larger(-steep * numbers.per_falling, steep * numbers.per_rising), over)
     for one in away:
         over = larger(ca.fabs(one) * numbers.per_weight, over)
     part = reciprocal(over)

@@ -24,15 +24,6 @@ from identifier.axle.chosen import CHOSEN
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.dynamics import curve_at_speed, lagged_force, series_compliance
 from identifier.axle.gate import GateState, Plausibility
-from identifier.axle.guarantee import (
-    Doubt,
-    Guarantee,
-    PossibleWeights,
-    along_acceleration,
-    force_rate,
-    grip_lost,
-    slip_beyond,
-)
 from identifier.axle.prior import friction_direction
 from identifier.axle.slip import SHORTEST, Sensors, Sway, SwayState
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
@@ -83,7 +74,6 @@ class AxleModel(TireModel):
     sensors : errors that were known before it learnt, and stay.
     calibration : of the band, by segments that did not teach it; None where nobody calibrated.
     tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
-    possible : weights that the drive left; None where nobody asked for a guarantee.
     force_missed : share of the measured force that it misses of the drive that taught, rms, (2,);
         None where nobody looked.
     """
@@ -105,7 +95,6 @@ class AxleModel(TireModel):
     sensors: Sensors = EXACT
     calibration: BandCalibration | None = None
     tells_v_y: bool = False
-    possible: PossibleWeights | None = None
     force_missed: Array | None = None
 
     def __post_init__(self) -> None:
@@ -199,52 +188,6 @@ class AxleModel(TireModel):
         slope: Array = ((1.0 - units**2) * self.W / scales).sum(axis=-1)
         return slope
 
-    @property
-    def guarantee(self) -> Guarantee | None:
-        if self.possible is None:
-            return None
-        at = (self.ladder, self.driven_slip, self._loads, self.min_speed)
-        return Guarantee(self.possible, *at, self.signals_of)
-
-    def signals_of(self, recording: Recording) -> tuple[Array, Doubt]:
-        """Return units times load and cos δ over a drive, (n, 2, ladder), and what opens a band.
-
-        ρ is of the model's force; where a guarantee is stated, of that possible one which changes
-        most, and the slower the car is against the drive that taught, the larger: the lag of a tire
-        is a length.
-        """
-        slip, dt, segments = self.lagged_slip(recording), recording.dt, recording.segments
-        T = np.stack([unit_matrix(slip[:, i], self.ladder) for i in range(2)], axis=1)
-        pressed = self.vehicle.load_ratio(recording.v_x)
-        T *= pressed[..., None]
-        beyond = slip_beyond(slip, self.driven_slip, dt, segments)
-        if self.possible is None:
-            rate = force_rate(T, (self.W[:1], self.W[1:]), dt, segments)
-        else:
-            rate = force_rate(T, self.possible.corners, dt, segments)
-            v_x = np.maximum(recording.v_x, self.min_speed)
-            rate *= np.maximum(self.possible.speed / v_x, 1.0)[:, None]
-            beyond += self.possible.too_fast(rate)
-        v_y = 0.0 if recording.v_y is None else recording.v_y
-        along = along_acceleration(recording.v_x, v_y * recording.r, dt, segments)
-        carried = (unit_matrix(self.driven_slip, self.ladder) * self.W).sum(axis=1) * pressed
-        doubt = Doubt(
-            beyond=beyond,
-            rate=rate,
-            lost=grip_lost(along[:, None] * self.vehicle.mass / self._loads, carried),
-        )
-        delta = self.sensors.steering(recording.delta_f)
-        T *= np.cos(np.column_stack([delta, recording.delta_r]))[..., None]
-        return T, doubt
-
-    @property
-    def driven_slip(self) -> Array:
-        """Largest slip that was seen while learning [rad], (2,); at least that of the first unit,
-        below which any curve is a line.
-        """
-        driven: Array = np.maximum(self.excitation[:, 0], self.ladder[0])
-        return driven
-
     def estimates(self) -> tuple[Estimate, ...]:
         """Return stiffness, grip, relaxation length and offset of each axle, with their doubt.
 
@@ -293,8 +236,8 @@ class AxleModel(TireModel):
         return tuple(lines)
 
     def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
-        # Both were shown of this car alone.
-        return replace(self, vehicle=vehicle, possible=None, force_missed=None)
+        # It was measured on this car alone.
+        return replace(self, vehicle=vehicle, force_missed=None)
 
     def at_friction(self, ratio: float) -> "AxleModel":
         require_positive(ValueError, ratio=ratio)
@@ -309,8 +252,7 @@ class AxleModel(TireModel):
             covariance=self.covariance * np.outer(unit, unit),
             prior_covariance=self.prior_covariance * np.outer(unit, unit),
             excitation=excitation,
-            possible=None,  # of the road that taught, as is what is missed
-            force_missed=None,
+            force_missed=None,  # of the road that taught
         )
 
     @property
@@ -389,7 +331,6 @@ class AxleModel(TireModel):
             "relaxation_length_m": self.relaxation_length.tolist(),
             "known_slip_rad": self.known_slip.tolist(),
             **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
-            **({} if self.possible is None else {"guarantee": self.possible.to_dict()}),
             **({"sensors": self.sensors._asdict()} if any(self.sensors) else {}),
             **({"tells_v_y": True} if self.tells_v_y else {}),
             **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
@@ -417,9 +358,6 @@ class AxleModel(TireModel):
             numbers["sensors"] = Sensors(*(sensors.number(name) for name in Sensors._fields))
         if "band" in table:
             numbers["calibration"] = BandCalibration.from_dict(table.value("band"))
-        if "guarantee" in table:
-            data = table.table("guarantee").data
-            numbers["possible"] = PossibleWeights.from_dict(data, len(ladder))
         tells = table.data.get("tells_v_y", False)
         if not isinstance(tells, bool):
             table.refuse("tells_v_y", f"must be true or false, it is {shown(tells)}")
@@ -527,7 +465,7 @@ class _AxleBand(Band[AxleModel]):
         change = sd_friction * model.W @ friction_direction(model.ladder).T
         wider = model.covariance.copy()
         wider[:, :n, :n] += change[:, :, None] * change[:, None, :]
-        return replace(model, covariance=wider, possible=None)
+        return replace(model, covariance=wider)
 
     def _samples(self, n: int, rng: np.random.Generator) -> tuple[AxleModel, ...]:
         model, calibration = self.model, self.calibration
@@ -604,7 +542,7 @@ def begun(model: TireModel, ladder: tuple[float, ...] = LADDER) -> TireModel:
     limits = Plausibility.for_vehicle(fit.vehicle)
     most = np.array([limits.max_steering, limits.slow])
     excitation = np.zeros((2, 1 + len(EDGES)))
-    excitation[:, 0] = fit.driven
+    excitation[:, 0] = fit.reach.slip
     return AxleModel(
         vehicle=fit.vehicle,
         ladder=ladder,
@@ -631,7 +569,7 @@ def _begun_axle(fit: Any, i: int, ladder: tuple[float, ...]) -> tuple[Array, Arr
     units = np.vstack([unit_matrix(slip, ladder) * weight[:, None], 1e-4 * np.eye(n)])
     weights_of = np.linalg.pinv(units)[:, : slip.size] * weight
     phi, _, J = fit.curve_at(np.column_stack([slip, slip]))
-    v_x = float(fit.speeds.mean())
+    v_x = float(fit.reach.speeds.mean())
     zeros = {"steering_zero": 1.0} if i == 0 else {"v_y_bias": 1.0, "v_y_angle": v_x}
     names = (f"compliance_{axle}", f"sway_share_{axle}", *zeros)
     index = [*curve_index(axle), *(INDEX[name] for name in names)]
@@ -641,6 +579,6 @@ def _begun_axle(fit: Any, i: int, ladder: tuple[float, ...]) -> tuple[Array, Arr
     to[n + 2, 11:] = list(zeros.values())
     P, before = (
         to @ whole[np.ix_(index, index)] @ to.T + LEAST_VARIANCE * np.eye(n + 3)
-        for whole in (fit.covariance, fit.covariance_before)
+        for whole in (fit.covariance, fit.band.prior_covariance)
     )
     return weights_of @ phi[:, i], P, before

@@ -286,10 +286,9 @@ class _Sample(NamedTuple):
 
 
 def build_step(
-    steps: tuple[int, ...], *, rises: bool = False, bands: bool = False, pressed: bool = False
+    steps: tuple[int, ...], *, bands: bool = False, pressed: bool = False
 ) -> ca.Function:
     """Return the step; every number stays an input of it.
-    rises : whether curves are kept from falling at a slip; adds the input `rising` (n,).
     bands : whether half the width of the band is given, too; adds the output `half_band` (2,) [N]
         and the inputs that it needs.
     pressed : whether the load of the axles changes with speed; adds the input `downforce` (2,).
@@ -298,7 +297,7 @@ def build_step(
     ports, s = symbols(
         **_learning_ports(n, pressed=pressed),
         bounds=BoundNumbers,
-        **({"rising": n} if rises else {}),
+        rising=n,
         excitation=(2, 1 + len(EDGES)),
         **(_band_ports(n) if bands else {}),
     )
@@ -320,7 +319,7 @@ def build_step(
     outputs = {AXLE_FORCE.name: f.axle_force}
     if bands:
         outputs[HALF_BAND.name] = _half_band(f, s)
-    name = _name("axle_step", steps, rising=rises, bands=bands, pressed=pressed)
+    name = _name("axle_step", steps, rising=True, bands=bands, pressed=pressed)
     return step_function(name, ports, {port: next_state[port] for port in CARRY}, outputs)
 
 
@@ -345,28 +344,6 @@ def _half_band(f: _Forward, s: SimpleNamespace) -> Any:
         return half_band(at, P, prior, mine, slips, speeds)
 
     return ca.if_else(f.gated.on, ca.vertcat(of_axle(0), of_axle(1)) * s.car.load, 0)
-
-
-TAUGHT = ("h", "e", "counts", "gains", "declared")
-
-
-def build_taught(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
-    """Return what a sample teaches, of the ports of the step: the recursion that errors obey.
-
-    Its outputs are the regressors h (2, q); e = y - h'w (2,), w before a change of the road;
-    which share of e counts, after clipping; the gains K (2, q), 0 where nothing is learnt; and the
-    declared standard deviation of y (2,), without what the means of squared errors add.
-    """
-    ports, s = symbols(**_learning_ports(len(steps) + 1, pressed=pressed))
-    f = _forward(s, steps)
-    h, y, _ = _regression(f, s)
-    y, _ = _without_bank(f, s, y)
-    sample, _ = _sample_of(f, s, h, y)
-    gains = ca.vertcat(*(ca.horzcat(*_learn(s, sample, i).gains) for i in (0, 1)))
-    e = sample.e + ca.sum2(sample.h[:, : s.W.shape[1]] * (sample.W - s.W))
-    counts = ca.if_else(e == 0, 1, sample.innovation / e)
-    outputs = dict(zip(TAUGHT, (sample.h, e, counts, gains, sample.sigma), strict=True))
-    return step_function(_name("axle_taught", steps, pressed=pressed), ports, {}, outputs)
 
 
 def _regression(f: _Forward, s: SimpleNamespace) -> tuple[Any, Any, dict[str, Any]]:
@@ -520,8 +497,7 @@ def _learn(s: SimpleNamespace, sample: _Sample, i: int) -> Learnt:
 def _bounded(s: SimpleNamespace, learnt: Learnt, i: int) -> Any:
     """Return the parameters of axle i after the sample, within their bounds (1, q)."""
     n, limits = s.W.shape[1], s.bounds
-    slope = ca.vertsplit(s.rising) if hasattr(s, "rising") else None
-    offset = (limits.steering, limits.v_y)[i]
+    offset, slope = (limits.steering, limits.v_y)[i], ca.vertsplit(s.rising)
     theta = bounded(limits, learnt.theta, learnt.weights, offset=offset, slope=slope)
     last = ca.horzsplit(s.W[i, :])
     return ca.horzcat(*limited(limits, s.regression.per_step, last, theta[:n]), *theta[n:])

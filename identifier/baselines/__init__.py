@@ -1,8 +1,7 @@
-"""What the default is compared with: known estimators."""
+"""What the default is compared with: the vehicle's linear tire, and a short Kalman filter."""
 
-from identifier.baselines.curve_ekf import CurveEkf, magic_formula_ekf
 from identifier.baselines.curves import CurveModel
 from identifier.baselines.lagged_ekf import LaggedEkf
-from identifier.baselines.linear import LinearBaseline
+from identifier.baselines.linear import LinearBaseline, LinearModel
 
-__all__ = ["CurveEkf", "CurveModel", "LaggedEkf", "LinearBaseline", "magic_formula_ekf"]
+__all__ = ["CurveModel", "LaggedEkf", "LinearBaseline", "LinearModel"]

@@ -21,8 +21,9 @@ from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.run import History, identify
 from identifier.tire_model import TireModel
 from identifier.verdict.chosen import CHOSEN as VERDICT_CHOSEN
-from identifier.verdict.motion import Windows, clean_rms, measured_force, noise_variance
+from identifier.verdict.motion import brisk_windows, clean_rms, measured_force, noise_variance
 from models.recordings import Recording
+from models.recordings.evidence import Windows
 from models.vehicle import Vehicle
 
 INFINITE = AxleRmse(front=np.inf, rear=np.inf)
@@ -66,7 +67,7 @@ class Course:
         return f"RMSE of the axle force{by}"
 
     def _windows(self, recording: Recording) -> Windows:
-        return Windows.of(
+        return brisk_windows(
             recording, max(self.min_speed, VERDICT_CHOSEN.brisk * self.vehicle.froude_speed)
         )
 

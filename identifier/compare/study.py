@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from identifier.compare.course import Course, Shares, Trial, cross_replay, shares, step_times
-from identifier.method import Method
 from identifier.methods import REFERENCE, make_method
 from identifier.run import History
 from models.recordings import Recording
@@ -54,16 +53,14 @@ def run_comparison(
     *,
     seed: int,
     progress: Callable[[str], None],
-    others: Mapping[str, Method] | None = None,
     left_out: Mapping[str, str] | None = None,
     seen: Callable[[str, History], None] | None = None,
 ) -> Comparison:
     """Run every method over every recording.
     recordings : with true forces, or judged by the motion.
-    others : further methods by name.   seen : called with each method's name and run.
+    seen : called with each method's name and run.
     """
-    methods: dict[str, Method] = {name: make_method(name, vehicle, seed) for name in names}
-    methods |= others or {}
+    methods = {name: make_method(name, vehicle, seed) for name in names}
     slowest = max(method.min_speed for method in methods.values())
     course = Course(vehicle=vehicle, recordings=tuple(recordings), min_speed=slowest)
     trials = {}

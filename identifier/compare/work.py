@@ -6,7 +6,6 @@ import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -15,25 +14,6 @@ from typing import Any
 import numpy as np
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
-
-
-@contextmanager
-def spread(workers: int, *, chunk: int = 1) -> Iterator[Map]:
-    """Yield a `map` that uses several processes; work that has not begun is dropped on an error.
-
-    Fresh processes rather than threads: the compiled loops release Python's lock, but what is
-    around them does not, and CasADi's graphs must not be built by two threads at once.
-    workers : number of processes; the functions and their arguments must be picklable.
-    chunk : number of items that a process takes at once.
-    """
-    if workers == 1:
-        yield map
-        return
-    pool = fresh_processes(workers)
-    try:
-        yield lambda work, items: pool.map(work, items, chunksize=chunk)
-    finally:
-        pool.shutdown(cancel_futures=True)
 
 
 def fresh_processes(workers: int, prepare: Callable[[], None] | None = None) -> ProcessPoolExecutor:

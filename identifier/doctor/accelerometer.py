@@ -50,7 +50,7 @@ class Accelerometer:
         self.usual = np.array([0.04, 0.03, roll, 0.012 * L, 1e-6])
         self.memory = 0.0
         width = float(np.sqrt(L / SEDAN)) * ESTIMATE_CHOSEN.smoothed
-        self.shown = [
+        self.measured = [
             box(thinned(one.needed("a_y"), drive.every), round(width / drive.dt) | 1)
             for one, drive in zip(segments, drives, strict=True)
         ]
@@ -71,12 +71,12 @@ class Accelerometer:
     def _line(self, p: Array, sd: Array, late: float) -> tuple[Line, float]:
         """Return the line where a_y is read later, and by how much more it is late."""
         y, X, seconds = [], [], 0.0
-        for one, shown in zip(self.drives, self.shown, strict=True):
+        for one, measured in zip(self.drives, self.measured, strict=True):
             v_x, v_y, r = _motion(one, p)
             count = CHOSEN.filtered / one.dt
             K = box(gradient(box(v_y, count / 3), one.dt) + v_x * r, count)
-            at = np.arange(shown.size)
-            felt = box(np.interp(at + late / one.dt, at, shown), count)
+            at = np.arange(measured.size)
+            felt = box(np.interp(at + late / one.dt, at, measured), count)
             slope = gradient(felt, one.dt)
             turning = gradient(box(r, count), one.dt)
             every = max(1, round(CHOSEN.stride / one.dt))

@@ -68,26 +68,14 @@ class Chosen(NamedTuple):
     alone: float = 2.8  # price of a v_y in another unit than v_x
     unusual: float = 2.0  # price of a v_y that is an angle in deg
     # samples
-    spike: float = 12.0  # times the noise beyond its neighbors
     freeze: float = 0.3  # [s] that a noisy channel repeats one number
     moves: float = 0.15  # of the range of v_x r, by which a car must move meanwhile, in any unit
-    # correlation of neighboring second differences, below which they are noise
-    alternate: float = -0.35
     repeated: float = 0.01  # of a noisy channel: share of repeated samples
-    few: int = 5  # of a noisy channel: how often it repeats; steps that tell the quantum of one
+    few: int = 5  # of a noisy channel: how often it repeats
     caught_up: float = 0.025  # of a rounded channel: share of samples after which it catches up
-    # of a step after a rest, that the next but one has where a channel begins to move
-    goes_on: float = 0.6
-    on_grid: float = 0.9  # of steps that are multiples of the smallest
-    outlier: float = 16.0  # times the variance that is expected of a difference, and not more
     alike_delays: float = math.log(1.6)  # of the times by which samples of two channels are late
     coarse: float = 0.05  # quantum over the rms of a channel
     certain: float = 0.99  # confidence in what samples show by themselves
-    block: int = 5  # samples in a row that were logged before, of all channels
-    shortest_jump: float = 4.0  # samples that a jump has at least
-    side: int = 12  # samples on each side of a jump
-    jump: float = 5.5  # of the usual disagreement of both sides of a jump, in two channels
-    also: float = 2.5  # of the same disagreement, in a third channel
     # screen
     # [m/s^2] of v_x r, which a drive must exceed in a share `lively` of its windows
     quiet: float = 0.8

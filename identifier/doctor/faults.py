@@ -91,7 +91,7 @@ class Examination(NamedTuple):
 
 class Candidate(NamedTuple):
     """A suspect that was fitted beside what is there: its value, deviation and gain of J.
-    shown : how much it brings over the value zero; of what is no state of the estimate, `gain`.
+    brings : how much over the value zero; of what is no state of the estimate, `gain`.
     felt : of the gain what the accelerometer says; negative where it speaks against it.
     """
 
@@ -99,7 +99,7 @@ class Candidate(NamedTuple):
     value: float
     deviation: float
     gain: float
-    shown: float
+    brings: float
     felt: float
     post: Posterior | None
 
@@ -183,7 +183,9 @@ class Search:
 
         That is the gain that it promises, its value, and its deviation.
         """
-        every = self.problem.under(_all_move(self.problem.priors)).residuals(base.p)
+        moves = np.ones(self.problem.priors.moves.size, dtype=bool)
+        all_move = replace(self.problem.priors, moves=moves)
+        every = self.problem.under(all_move).residuals(base.p)
         H, g = normal(self.problem, every, base.scale**2, base.memory)
         before = self.priors(self.wide).cost(base.p)
         for one in self.left(of_model=True):
@@ -242,10 +244,10 @@ class Search:
             post, sd, line, moved = self.both(post, one.parameter)
             value, felt = post[one.parameter], before - line
             gain += felt - moved
-        shown = gain
+        brings = gain
         if base.sd(one.parameter) > 0.0:
-            shown = max(gain, 0.5 * value**2 / (sd**2 + self.least(one) ** 2))
-        return Candidate(one, value, sd, gain, shown, felt, post)
+            brings = max(gain, 0.5 * value**2 / (sd**2 + self.least(one) ** 2))
+        return Candidate(one, value, sd, gain, brings, felt, post)
 
     def both(self, post: Posterior, name: str) -> tuple[Posterior, float, float, float]:
         """Return an estimate moved along a parameter to where a_y fits too; its sd and both J.
@@ -290,8 +292,8 @@ class Search:
         """Return whether a size stands out and is one that devices and cars have."""
         telling = abs(one.value) > RULES.telling * self.deviation(one)
         most = 3.5 * one.suspect.scaled(one.suspect.wide, self.vehicle)
-        possible = one.suspect.possible(one.suspect.size(one.value), self.vehicle)
-        return telling and possible and abs(one.value) < most and one.felt > -RULES.against
+        plausible = one.suspect.plausible(one.suspect.size(one.value), self.vehicle)
+        return telling and plausible and abs(one.value) < most and one.felt > -RULES.against
 
     def deviation(self, one: Candidate) -> float:
         return math.hypot(one.deviation, self.least(one.suspect))
@@ -303,7 +305,7 @@ class Search:
             listed = self.candidates(base)
             # What gains before what the estimate has anyhow, as a state that stands out.
             chosen = [one for one in listed if one.gain > RULES.gain] or sorted(
-                (one for one in listed if one.shown > RULES.gain), key=lambda one: -one.shown
+                (one for one in listed if one.brings > RULES.gain), key=lambda one: -one.brings
             )
             if not chosen:
                 break
@@ -342,11 +344,11 @@ class Search:
         Each half is asked about a fault that the other half was fitted on.
         """
         suspect, wide = best.suspect, self.widened(best.suspect)
-        lead = best.shown - (rival.gain if rival is not None else 0.0)
+        lead = best.brings - (rival.gain if rival is not None else 0.0)
         clear = abs(best.value) > RULES.clear * self.deviation(best) and suspect.code not in NOTES
         # A factor of v_x changes what the accelerometer must show: it has to agree.
         agreed = best.felt > (RULES.ahead if suspect.parameter == "v_x_factor" else -1.0)
-        if best.shown < RULES.sure or lead < RULES.ahead or not (clear and agreed):
+        if best.brings < RULES.sure or lead < RULES.ahead or not (clear and agreed):
             return False
         if best.post is None:  # of the accelerometer: it changes no tire
             return True
@@ -374,25 +376,25 @@ class Search:
 
         The model of a half is one Gauss-Newton step from that of the whole.
         parts : which residuals are of each half, (m,) each.
-        zero : a suspect that is held at zero.
+        zero : a suspect that is fixed at zero.
         """
         problem = self.problem.under(self.priors(wide))
         at = problem.residuals(post.p)
         pull, P = around_beliefs(problem.priors, post.p)
         pull, P = pull[problem.index], P[np.ix_(problem.index, problem.index)]
         shares = np.empty(2)
-        for k, (learnt, asked) in enumerate(((parts[1], parts[0]), (parts[0], parts[1]))):
+        for k, (learnt, evaluated) in enumerate(((parts[1], parts[0]), (parts[0], parts[1]))):
             H, g = normal(problem.weighted(learnt), at, post.scale**2, post.memory)
             H, g = H + P, g + pull
             step = np.zeros(problem.index.size)
             free = np.ones(step.size, dtype=bool)
             if zero is not None:
-                held = np.isin(problem.index, [INDEX[name] for name in zero.parameters])
-                free, step[held] = ~held, -post.p[problem.index[held]]
+                fixed = np.isin(problem.index, [INDEX[name] for name in zero.parameters])
+                free, step[fixed] = ~fixed, -post.p[problem.index[fixed]]
             rest = g[free] + H[np.ix_(free, ~free)] @ step[~free]
             step[free] = -np.linalg.solve(H[np.ix_(free, free)], rest)
             e = (at.e + at.slopes @ step) * problem.size[:, None]
-            shares[k] = math.sqrt(float((asked @ e**2).mean() / (asked @ problem.force**2)))
+            shares[k] = math.sqrt(float((evaluated @ e**2).mean() / (evaluated @ problem.force**2)))
         return shares
 
     def findings(self, post: Posterior) -> Iterator[Finding]:
@@ -408,8 +410,8 @@ class Search:
                 value, sd = post[name], post.sd(name)
             best = first._replace(value=value, deviation=sd)
             left = [x for x in alike if x.suspect.parameter not in {*self.wide, *names}]
-            brought = np.array([RULES.gain / 2.0, first.shown, *(one.gain for one in left)])
-            shares = np.exp((brought - first.shown) / RULES.temper)
+            brought = np.array([RULES.gain / 2.0, first.brings, *(one.gain for one in left)])
+            shares = np.exp((brought - first.brings) / RULES.temper)
             shares /= shares.sum()
             sure = sure and all(one.is_late_as(first) for one in left)
             for one, share in zip((best, *left), shares[1:], strict=True):
@@ -438,7 +440,7 @@ class Search:
             group=real * likely[1],
             text=text,
             repair=repair,
-            sure=sure and repair is not None and suspect.possible(size, vehicle),
+            sure=sure and repair is not None and suspect.plausible(size, vehicle),
             note=suspect.code in NOTES,
         )
 
@@ -446,14 +448,10 @@ class Search:
         """Yield what this drive tells next to nothing of, beside what was found."""
         for one, _, _, left in self.steps(post):
             if left > RULES.untold * one.scaled(one.wide, self.vehicle):
-                least = f"{left * one.per_unit:.2g}{one.shown}"
+                least = f"{left * one.per_unit:.2g}{one.text_unit}"
                 if one.code in ("factor", "yaw_inertia"):
                     least = f"a factor of {1.0 + left:.2g}"
                 yield f"{one.name}: {least} is not observable on this drive"
-
-
-def _all_move(priors: Priors) -> Priors:
-    return replace(priors, moves=np.ones(priors.moves.size, dtype=bool))
 
 
 def examine(recording: Recording, vehicle: Vehicle) -> Examination:

@@ -65,11 +65,6 @@ class Finding:
         """The confidence as text; 99 % at most, as a log alone proves nothing."""
         return f"{100.0 * min(self.confidence, CHOSEN.most_confidence):.0f} %"
 
-    @property
-    def subject(self) -> tuple[str, str]:
-        """Code and channel: a log has one finding of each."""
-        return self.code, self.channel
-
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain numbers and words, ready for JSON; None is what is not known."""
 
@@ -92,8 +87,8 @@ class Finding:
 
 
 def first_of_each(findings: Iterable[Finding]) -> list[Finding]:
-    """Return findings without the second of one subject."""
+    """Return findings, of each code and channel the first."""
     kept: dict[tuple[str, str], Finding] = {}
     for one in findings:
-        kept.setdefault(one.subject, one)
+        kept.setdefault((one.code, one.channel), one)
     return list(kept.values())

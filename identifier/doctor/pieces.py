@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from codegen.arrays import blocks, large
 from identifier.doctor.chosen import CHOSEN
 from identifier.verdict.chosen import CHOSEN as VERDICT_CHOSEN
-from identifier.verdict.motion import Windows
 from models.recordings import Recording
+from models.recordings.evidence import Windows
 from models.vehicle import Vehicle
 
 

@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identifier.doctor.chosen import CHOSEN
-from identifier.doctor.consistency import Motion
 from identifier.doctor.finding import Finding
 from identifier.doctor.pieces import driven_pieces, driven_windows, looked_at, usual_speed
-from identifier.doctor.readings import ARM, DEGREE, Change, Read, read
+from identifier.doctor.readings import ARM, DEGREE, Change, Motion, Read, read
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.suspects import similar_inertia, usual_inertia
 from identifier.measured import with_doubt
@@ -63,7 +62,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
         return Screened(findings=(*samples, *given), repair=Repair(), blind=blind)
     some, hidden = looked_at(mended)[0], sorted(motion.hidden)
 
-    def possible(changes: tuple[Change, ...]) -> bool:
+    def admissible(changes: tuple[Change, ...]) -> bool:
         try:
             read_so, _ = _repair_of(changes).apply(some, vehicle)
         except RecordingError:  # beyond what a car does
@@ -84,17 +83,22 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
             without=None if found.without is None else screened(found.without),
         )
 
-    return screened(read(motion, vehicle, possible))
+    return screened(read(motion, vehicle, admissible))
 
 
 def _gross_findings(found: Read, vehicle: Vehicle) -> list[Finding]:
     """Return what the best reading says is grossly wrong; a reading is judged as a whole."""
-    gross = [
-        _reading_finding(part, found, vehicle)
-        for change in found.best.gross
-        for part in (change.parts if change.code == "unit" else (change,))
-    ]
-    gross = _one_steering(gross)
+    parts: list[Change] = []
+    for change in found.best.gross:
+        pairs = zip(change.channels, change.factors, strict=True) if change.code == "unit" else ()
+        each = [replace(change, channels=(name,), factors=(factor,)) for name, factor in pairs]
+        parts += each or [change]
+    gross = [_reading_finding(part, found, vehicle) for part in parts]
+    of_steering = [one for one in gross if one.channel == "delta_f" and one.repair is not None]
+    if len(of_steering) > 1:  # one angle: factors multiply
+        factor = math.prod(one.repair.factor["delta_f"] for one in of_steering if one.repair)
+        others = [one for one in gross if one not in of_steering]
+        gross = [steering_finding(factor, of_steering[0].confidence), *others]
     return doubted(gross, gross)
 
 
@@ -186,16 +190,6 @@ def _unlike(vehicle: Vehicle) -> list[Finding]:
             repair=Repair(vehicle={"yaw_inertia": similar}),
         )
     ]
-
-
-def _one_steering(gross: list[Finding]) -> list[Finding]:
-    """Return findings with one of the steering angle where there were several: factors multiply."""
-    of_steering = [one for one in gross if one.channel == "delta_f" and one.repair is not None]
-    if len(of_steering) < 2:
-        return gross
-    factor = math.prod(one.repair.factor["delta_f"] for one in of_steering if one.repair)
-    one = steering_finding(factor, of_steering[0].confidence)
-    return [one, *(other for other in gross if other not in of_steering)]
 
 
 def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:

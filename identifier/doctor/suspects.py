@@ -44,8 +44,8 @@ class Suspect(NamedTuple):
     parameter : of `motion.parameters` that tells it, or "a_y." and what an accelerometer has.
     code, channel, unit : as in `Finding`.   wide : standard deviation of what it may be, of the
     parameter, of a sedan.   least : what nobody need mend, and what no model of this size tells
-    from a tire.   grows : both with the size of a car.   text : with {size} in `shown`, {origin}
-    of a number of the car.   shown : unit of the text.   per_unit : of the text per SI unit.
+    from a tire.   grows : both with the size of a car.   text : with {size} in `text_unit`, and
+    {origin} of a number of the car.   per_unit : unit of the text per SI unit.
     """
 
     parameter: str
@@ -56,7 +56,7 @@ class Suspect(NamedTuple):
     least: float
     grows: str
     text: str
-    shown: str = ""
+    text_unit: str = ""
     per_unit: float = 1.0
 
     @property
@@ -107,7 +107,7 @@ class Suspect(NamedTuple):
                 numbers = {"vehicle": right}
         return Repair(**numbers)
 
-    def possible(self, size: float, vehicle: Vehicle) -> bool:
+    def plausible(self, size: float, vehicle: Vehicle) -> bool:
         """Return whether a device can have such a size, and the car without it be a car."""
         match self.code:
             case "lag":
@@ -129,10 +129,10 @@ class Suspect(NamedTuple):
         if self.code == "center_of_gravity":
             swapped = abs(vehicle.l_f - vehicle.l_r - size) < 1.5 * abs(deviation)
             text += ", as if they were swapped" * swapped
-        if size < 0.0 and (said := next((one for one in _OPPOSITES if one in text), None)):
-            size, text = -size, text.replace(said, _OPPOSITES[said])
-        shown = f"{with_doubt(size * self.per_unit, abs(deviation) * self.per_unit)}{self.shown}"
-        return text.format(size=shown, origin=vehicle.origin(self.code))
+        if size < 0.0 and (words := next((one for one in _OPPOSITES if one in text), None)):
+            size, text = -size, text.replace(words, _OPPOSITES[words])
+        said = f"{with_doubt(size * self.per_unit, abs(deviation) * self.per_unit)}{self.text_unit}"
+        return text.format(size=said, origin=vehicle.origin(self.code))
 
 
 WORDS = {  # of a channel, and the parameter of its factor
@@ -159,8 +159,8 @@ def _of_channels() -> tuple[Suspect, ...]:
     )
     found = [
         Suspect(parameter, "offset", name, unit, wide, least, grows,
-                f"{WORDS[name][0]} reads {{size}} too much", shown, per_unit)
-        for parameter, name, unit, wide, least, grows, shown, per_unit in offsets
+                f"{WORDS[name][0]} reads {{size}} too much", text_unit, per_unit)
+        for parameter, name, unit, wide, least, grows, text_unit, per_unit in offsets
     ]  # fmt: skip
     for name, device in _DEVICES.items():
         stem, words = device if device.endswith(".") else f"{device}_", WORDS[name][0]

@@ -15,9 +15,9 @@ from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.drive import Drive, hardest
 from identifier.estimate.information import Information
 from identifier.estimate.latent import Learnt, lateness, latent_priors, learn_latent
-from identifier.estimate.model import FittedModel, Segment
+from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes, TooShortError
-from identifier.estimate.posterior import Posterior
+from identifier.estimate.posterior import Posterior, Reach, Segment
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
 from identifier.estimate.solve import error_size, estimate, simulate
@@ -61,11 +61,9 @@ def fit(
         Where a log has neither v_y nor a_y.
     """
     before = Priors.of(vehicle) if priors is None else priors
+    parts, reach, found = [], Reach(), None
     known, sd = Information.nothing(), Priors.of(vehicle).sd
-    parts: list[tuple[float, Information]] = []
-    total = sum(one.duration for one in recordings)
-    done, reach, found, parted, late = 0.0, Reach(), None, 0.0, 0.0
-    segments: list[Segment] = []
+    total, done = sum(one.duration for one in recordings), 0.0
     coarse = coarse or total > CHOSEN.long
 
     def went_on(seconds: float) -> None:
@@ -74,8 +72,9 @@ def fit(
         if progress is not None:
             progress(min(done / max(total, 1e-9), 1.0))
 
-    sighted = [one for one in recordings if one.logged_v_y is not None]
-    for drives in _blocks(sighted, vehicle, block, coarse=coarse):
+    for drives in _blocks(
+        [one for one in recordings if one.logged_v_y is not None], vehicle, block, coarse=coarse
+    ):
         if not any(one.counts.any() for one in drives):
             continue
         begin = None if found is None else found.p
@@ -83,8 +82,7 @@ def fit(
         beliefs = before.after(known) if parts else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         found, roads = with_roads(drives, vehicle, beliefs, found)
-        segments += _segments(drives, roads)
-        here = Reach.of(drives, roads, found, vehicle)
+        here = _reach(drives, roads, found, vehicle)
         reach = reach.with_(here)
         part = Information.about(
             found.p, found.slope, found.curvature, sd, here.slip, found.seconds
@@ -95,34 +93,22 @@ def fit(
     beliefs = before if found is None else _after(before, found)
     for blind in (one for one in recordings if one.logged_v_y is None):
         try:
-            own = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
-            nodes = Nodes.of(blind, vehicle, hardest(blind, CHOSEN.blind), a_y_late=own)
+            late = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
+            nodes = Nodes.of(blind, vehicle, hardest(blind, CHOSEN.blind), a_y_late=late)
         except TooShortError:
             if len(recordings) == 1:
                 raise
             continue
-        late = max(late, own, key=abs)
+        reach = reach.with_(Reach(a_y_late=late))
         if nodes.counts.any():
-            learnt = learn_latent(nodes, vehicle, beliefs, late=own != 0.0)
-            found, parted = learnt.posterior, max(parted, learnt.parted)
-            reach = reach.with_(Reach.of_states(learnt))
+            learnt = learn_latent(nodes, vehicle, beliefs, late=late != 0.0)
+            found, reach = learnt.posterior, reach.with_(_reach_of_states(learnt))
             beliefs = _after(beliefs, found)
         went_on(blind.duration)
     if found is None:
         name = recordings[0].name
         raise ValueError(f"{name}: no sample is fast enough to learn from")
-    model = FittedModel(
-        vehicle=vehicle,
-        p=found.p,
-        covariance=found.covariance,
-        driven=reach.slip,
-        speeds=reach.speeds,
-        a_x=reach.a_x,
-        unexplained=reach.unexplained,
-        segments=tuple(segments),
-        parted=parted,
-        a_y_late=late,
-    )
+    model = FittedModel(vehicle=vehicle, p=found.p, covariance=found.covariance, reach=reach)
     least = np.min(model.force(np.array([0.05, 1.0]) * PROBE), axis=0)
     falling = [
         f"residual{j}_{axle}"
@@ -162,76 +148,58 @@ def _segments(drives: Sequence[Drive], roads: Roads | None) -> list[Segment]:
     return listed
 
 
-class Reach(NamedTuple):
-    """What drives reached: slip (2,) [rad], least and largest speed [m/s] and a_x [m/s²].
-    alike, pairs : sum of products of what the model misses, over its size, at two times
-    `CHOSEN.lasts` apart, (2,), and how many there are: white noise of the sensors has no part in
-    it.
-    """
-
-    slip: Array = np.zeros(2)
-    speeds: Array = np.array([np.inf, -np.inf])
-    a_x: Array = np.array([np.inf, -np.inf])
-    alike: Array = np.zeros(2)
-    pairs: float = 0.0
-
-    def with_(self, other: "Reach") -> "Reach":
-        """Return what both reached."""
-
-        def widest(one: Array, two: Array) -> Array:
-            return np.array([min(one[0], two[0]), max(one[1], two[1])])
-
-        return Reach(
-            np.maximum(self.slip, other.slip),
-            widest(self.speeds, other.speeds),
-            widest(self.a_x, other.a_x),
-            self.alike + other.alike,
-            self.pairs + other.pairs,
+def _reach(
+    drives: Sequence[Drive], roads: Roads | None, posterior: Posterior, vehicle: Vehicle
+) -> Reach:
+    """Return what drives reached, by the estimate of them."""
+    found = Reach(segments=tuple(_segments(drives, roads)))
+    later = CHOSEN.lasts * min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
+    for i, one in enumerate(drives):
+        on = one.counts
+        if not on.any():
+            continue
+        if roads is not None:
+            one = one.on(np.concatenate([[0.0], roads.ln_m])[roads.labels[i]])
+        driven = simulate(one, posterior.p, vehicle)
+        force = np.abs(one.signals[:, 0] * one.signals[:, 2]) / GRAVITY
+        e = np.nan_to_num(driven["missed"] / error_size(force)[:, None])
+        n = max(round(max(later, CHOSEN.stride) / one.dt), 1)
+        together = on[n:] & on[:-n]
+        found = found.with_(
+            Reach(
+                _lasting(np.abs(driven["slip"][on]), one.dt),
+                *_most(one.signals[on][:, [0, 5]]),
+                alike=(e[n:] * e[:-n])[together].sum(axis=0),
+                pairs=float(np.count_nonzero(together)),
+            )
         )
+    return found
 
-    @property
-    def unexplained(self) -> Array:
-        """Size of what is missed for longer than noise, over what a good model misses, (2,)."""
-        found: Array = np.sqrt(np.maximum(self.alike, 0.0) / max(self.pairs, 1e-9))
-        return found
 
-    @classmethod
-    def of(
-        cls, drives: Sequence[Drive], roads: Roads | None, posterior: Posterior, vehicle: Vehicle
-    ) -> "Reach":
-        """Return what drives reached, by the estimate of them."""
-        found = cls()
-        later = CHOSEN.lasts * min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
-        for i, one in enumerate(drives):
-            on = one.counts
-            if not on.any():
-                continue
-            if roads is not None:
-                one = one.on(np.concatenate([[0.0], roads.ln_m])[roads.labels[i]])
-            driven = simulate(one, posterior.p, vehicle)
-            size = np.abs(driven["slip"][on])
-            force = np.abs(one.signals[:, 0] * one.signals[:, 2]) / GRAVITY
-            e = np.nan_to_num(driven["missed"] / error_size(force)[:, None])
-            n = max(round(max(later, CHOSEN.stride) / one.dt), 1)
-            together = on[n:] & on[:-n]
-            k = min(max(round(CHOSEN.reached / one.dt), 1), len(size))
-            speeds, a_x = np.quantile(one.signals[on][:, [0, 5]], [0.005, 0.995], axis=0).T
-            slip = np.partition(size, len(size) - k, axis=0)[-k]
-            alike = (e[n:] * e[:-n])[together].sum(axis=0)
-            found = found.with_(cls(slip, speeds, a_x, alike, float(np.count_nonzero(together))))
-        return found
+def _reach_of_states(learnt: Learnt) -> Reach:
+    """Return what a drive without v_y reached, by its estimated states."""
+    nodes, on = learnt.nodes, learnt.nodes.counts
+    given, z = nodes.given[on], learnt.z[on]
+    turning = np.abs(given[:, 0] * z[:, 1]) / GRAVITY
+    return Reach(
+        _lasting(np.abs(z[:, 2:4]), nodes.dt),
+        *_most(given[:, [0, 3]]),
+        alike=np.sum((z[:, 4:6] / error_size(turning)[:, None]) ** 2, axis=0),
+        pairs=float(len(z)),
+        parted=learnt.parted,
+    )
 
-    @classmethod
-    def of_states(cls, learnt: Learnt) -> "Reach":
-        """Return what a drive without v_y reached, by its estimated states."""
-        nodes, on = learnt.nodes, learnt.nodes.counts
-        size, given = np.abs(learnt.z[on, 2:4]), nodes.given[on]
-        k = min(max(round(CHOSEN.reached / nodes.dt), 1), len(size))
-        speeds, a_x = np.quantile(given[:, [0, 3]], [0.005, 0.995], axis=0).T
-        turning = np.abs(given[:, 0] * learnt.z[on, 1]) / GRAVITY
-        alike = np.sum((learnt.z[on, 4:6] / error_size(turning)[:, None]) ** 2, axis=0)
-        slip = np.partition(size, len(size) - k, axis=0)[-k]
-        return cls(slip, speeds, a_x, alike, float(len(size)))
+
+def _lasting(slip: Array, dt: float) -> Array:
+    """Return the slip of each axle that is exceeded for `CHOSEN.reached`, (2,)."""
+    k = min(max(round(CHOSEN.reached / dt), 1), len(slip))
+    found: Array = np.partition(slip, len(slip) - k, axis=0)[-k]
+    return found
+
+
+def _most(signals: Array) -> Array:
+    """Return the least and the largest of two signals but for outliers, (2, 2)."""
+    return np.quantile(signals, [0.005, 0.995], axis=0).T
 
 
 def _blocks(

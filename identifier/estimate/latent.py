@@ -472,7 +472,6 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, late: bool 
     ) * np.outer(away, away)
     return Learnt(
         Posterior(
-            vehicle=vehicle,
             p=best.p[:P],
             covariance=covariance,
             slope=np.zeros(P),

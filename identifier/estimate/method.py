@@ -8,6 +8,7 @@ from identifier.axle.gate import GATE_PORT
 from identifier.estimate.fit import fit
 from identifier.estimate.model import FittedModel
 from identifier.estimate.poor import on_time
+from identifier.estimate.priors import Priors
 from identifier.method import CannotFreezeError, Method, WholeLog
 from identifier.motion.model import REPLAYED
 from identifier.setup import AXLE_FORCE, Port, Setup
@@ -63,14 +64,16 @@ class FitMethod(Method):
     ) -> FittedModel:
         """Return the tires of a log.
 
-        start : a fit, or the prior of a fleet, that is believed before; None believes the table.
+        start : a fit that is believed before; None believes the table.
         """
         if start is not None and not isinstance(start, FittedModel):
             raise ValueError(
-                "--method fit begins with a fit or a fleet's prior: give it all logs, in place of "
-                "a model of another method"
+                "--method fit begins with a fit: give it all logs, in place of a model of another "
+                "method"
             )
-        priors = None if start is None else start.as_prior(vehicle)
+        priors = Priors.of(vehicle)
+        if start is not None:
+            priors = priors.known(start.p, start.covariance)
         return fit([recording], vehicle, priors, progress=progress).model
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:

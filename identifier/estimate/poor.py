@@ -18,7 +18,7 @@ from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.drive import hardest
 from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
-from models.sensors import white_noise
+from models.recordings.samples import white_noise
 from models.vehicle import Vehicle
 
 DELAYS = np.arange(0.0, 0.41, 0.05)  # [s]
@@ -72,7 +72,7 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
             return recording  # a_y does not show this motion
     weights, whole = np.ones(len(new)), _Kinematics(recording, new)
     for _ in range(CHOSEN.again):
-        found, missed = whole.carried(shown, weights)
+        found, missed, _ = whole.solved(shown, weights)
         weights = np.minimum(1.0, CHOSEN.clip * shown.noise / np.maximum(np.abs(missed), 1e-12))
     found.setflags(write=False)
     by = "straight lines" if recording.a_y is None else "ay, vx and r"
@@ -130,10 +130,12 @@ class _Kinematics:
     def _piece(self) -> NDArray[np.intp]:
         return np.searchsorted(np.array(self.recording.breaks), np.arange(self.n), side="right")
 
-    def _solved(
-        self, s: _Shown, weights: Array, late: float | None = None
+    def solved(
+        self, s: _Shown, weights: Array | float, late: float | None = None
     ) -> tuple[Array, Array, float]:
-        """Return v_y (n,), what it misses of what was shown (m,), and -ln of the likelihood.
+        """Return v_y (n,) and what it misses of the values (m,) [m/s], and -ln of the likelihood
+        but for a constant [nats].
+        weights : of the values, at most 1, (m,).
         late : delay up to which values must have a past to count [s]; None takes that of `s`.
         """
         from scipy.linalg import cho_solve_banded, cholesky_banded  # takes long to import
@@ -194,24 +196,14 @@ class _Kinematics:
         logs += steps * np.log(s.push * s.wanders)
         return v, np.where(there, missed, 0.0), 0.5 * float(squares + logs)
 
-    def carried(self, shown: _Shown, weights: Array) -> tuple[Array, Array]:
-        """Return v_y (n,) and what it misses of the values that were shown (m,) [m/s].
-        weights : of the values, at most 1 (m,).
-        """
-        v_y, missed, _ = self._solved(shown, weights)
-        return v_y, missed
-
-    def cost(self, shown: _Shown) -> float:
-        """Return -ln of the likelihood of how a sensor shows v_y [nats], but for a constant.
-
-        The same values count for each delay.
-        """
-        return self._solved(shown, np.ones(len(self.new)), float(DELAYS[-1]))[2]
-
 
 def _likeliest(problem: _Kinematics, best: _Shown, scale: float) -> _Shown:
     """Return how v_y is shown, by the largest likelihood, from a beginning on."""
-    least = problem.cost(best)
+
+    def cost(shown: _Shown) -> float:  # the same values count for each delay
+        return problem.solved(shown, 1.0, float(DELAYS[-1]))[2]
+
+    least = cost(best)
 
     def better(**lists: Array) -> bool:
         nonlocal best, least
@@ -219,8 +211,8 @@ def _likeliest(problem: _Kinematics, best: _Shown, scale: float) -> _Shown:
         for name, values in lists.items():
             for value in values:
                 one = best._replace(**{name: float(value)})
-                if (cost := problem.cost(one)) < least:
-                    best, least = one, cost
+                if (reached := cost(one)) < least:
+                    best, least = one, reached
         return least < before - 0.1
 
     others = {"noise": NOISE * scale, "push": PUSHES, "wanders": BANKS}
@@ -231,8 +223,8 @@ def _likeliest(problem: _Kinematics, best: _Shown, scale: float) -> _Shown:
         near = np.maximum(best.late + step * np.array([-1.0, 1.0]), 0.0)
         if not better(late=near, **others) and step < CHOSEN.fine * scale:
             break
-    if best.late and problem.cost(best._replace(late=0.0)) - least < CHOSEN.sure:
+    if best.late and cost(best._replace(late=0.0)) - least < CHOSEN.sure:
         best = best._replace(late=0.0)
-        least = problem.cost(best)
+        least = cost(best)
         better(**others)
     return best

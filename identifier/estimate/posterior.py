@@ -1,12 +1,12 @@
-"""What an estimate leaves: parameters, how sure, and what the drives did not tell."""
+"""What an estimate leaves: parameters, how sure, and what its drives reached."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from codegen.arrays import Array
 from identifier.motion.parameters import INDEX
-from models.vehicle import Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -22,7 +22,6 @@ class Posterior:
     memory : T, their integrated autocorrelation time [s], (2,).   cost : J at the optimum [nats].
     """
 
-    vehicle: Vehicle
     p: Array
     covariance: Array
     slope: Array
@@ -40,3 +39,60 @@ class Posterior:
     def sd(self, name: str) -> float:
         """Return the standard deviation of a parameter; 0 where it did not move."""
         return float(np.sqrt(self.covariance[INDEX[name], INDEX[name]]))
+
+
+class Segment(NamedTuple):
+    """A part of a drive on another road: from, to [s], its friction over that of the curves, sd."""
+
+    begin: float
+    end: float
+    ratio: float
+    sd: float
+
+
+class Reach(NamedTuple):
+    """What identification drives reached, and what is particular to them.
+    slip : largest of each axle [rad], (2,).
+    speeds, a_x : least and largest [m/s], [m/s²], (2,).
+    alike, pairs : sum of products of what the model misses, over its size, at two times
+        `CHOSEN.lasts` apart, (2,), and how many there are: white noise of the sensors has no part
+        in it.
+    segments : on another road.
+    parted : of drives without v_y, side slip by which soft and stiff tires that explain them alike
+        part, rms [rad].
+    a_y_late : of such drives, by which a_y was later than the yaw rate [s].
+    """
+
+    slip: Array = np.zeros(2)
+    speeds: Array = np.array([np.inf, -np.inf])
+    a_x: Array = np.array([np.inf, -np.inf])
+    alike: Array = np.zeros(2)
+    pairs: float = 0.0
+    segments: tuple[Segment, ...] = ()
+    parted: float = 0.0
+    a_y_late: float = 0.0
+
+    def with_(self, other: "Reach") -> "Reach":
+        """Return what both reached."""
+        speeds, a_x = (
+            np.array([min(one[0], two[0]), max(one[1], two[1])])
+            for one, two in ((self.speeds, other.speeds), (self.a_x, other.a_x))
+        )
+        return Reach(
+            np.maximum(self.slip, other.slip),
+            speeds,
+            a_x,
+            self.alike + other.alike,
+            self.pairs + other.pairs,
+            self.segments + other.segments,
+            max(self.parted, other.parted),
+            max(self.a_y_late, other.a_y_late, key=abs),
+        )
+
+    @property
+    def unexplained(self) -> Array:
+        """Size of what the drives miss for longer than noise, over the errors that are usual, 2 %
+        of the static load and 4 % of the lateral acceleration in g, (2,).
+        """
+        found: Array = np.sqrt(np.maximum(self.alike, 0.0) / max(self.pairs, 1e-9))
+        return found

@@ -196,6 +196,16 @@ class Priors:
             curvature[:n, :n] += bend
         return gradient, curvature
 
+    def known(self, p: Array, covariance: Array) -> "Priors":
+        """Return what a fit leaves to believe of the car: its numbers, as sure as they are.
+        p, covariance : parameters and their covariance (p,), (p, p).
+        """
+        where = np.ix_(self.moves, self.moves)
+        information = np.zeros_like(self.information)
+        sure = covariance + CHOSEN.least_doubt * np.diag(self.sd**2)
+        information[where] = np.linalg.inv(sure[where])
+        return replace(self, mean=p, information=information, typed=())
+
     def after(self, data: Information) -> "Priors":
         """Return the beliefs with what drives add."""
         return replace(self, data=data)

@@ -7,7 +7,7 @@ second of it counts 1/T_i times; S_i: its scale, by expectation maximization in 
 Gauss-Newton with Levenberg's damping and active bounds.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from copy import copy
 from typing import NamedTuple, TypeAlias
 
@@ -64,20 +64,17 @@ class Problem:
         self._scan = motion_scan((*moved, "ln_road"))
         self._car = car_numbers(vehicle)
         self._strides = [max(1, round(CHOSEN.stride / one.dt)) for one in drives]
-        self._kept = [
-            np.flatnonzero(one.counts[::stride])
-            for one, stride in zip(drives, self._strides, strict=True)
-        ]
-        self.lengths = [kept.size for kept in self._kept]
-        sizes, weights, forces = [], [], []
-        for one, stride, kept in zip(drives, self._strides, self._kept, strict=True):
+        self._kept, weights, forces = [], [], []
+        for one, stride in zip(drives, self._strides, strict=True):
+            kept = np.flatnonzero(one.counts[::stride])
             v_x, r = one.signals[::stride][kept][:, [0, 2]].T
+            self._kept.append(kept)
             forces.append(np.abs(v_x * r) / GRAVITY)
-            sizes.append(error_size(forces[-1]))
             weights.append(np.full(kept.size, one.dt * stride))
-        self.size = np.concatenate(sizes)
+        self.lengths = [kept.size for kept in self._kept]
         self.weight = np.concatenate(weights)
         self.force = np.concatenate(forces)  # of an axle in steady cornering [static loads]
+        self.size = error_size(self.force)
 
     def under(self, priors: Priors) -> "Problem":
         """Return the same under other priors, of a problem with slopes over `every` parameter."""
@@ -111,50 +108,40 @@ class Problem:
 
     def missed(self, p: Array, road: float) -> Array:
         """Return what the balance misses over its size where the friction is another, (m, 2)."""
-        scan = motion_scan()
-        e = []
-        for k, one in enumerate(self.drives):
-            driven = one.on(road)
-            given = _arguments(driven, p, self._car, scan)
-            out = scan(len(one.signals), given, every=self._strides[k], ports=("missed",))
-            e.append(out["missed"][self._kept[k]])
-        whole: Array = np.concatenate(e) / self.size[:, None]
-        found: Array = np.nan_to_num(whole, nan=1e3, posinf=1e3)
+        e = [
+            _simulated(one.on(road), p, self._car, motion_scan(), ("missed",), stride)[0][kept]
+            for one, stride, kept in zip(self.drives, self._strides, self._kept, strict=True)
+        ]
+        found: Array = np.nan_to_num(np.concatenate(e) / self.size[:, None], nan=1e3, posinf=1e3)
         return found
 
     def residuals(self, p: Array) -> _Residuals:
         """Return what the balance misses, and its slopes.
         p : parameters, and behind them ln of the friction of other roads.
         """
-        e, slopes = [], []
+        many, slopes = [], []
         ln_m = np.concatenate([[0.0], p[len(NAMES) :]])
+        ports = ("missed", "missed_slopes")
         for k, one in enumerate(self.drives):
             stride, kept = self._strides[k], self._kept[k]
             roads = None if self.labels is None else self.labels[k]
             driven = one if roads is None else one.on(ln_m[roads])
-            out = self._scan(
-                len(driven.signals),
-                _arguments(driven, p[: len(NAMES)], self._car, self._scan),
-                every=stride,
-                ports=("missed", "missed_slopes"),
-            )
-            e.append(out["missed"][kept])
-            J = out["missed_slopes"][kept]
-            of_road = J[:, :, -1:]
-            J = J[:, :, self._columns]
+            missed, J = _simulated(driven, p[: len(NAMES)], self._car, self._scan, ports, stride)
+            many.append(missed[kept])
+            of_road, J = J[kept][:, :, -1:], J[kept][:, :, self._columns]
             if self.roads and roads is not None:
                 on = roads[::stride][kept][:, None] == np.arange(1, self.roads + 1)
                 J = np.concatenate([J, of_road * on[:, None, :]], axis=2)
             slopes.append(J)
-        missed, slope = np.concatenate(e), np.concatenate(slopes)
+        e, slope = np.concatenate(many), np.concatenate(slopes)
         # To shrink v_x shrinks what is missed, and explains nothing: its size shrinks alike.
         shrunk = min(1.0 + float(p[INDEX["v_x_factor"]]), 1.0)
         size = self.size[:, None] * shrunk
         if shrunk < 1.0:
-            slope[:, :, self.index == INDEX["v_x_factor"]] -= missed[..., None] / shrunk
+            slope[:, :, self.index == INDEX["v_x_factor"]] -= e[..., None] / shrunk
         with np.errstate(invalid="ignore", over="ignore"):
             return _Residuals(
-                np.nan_to_num(missed / size, nan=1e3, posinf=1e3, neginf=-1e3),
+                np.nan_to_num(e / size, nan=1e3, posinf=1e3, neginf=-1e3),
                 np.nan_to_num(slope / size[..., None]),
             )
 
@@ -231,34 +218,29 @@ def car_numbers(vehicle: Vehicle) -> Array:
     )
 
 
-def _arguments(one: Drive, p: Array, car: Array, scan: Scan) -> dict[str, Array]:
-    """Return the inputs of a compiled motion over a drive.
+def _simulated(
+    one: Drive, p: Array, car: Array, scan: Scan, ports: tuple[str, ...], every: int = 1
+) -> list[Array]:
+    """Return what comes out of a compiled motion over a drive, by port.
 
     Late signals are read on time; the rest of a delay is 0.
-    car : of `car_numbers`, (7,).
+    car : of `car_numbers`, (7,).   every : samples between what is returned.
     """
     late = p[DELAYS]
     if late.any():
         one, p = one.on_time(late), p.copy()
         p[DELAYS] = 0.0
-    return {
-        **scan.zeros(),
-        "signals": one.signals,
-        "rates": one.rates,
-        "parameters": p,
-        "car": car,
-        "dt": np.array(one.dt),
-    }
+    signals = {"signals": one.signals, "rates": one.rates}
+    given = {**scan.zeros(), **signals, "parameters": p, "car": car, "dt": np.array(one.dt)}
+    out = scan(len(one.signals), given, every=every, ports=ports)
+    return [out[port] for port in ports]
 
 
 def simulate(one: Drive, p: Array, vehicle: Vehicle) -> dict[str, Array]:
     """Return force [static loads], what is missed and slip of a drive, (n, 2) each, by port."""
-    scan = motion_scan()
-    return scan(
-        len(one.signals),
-        _arguments(one, p, car_numbers(vehicle), scan),
-        ports=("force", "missed", "slip"),
-    )
+    ports = ("force", "missed", "slip")
+    found = _simulated(one, p, car_numbers(vehicle), motion_scan(), ports)
+    return dict(zip(ports, found, strict=True))
 
 
 def estimate(
@@ -321,7 +303,6 @@ def descend(
     enough : improvement below which it ends [nats].
     """
     priors, index = problem.priors, problem.index
-    low, high = priors.low[index], priors.high[index]
     p, damping = start.copy(), 1e-3 if memory is None else 1e-6  # then it is near
     now = problem.residuals(p)
     T = problem.memory(now.e) if memory is None else memory
@@ -333,21 +314,15 @@ def descend(
         of_beliefs, curvature = around_beliefs(priors, p)
         H = H + curvature[np.ix_(index, index)]
         gradient = gradient + of_beliefs[index]
-        better = None
-        for _ in range(8):
-            step = bounded_step(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
-            trial = p.copy()
-            trial[index] = np.clip(p[index] + step, low, high)
+        for trial, tried in _trials(H, gradient, p, priors, damping):
             then = problem.residuals(trial)
             reached = problem.misfit(then.e, S2, T) + beliefs_cost(priors, trial)
             if reached < cost:
-                better = trial, then, cost - reached
+                p, now, damping = trial, then, max(tried / 5.0, 1e-6)
                 break
-            damping = max(6.0 * damping, 1e-3)
-        if better is None:
+        else:
             break
-        p, now, gained = better
-        damping = max(damping / 5.0, 1e-6)
+        gained = cost - reached
         if gained < enough and (count > 3 or memory is not None):
             break
     S2, T = problem.scale(now.e), problem.memory(now.e) if memory is None else memory
@@ -359,7 +334,6 @@ def descend(
     whole[np.ix_(index, index)] = np.linalg.inv(H)
     n = len(NAMES)
     return Posterior(
-        vehicle=problem.vehicle,
         p=p[:n],
         covariance=whole[:n, :n],
         slope=slope,
@@ -393,25 +367,36 @@ def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
     begin : parameters to begin with (p,).
     """
     index, p = np.flatnonzero(priors.moves), begin.copy()
-    low, high = priors.low[index], priors.high[index]
-    cost, damping = beliefs_cost(priors, p), 1e-6
+    where, cost, damping = np.ix_(index, index), beliefs_cost(priors, p), 1e-6
     for _ in range(CHOSEN.settling):
         gradient, curvature = around_beliefs(priors, p)
-        H = curvature[np.ix_(index, index)]
-        step = bounded_step(H + damping * np.diag(np.diag(H)), gradient[index], p[index], low, high)
-        trial = p.copy()
-        trial[index] = np.clip(p[index] + step, low, high)
-        reached = beliefs_cost(priors, trial)
-        if not reached < cost:
-            damping = max(6.0 * damping, 1e-3)
-            continue
-        gained, p, cost, damping = cost - reached, trial, reached, max(damping / 5.0, 1e-6)
+        for trial, tried in _trials(curvature[where], gradient[index], p, priors, damping):
+            reached = beliefs_cost(priors, trial)
+            if reached < cost:
+                p, damping = trial, max(tried / 5.0, 1e-6)
+                break
+        else:
+            break
+        gained, cost = cost - reached, reached
         if gained < CHOSEN.settled:
             break
     covariance = np.zeros_like(priors.information)
-    where = np.ix_(index, index)
     covariance[where] = np.linalg.inv(around_beliefs(priors, p)[1][where])
     return p, covariance
+
+
+def _trials(
+    H: Array, gradient: Array, p: Array, priors: Priors, damping: float
+) -> Iterator[tuple[Array, float]]:
+    """Yield where steps with more and more of Levenberg's damping end, and that damping."""
+    index = np.flatnonzero(priors.moves)
+    low, high = priors.low[index], priors.high[index]
+    for _ in range(8):
+        step = bounded_step(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
+        trial = p.copy()
+        trial[index] = np.clip(p[index] + step, low, high)
+        yield trial, damping
+        damping = max(6.0 * damping, 1e-3)
 
 
 def beliefs_cost(priors: Priors, p: Array) -> float:

@@ -4,36 +4,30 @@ Tensors are (batch, columns) of one number type; the batch may have any size. Op
 of opset 13, which every runtime of the last years knows, and of which CasADi reads back all.
 """
 
-from collections.abc import Callable
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
-from codegen.arrays import Array
 from codegen.clean_c import recognized
 from codegen.elementary import atan
 from codegen.errors import TireidError
 from codegen.escape import visible
 from codegen.graph import BUILDERS, function_of, graph_of
-from identifier.axle.band import FLOOR, RELATIVE, root
-from identifier.axle.band_step import LEAST_BEFORE, hinges
+from identifier.axle.band import root
+from identifier.axle.band_step import AtSample, BandNumbers, band_numbers, half_band, hinges
 from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
+from identifier.axle.covariance import factors_of, packed
 from identifier.axle.model import AxleModel
 from identifier.band import LEVEL, normal_quantile
 from identifier.estimate.model import FittedModel
 from identifier.export.specialize import INPUTS, Signal
 from identifier.motion.model import curve_function
 from identifier.motion.parameters import INDEX, curve_index
-from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.extras import needs
-from models.files import write_atomically
-from models.vehicle import Vehicle
 
 
 class MissingOnnxError(TireidError, ImportError):
@@ -77,9 +71,6 @@ class _Graph:
         name = result or f"value_{len(self.lines)}"
         self.lines.append(f"{name} = {operator}({', '.join(inputs)})")
         return name
-
-    def square(self, row: str) -> str:
-        return self.node("Mul", row, row)
 
     def content(
         self,
@@ -177,30 +168,69 @@ def _network(model: NetworkModel, *, single: bool) -> bytes:
     )
 
 
-# The static force curve: of an axle model F_i = load_i Σ_j w_ij tanh(α_i/α_j), of a fit the curve
-# of `identifier.motion.model`, operator by operator.
+# The static force curve and half the width of its band, in static axle loads: of an axle model
+# Σ_j w_ij tanh(α_i/α_j), of a fit the curve of `identifier.motion.model`, operator by operator.
 #
 # What the whole model adds, the lag of slip and the sway of the body, has a state and stays out.
 # So does downforce, which needs a speed: its κ are given as metadata, F times 1 + κ v_x².
 
-_AddBand = Callable[[_Graph, int, str], None]  # axle, and the name of its units
+
+def _axle_curve(model: AxleModel, i: int, x: ca.SX, *, with_band: bool) -> list[ca.SX]:
+    """Return φ of an axle at a slip, and half its width at the mean speed of the drive."""
+    units = [ca.tanh(x / scale) for scale in model.ladder]
+    force = sum(w * t for w, t in zip(model.W[i], units, strict=True))
+    if not with_band:
+        return [force]
+    calibration, q = model.band.calibration, len(units) + 3
+    parts = zip(model.W[i] / np.array(model.ladder), units, strict=True)
+    at = AtSample(
+        units=units,
+        slope=sum(w * (1 - t * t) for w, t in parts),
+        force=force,
+        slip=ca.fabs(x),
+        per_v_x=ca.SX(1.0 / calibration.speed),
+        e=1,
+        by_offset=(1.0, 1.0 / calibration.speed)[i],
+    )
+    covariances = (model.covariance, model.prior_covariance)
+    P, prior = (factors_of(list(packed(one)[i]), q) for one in covariances)
+    numbers = band_numbers(calibration, model.vehicle.froude_speed)
+    slips = hinges(calibration.factors, AXLE_CHOSEN.centers)[i]
+    speeds = hinges(calibration.speeds, AXLE_CHOSEN.at_speeds)[i]
+    numbers = BandNumbers(*(column[i] for column in numbers))
+    return [force, half_band(at, P, prior, numbers, list(slips), list(speeds))]
 
 
-def _curves(model: AxleModel, *, single: bool, add_band: _AddBand | None) -> bytes:
+def _fitted_curve(model: FittedModel, i: int, x: ca.SX, *, with_band: bool) -> list[ca.SX]:
+    """Return what `_axle_curve` does of a fit, at the speed of its drives."""
+    axle, P, band = "fr"[i], model.covariance, model.band
+    phi, slope, numbers, *_ = curve_function()(ca.DM(model.p[curve_index(axle)]), x)
+    if not with_band:
+        return [phi]
+    shares = {
+        "steering_zero": 1.0 - i,
+        "v_y_bias": 1.0 / model.reach.speeds.mean(),
+        "v_y_angle": 1.0,
+    }
+    h = dict(zip(curve_index(axle), ca.vertsplit(ca.vec(numbers)), strict=True))
+    h |= {INDEX[name]: share * slope for name, share in shares.items()}
+    moves = [k for k in h if P[k, k] > 0.0]
+    left = ca.sumsqr(root(P[np.ix_(moves, moves)]).T @ ca.vertcat(*(h[k] for k in moves)))
+    variance = left + (band.error_share[i] * phi) ** 2 + band.error_floor[i] ** 2
+    return [phi, normal_quantile(LEVEL) * ca.sqrt(variance)]
+
+
+def _curves(model: AxleModel | FittedModel, *, single: bool, with_band: bool) -> bytes:
     """Return the static curves, alpha_f, alpha_r to F_yf, F_yr, (batch, 1), under static loads."""
-    graph = _Graph()
-    scales = graph.number(1.0 / np.array(model.ladder))
-    for axle, (slip, force, weights, load) in enumerate(
-        zip(_SLIPS, _FORCES, model.W, model.vehicle.axle_loads, strict=True)
-    ):
-        units = graph.node("Tanh", graph.node("MatMul", slip.name, scales))
-        graph.node("MatMul", units, graph.number(load * weights[:, None]), result=force.name)
-        if add_band is not None:
-            add_band(graph, axle, units)
-    return _content_of_curves(graph, model.vehicle, single=single, with_band=add_band is not None)
-
-
-def _content_of_curves(graph: _Graph, car: Vehicle, *, single: bool, with_band: bool) -> bytes:
+    graph, x, car = _Graph(), ca.SX.sym("x"), model.vehicle
+    for i, (slip, size) in enumerate(zip(_SLIPS, car.axle_loads, strict=True)):
+        if isinstance(model, AxleModel):
+            found = _axle_curve(model, i, x, with_band=with_band)
+        else:
+            found = _fitted_curve(model, i, x, with_band=with_band)
+        written = _written(graph, ca.Function("curve", [x], found), slip.name)
+        for value, port in zip(written, (_FORCES[i], _HALF_BANDS[i]), strict=False):
+            graph.node("Mul", value, graph.number(size), result=port.name)
     loads, more = "", {}
     if car.has_downforce:
         loads = " under static loads, at v_x times 1 + downforce v_x^2"
@@ -216,145 +246,43 @@ def _content_of_curves(graph: _Graph, car: Vehicle, *, single: bool, with_band: 
     )
 
 
-def _fitted_curves(model: FittedModel, *, single: bool, with_band: bool) -> bytes:
-    """Return the static curves of a fit, as those of `_curves`."""
-    graph, x = _Graph(), ca.SX.sym("x")
-    for i, axle in enumerate("fr"):
-        found = curve_function()(ca.DM(model.curve_numbers(axle)), x)
-        at_slip = ca.Function("curve", [x], found[: 3 if with_band else 1])
-        phi, *slopes = _written(graph, at_slip, _SLIPS[i].name)
-        load = graph.number(model.vehicle.axle_loads[i])
-        graph.node("Mul", phi, load, result=_FORCES[i].name)
-        if with_band:
-            _band_of_fit(model, graph, i, phi, *slopes)
-    return _content_of_curves(graph, model.vehicle, single=single, with_band=with_band)
-
-
 # No runtime has an Atan of double: our own is made of the others.
-_BUILDERS = {**BUILDERS, "tanh": ca.tanh, "exp": ca.exp, "atan": atan}
 _OPERATORS = {
     "add": "Add", "sub": "Sub", "mul": "Mul", "div": "Div", "neg": "Neg", "inv": "Reciprocal",
-    "tanh": "Tanh", "exp": "Exp", "sin": "Sin", "cos": "Cos", "sqrt": "Sqrt", "lt": "Less",
-    "select": "Where",
+    "tanh": "Tanh", "exp": "Exp", "sin": "Sin", "cos": "Cos", "sqrt": "Sqrt", "fabs": "Abs",
+    "lt": "Less", "not": "Not", "select": "Where", "if_else_zero": "Where", "sq": "Mul",
+    "twice": "Add",
 }  # fmt: skip
 
 
 def _written(graph: _Graph, function: ca.Function, argument: str) -> list[str]:
     """Add the operators of an SX function of a scalar; return the names of its results."""
-    plain = function_of(graph_of(function), function, _BUILDERS)
+    plain = function_of(graph_of(function), function, {**BUILDERS, "atan": atan})
     scalars, names = recognized(graph_of(plain), whole=False), dict[int, str]()
     for place in scalars.reached():
         node = scalars.nodes[place]
-        given = [names[a] for a in node.args]
+        given = [names[a] for a in node.args] * (1 + (node.op in ("sq", "twice")))
+        if node.op == "if_else_zero":
+            given.append(graph.number(0.0))
         if node.op == "const":
             names[place] = graph.number(node.value)
         elif node.op == "input":
             names[place] = argument
-        elif node.op == "sq":
-            names[place] = graph.square(*given)
-        elif node.op == "twice":
-            names[place] = graph.node("Add", *given, *given)
         else:
             names[place] = graph.node(_OPERATORS[node.op], *given)
     return [names[place] for entries in scalars.outputs for place in entries]
 
 
-def _sensitivity(graph: _Graph, model: AxleModel, axle: int, units: str, speed: float) -> str:
-    """Return h: the force over its weights and the zero of its slip, (batch, n + 1)."""
-    by_offset = (1.0, 1.0 / speed)[axle]
-    bent = graph.node("Sub", graph.number(1.0), graph.square(units))
-    by = (by_offset * model.W[axle] / model.ladder)[:, None]
-    slope = graph.node("MatMul", bent, graph.number(by))
-    return graph.node("Concat<axis = 1>", units, slope)
-
-
-def _square_of(graph: _Graph, h: str, P: Array, index: list[int]) -> str:
-    """Return h' P h, (batch, 1).   index : of the rows of P that h is of."""
-    by = root(P[np.ix_(index, index)])
-    product = graph.node("MatMul", h, graph.number(by))
-    return graph.node("MatMul", graph.square(product), graph.number(np.ones((by.shape[1], 1))))
-
-
-def _band_of_fit(
-    model: FittedModel, graph: _Graph, i: int, phi: str, slope: str, *numbers: str
-) -> None:
-    """Add half the width of the band of an axle, as of a fit at the speed of its drives.
-    i : 0 in front, 1 at the rear.   phi, slope, numbers : names of φ [static loads], of dφ/dx and
-        of the slopes of φ over the numbers of its curve, (batch, 1).
-    """
-    node, number, band = graph.node, graph.number, model.band
-    index, P = curve_index("fr"[i]), model.covariance
-    shares = {"steering_zero": 1.0 - i, "v_y_bias": 1.0 / model.speeds.mean(), "v_y_angle": 1.0}
-    columns = dict(zip(index, numbers, strict=True)) | {
-        INDEX[name]: node("Mul", slope, number(share)) for name, share in shares.items()
-    }
-    moves = [k for k in columns if P[k, k] > 0.0]
-    h = node("Concat<axis = 1>", *(columns[k] for k in moves))
-    left = _square_of(graph, h, P, moves)
-    own = graph.square(node("Mul", phi, number(band.error_share[i])))
-    total = node("Add", left, node("Add", own, number(band.error_floor[i] ** 2)))
-    size = number(model.vehicle.axle_loads[i] * normal_quantile(LEVEL))
-    node("Mul", node("Sqrt", total), size, result=_HALF_BANDS[i].name)
-
-
-def _band_of_axle(model: AxleModel, graph: _Graph, axle: int, units: str) -> None:
-    """Add half the width of the band of an axle; the formula of `identifier.axle.band`.
-    axle : 0 in front, 1 at the rear.   units : name of t (batch, n).
-    """
-    node, number = graph.node, graph.number
-    load, calibration = model.vehicle.axle_loads[axle], model.band.calibration
-    speed = calibration.speed
-    n, h = len(model.ladder), _sensitivity(graph, model, axle, units, speed)
-    learnt = [*range(n), n + 2]  # weights and the zero of the slip
-    left, before = (
-        _square_of(graph, h, P[axle], learnt) for P in (model.covariance, model.prior_covariance)
-    )
-    before = node("Max", before, number(LEAST_BEFORE))
-    share = node("Min", node("Div", left, before), number(1.0))
-    c = float(calibration.color[axle])
-    given = node("Add", number(1.0), node("Mul", share, number(c - 1.0)))
-    colored = node("Div", node("Mul", node("Mul", before, share), number(c)), given)
-    left = node("Max", colored, left)
-    relative = node("Mul", _FORCES[axle].name, number(RELATIVE / load))
-    total = node("Add", node("Add", graph.square(relative), number(FLOOR**2)), left)
-    ratio = node("Div", left, node("Mul", before, number(AXLE_CHOSEN.unknown**2)))
-    unknown = node("Min", ratio, number(1.0))
-    slips = hinges(calibration.factors, AXLE_CHOSEN.centers)[axle]
-    size = node("Min", node("Abs", _SLIPS[axle].name), number(AXLE_CHOSEN.centers[-1]))
-    over = node("Max", node("Sub", size, number(AXLE_CHOSEN.centers[:-1])), number(0.0))
-    by_slip = node("Add", node("MatMul", over, number(slips[1:, None])), number(slips[0]))
-    at = speed / model.vehicle.froude_speed
-    factor = node(
-        "Mul", by_slip, number(np.interp(at, AXLE_CHOSEN.at_speeds, calibration.speeds[axle]))
-    )
-    wide = node("Max", factor, number(1.0))
-    narrow, wide = graph.square(factor), graph.square(wide)
-    opened = node("Mul", unknown, node("Sub", wide, narrow))
-    sd = node("Sqrt", node("Mul", total, node("Add", narrow, opened)))
-    node("Mul", sd, number(load * normal_quantile(LEVEL)), result=_HALF_BANDS[axle].name)
-
-
 def onnx_bytes(model: TireModel, *, single: bool = False, with_band: bool = False) -> bytes:
     """Return a frozen model as the content of an ONNX file; the same model gives the same bytes.
-    model : the whole model for a network, the static force curves for an axle model and a fit, the
-        network itself for one that came from an ONNX file.
+    model : the whole model for a network, the static force curves for an axle model and a fit.
     single : whether numbers are float32; else they are float64.
     """
-    if isinstance(model, AxleModel):
-        band = partial(_band_of_axle, model) if with_band else None
-        return _curves(model, single=single, add_band=band)
-    if isinstance(model, FittedModel):
-        return _fitted_curves(model, single=single, with_band=with_band)
+    if isinstance(model, AxleModel | FittedModel):
+        return _curves(model, single=single, with_band=with_band)
     name = type(model).__name__
-    if not isinstance(model, NetworkModel | OnnxModel):
+    if not isinstance(model, NetworkModel):
         raise NoOnnxError(f"{name} has no ONNX form, only networks and axle curves do")
     if with_band:
         raise NoOnnxError(f"{name} cannot tell how sure it is: it has no band")
-    return model.content if isinstance(model, OnnxModel) else _network(model, single=single)
-
-
-def export_onnx(
-    model: TireModel, path: Path, *, single: bool = False, with_band: bool = False
-) -> None:
-    """Write a frozen model as an ONNX file; arguments as of `onnx_bytes`."""
-    write_atomically(path, onnx_bytes(model, single=single, with_band=with_band))
+    return _network(model, single=single)

@@ -7,8 +7,6 @@ class Chosen(NamedTuple):
     """Numbers of this package, by the file that reads them."""
 
     # design
-    # rad, the slip at which force curves shall not fall: the cornering stiffness
-    rising_until: float = 0.0
     least_share: float = 1e-6  # of the sway, which a prior has to have
     reach: float = 0.3  # rad, up to which directions of curves are those of a tire
     # motion

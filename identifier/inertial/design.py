@@ -16,7 +16,6 @@ from identifier.axle.covariance import packed, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.design import AxleIdentifier, curve_boxes, curve_tracks, resumed_units
 from identifier.axle.gate import Plausibility
-from identifier.axle.guarantee import prior_box
 from identifier.axle.learning import Bounds, inward, rising_shares
 from identifier.axle.model import EXACT, AxleModel, begun
 from identifier.axle.prior import Prior
@@ -130,7 +129,7 @@ class InertialIdentifier(Method):
             prior=replace(usual.prior, sway_share=share),
             roll_frequency=tires.sway.frequency * vehicle.froude_time,
             doubt=(float(model.band.error_floor[1]), float(model.band.error_share[1])),
-            a_y_late=model.a_y_late,
+            a_y_late=model.reach.a_y_late,
             along=Along(
                 load_f=-model["load_transfer"] * vehicle.wheelbase / vehicle.l_r,
                 load_r=model["load_transfer"] * vehicle.wheelbase / vehicle.l_f,
@@ -170,12 +169,12 @@ class InertialIdentifier(Method):
 
     @property
     def limits(self) -> Limits:
-        boxes = curve_boxes(self.bounds, stiffness=True) | {
+        boxes = curve_boxes(self.bounds) | {
             "roll_rad_per_g": [0.0, MOST["roll"]],
             "a_y_offset_g": [-MOST["bias"], MOST["bias"]],
             "yaw_rate_offset_rad_s": [-MOST["gyro"], MOST["gyro"]],
         }
-        return Limits(boxes, prior_box(self.bounds, self.ladder))
+        return Limits(boxes)
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -220,8 +219,8 @@ class InertialIdentifier(Method):
                 "trust": np.array(trust),
                 "learning_speed": np.array(self.plausibility.learning_speed),
                 "limits": np.array(self._limits()),
-                "bounds": np.array(self.bounds.of_ladder(self.ladder, CHOSEN.rising_until)),
-                "rising": rising_shares(self.ladder, CHOSEN.rising_until),
+                "bounds": np.array(self.bounds.of_ladder(self.ladder)),
+                "rising": rising_shares(self.ladder),
                 "curves": curves,
                 "compliance": compliance,
                 "doubt": np.array(self.doubt),

@@ -9,7 +9,6 @@ class Chosen(NamedTuple):
     # design
     shortest_step: float = 1e-4  # [s]: finer is only work
     longest_step: float = 0.1  # [s]: coarser is blind
-    phase_margin: float = 60.0  # deg
     # laws
     least: float = 1e-15  # of a gain that is not 0, in its unit, whatever U is
     largest: float = 1e12  # of a gain, in its unit, whatever U is

@@ -22,7 +22,8 @@ from identifier.certificate import Certificate
 from identifier.driving import SPEED_SPREAD, Driving, natural_driving
 from identifier.method import Method
 from identifier.paper.chosen import CHOSEN
-from identifier.paper.laws import INPUT_SOURCES, INTEGRATORS, LAWS, Gains, diagonal
+from identifier.paper.gains import gains_for
+from identifier.paper.laws import INPUT_SOURCES, LAWS, Gains, diagonal
 from identifier.paper.network import (
     Network,
     NetworkModel,
@@ -34,16 +35,12 @@ from identifier.paper.network import (
 from identifier.paper.step import CARRY, GAINS, OVER, PORTS, Structure, build_step
 from identifier.setup import Port, Setup, in_force_unit
 from identifier.stability.certificate import certify
-from identifier.stability.gain_design import KEEPINGS, decay_rate, design_gains
-from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import (
     Operation,
     declared_signals,
     disturbance,
     estimated_input_feedback,
     expected_residual,
-    minimal_decay,
-    proven_bounds,
 )
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters, bicycle
@@ -85,8 +82,7 @@ class PaperIdentifier(Method):
     law : the driving error, "integral" (the paper's), "instantaneous" (the conventional one) or
         "pi_lead" (which needs the gain `lead`).
     input_source : where the network reads the state, "measured" or "estimated" (the paper's).
-    integrator : "euler" or "rk4".
-    dt : sampling interval T_s [s].
+    dt : sampling interval T_s [s], of explicit Euler.
     force_unit : the unit U of forces inside the identifier [N]; gains are meant in it.
     min_speed : below this speed [m/s] learning rests and forces read zero.
     driving : the conditions that it was designed for and is judged at; None takes those of the
@@ -102,7 +98,6 @@ class PaperIdentifier(Method):
     network: Network = field(default_factory=Network)
     law: str = "integral"
     input_source: str = "measured"
-    integrator: str = "euler"
     dt: float = 0.01
     force_unit: float = 1000.0
     min_speed: float = 1.0
@@ -112,11 +107,7 @@ class PaperIdentifier(Method):
     judged_by = "tireid check"  # on the file of the design
 
     def __post_init__(self) -> None:
-        for name, known in (
-            ("law", LAWS),
-            ("input_source", INPUT_SOURCES),
-            ("integrator", INTEGRATORS),
-        ):
+        for name, known in (("law", LAWS), ("input_source", INPUT_SOURCES)):
             if getattr(self, name) not in known:
                 raise ValueError(
                     f"{name} must be one of {list(known)}, not {getattr(self, name)!r}"
@@ -129,14 +120,7 @@ class PaperIdentifier(Method):
     @property
     def structure(self) -> Structure:
         """What the compiled step is built from."""
-        return Structure(
-            network=self.network,
-            law=self.law,
-            input_source=self.input_source,
-            integrator=self.integrator,
-            projects=bool(np.isfinite(self.gains.W_max) or np.isfinite(self.gains.V_max)),
-            rests=bool(self.gains.W_free > 0.0 or self.gains.V_free > 0.0),
-        )
+        return Structure(network=self.network, law=self.law, input_source=self.input_source)
 
     @classmethod
     def for_vehicle(
@@ -161,15 +145,21 @@ class PaperIdentifier(Method):
         """
         if law not in VARIANTS:
             raise ValueError(f"law must be one of {list(VARIANTS)}, not {law!r}")
-        found = design_for(
-            vehicle,
-            natural_driving(vehicle),
-            law=VARIANTS[law].gains_of,
-            network=network,
-            seed=seed,
+        driving, gains_of = natural_driving(vehicle), VARIANTS[law].gains_of
+        blank = cls(
+            gains=Gains(  # until the design around them is known
+                A_d=diagonal(1.0), forgetting=1.0, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0
+            ),
+            network=network or natural_network(vehicle),
+            law=gains_of,
             dt=dt,
+            force_unit=_natural_force_unit(vehicle.mass),
+            min_speed=vehicle.lowest_speed,
+            seed=seed,
+            driving=driving,
         )
-        return found.with_law(law)
+        found = gains_for(LAWS[gains_of], blank.operation(vehicle, driving))
+        return replace(blank, gains=found).with_law(law)
 
     def with_law(self, name: str) -> "PaperIdentifier":
         """Return it run by another law, to compare the two.
@@ -236,7 +226,7 @@ class PaperIdentifier(Method):
             "gains": asdict(self.gains),
             "network": asdict(self.network),
             "design": {
-                "input_source": self.input_source, "integrator": self.integrator, "dt_s": self.dt,
+                "input_source": self.input_source, "dt_s": self.dt,
                 "force_unit_N": self.force_unit, "min_speed_m_s": self.min_speed,
             },
             "seed": self.seed,
@@ -337,7 +327,6 @@ def _operation(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> O
     return Operation(
         n_h=design.network.hidden,
         dt=design.dt,
-        integrator=design.integrator,
         bandwidth=driving.bandwidth,
         disturbance=found,
         needed_force=expected / design.force_unit,
@@ -349,97 +338,16 @@ def _operation(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> O
     )
 
 
-# Gains by the margin of the learning loop: sizes follow from the car by similarity.
-
-
-def design_for(
-    vehicle: Vehicle,
-    driving: Driving,
-    *,
-    law: str = "integral",
-    network: Network | None = None,
-    phase_margin: float = CHOSEN.phase_margin,
-    input_source: str = "measured",
-    integrator: str = "euler",
-    dt: float = 0.01,
-    seed: int = 0,
-) -> PaperIdentifier:
-    """Return a design whose learning loop has the wanted phase margin at the worst regressor.
-    driving : how hard it is driven; it is stored with the design.
-    law : "integral", "instantaneous" or "pi_lead", which gets the lead τ = 1/a.
-    network : structure; None takes `natural_network`.   phase_margin : of the sampled loop [deg].
-    input_source : "measured" or "estimated".   integrator : "euler" or "rk4".
-    dt : sampling interval [s].
-    """
-    network = network or natural_network(vehicle)
-    placeholder = Gains(  # until the design around it is known
-        A_d=diagonal(1.0), forgetting=1.0, eta_W=0.0, eta_V=0.0, rho_W=0.0, rho_V=0.0
-    )
-    frame = PaperIdentifier(
-        gains=placeholder,
-        network=network,
-        law=law,
-        input_source=input_source,
-        integrator=integrator,
-        dt=dt,
-        force_unit=_natural_force_unit(vehicle.mass),
-        min_speed=vehicle.lowest_speed,
-        seed=seed,
-        driving=driving,
-    )
-    known = frame.operation(vehicle, driving)
-    feedback = known.input_feedback
-    slowest = 0.0 if feedback is None else minimal_decay(feedback)
-    lead = LAWS[law].lead / decay_rate(driving.bandwidth, slowest)
-    gains = design_gains(
-        law=LAWS[law].error(lead),
-        bandwidth=driving.bandwidth,
-        dt=dt,
-        n_h=network.hidden,
-        x_bar_max=known.x_bar_max,
-        disturbance=known.disturbance,
-        needed_force=known.needed_force,
-        V_max=known.V_start,
-        phase_margin=phase_margin,
-        integrator=integrator,
-        minimal_decay=slowest,
-    )
-    return replace(frame, gains=replace(gains, lead=lead))
-
-
-def with_keeping(design: PaperIdentifier, known: Operation, keeping: str) -> PaperIdentifier:
-    """Return the design with its weights kept otherwise, η_V lowered where V would cost margin.
-    design : of the paper's leakage, as `design_for` finds it.
-    known : where it runs, `PaperIdentifier.operation`.   keeping : one of `KEEPINGS`.
-    """
-    if keeping not in KEEPINGS:
-        raise ValueError(f"keeping must be one of {list(KEEPINGS)}, not {keeping!r}")
-    first = design.gains
-    if first.W_free or first.V_free or np.isfinite([first.W_max, first.V_max]).any():
-        raise ValueError("the weights of this design are bounded by a dead zone or a projection")
-    gains = KEEPINGS[keeping](first, known)
-    if gains == first:
-        return design
-    chosen = LAWS[design.law]
-    law, D = chosen.error(gains.lead), direction_matrix(chosen, gains.matrix)
-    W = proven_bounds(gains, law, known, D).W
-    free_of_cost = gains.eta_W / (known.x_bar_max * W) ** 2  # rule 5 of `gain_design`
-    return replace(design, gains=replace(gains, eta_V=min(gains.eta_V, free_of_cost)))
-
-
 # A design as a TOML file: design.toml, read strictly and written with its units.
 
 COMMENTS = {
     "law": "integral | instantaneous | pi_lead",
     "input_source": "the state that the network reads: measured | estimated",
-    "integrator": "euler | rk4", "dt": "s", "force_unit": "N, the unit U of forces in the gains",
+    "dt": "s", "force_unit": "N, the unit U of forces in the gains",
     "min_speed": "m/s, below it learning rests", "seed": "of the initial weights",
     "A_d": "1/s, by rows, Hurwitz", "forgetting": "1/s, lambda",
     "eta_W": "1/s^4 (instantaneous: 1/s^3)", "eta_V": "1/(U^2 s^4) (instantaneous: 1/(U^2 s^3))",
-    "rho_W": "1/(U s^2)", "rho_V": "1/(U s^2)", "W_max": "U, projection of W (inf: none)",
-    "V_max": "projection of V (inf: none)",
-    "W_free": "U, dead zone of the leakage of W (0: all of W leaks, the paper's)",
-    "V_free": "dead zone of the leakage of V (0: all of V leaks, the paper's)",
+    "rho_W": "1/(U s^2)", "rho_V": "1/(U s^2)",
     "lead": "s, tau of pi_lead", "hidden": "units", "inputs": "what the network reads",
     "scale": "divisors of the inputs, SI", "v_x": "m/s, give or take 5 %",
     "slip": "rad, largest slip angle of an axle", "friction": "largest of the road",

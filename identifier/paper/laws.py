@@ -1,20 +1,14 @@
-"""The adaptive laws (11)-(13): which error drives them, how they leak, how weights are bounded.
+"""The adaptive laws (11)-(13): which error drives them, and how they leak.
 
-The leakage of (11)-(12) never rests: whatever |ξ̃| is, noise or what no network can learn, takes
-W and V towards zero, and in hours of driving the network is gone. Two things keep it. A dead zone:
-only what lies beyond a ball leaks, W - Π(W), Π(W) the point of the ball that is nearest, which is
-the switching σ of Ioannou and Sun, Robust Adaptive Control (1996), 8.4.1, with the factor
-1 - W_free/|W| beyond the radius in place of their ramp from one to two radii: it too is continuous,
-and since W - Π(W) never grows faster than W, all that is proven of the leakage holds of what lies
-beyond the ball. Or a projection (8.4.2 there) in place of the leakage, which keeps weights in a
-ball; it is done after the step.
+The leakage never rests: whatever |ξ̃| is, noise or what no network can learn, takes W and V towards
+zero.
 
 ξ̃ = ξ - ξ̂ [U s], z = ∫ exp(-λ (t - τ)) ξ̃ dτ [U s²], σ = tanh(V̂ x̄), U the force unit.
 The paper never defines ξ̃. Only with ξ - ξ̂, so that dξ̃/dt = A_d ξ̃ + f - f̂, do (11)-(12) descend.
 
 In functions:
 A_d : Hurwitz matrix (2, 2) [1/s].   drive : the error that drives the laws (2,).
-xi : measured axle impulse (2,).   xi_hat : estimated axle impulse (2,).   dt : step [s].
+xi : measured axle impulse (2,).   xi_hat : estimated axle impulse (2,).
 """
 
 from collections.abc import Callable, Mapping
@@ -72,11 +66,6 @@ class Law:
     lead: float = 0.0
     direction: _Direction = _static_direction
 
-    def __post_init__(self) -> None:
-        shares = (self.z, self.xi, self.lead)
-        if not (min(shares) >= 0.0 and 0.0 < sum(shares) < np.inf):
-            raise ValueError(f"a law must weigh z and xi_tilde positively, it has {shares}")
-
     def error(self, lead: Any = 0.0) -> DrivingError:
         """Return the coefficients of the driving error.
         lead : lead time τ of the gains [s], a number or a symbol.
@@ -95,26 +84,6 @@ LAWS: Mapping[str, Law] = {
         Law(name="pi_lead", z=1.0, lead=1.0, direction=_lyapunov_direction),
     )
 }
-
-
-def ball(weights: Any, radius: Any) -> Any:
-    """Return the weights, projected on the ball |weights|_F <= radius.
-    radius : Frobenius norm that is kept, positive.
-    """
-    return weights * ca.fmin(1, radius / ca.fmax(ca.norm_fro(weights), 1e-300))
-
-
-def whole(weights: Any, radius: Any) -> Any:
-    """Return the weights as they are: all of them leak, as in (11)-(12), and none is projected."""
-    del radius
-    return weights
-
-
-def beyond_ball(weights: Any, radius: Any) -> Any:
-    """Return what of the weights lies beyond the ball: zero within it, and continuous.
-    radius : Frobenius norm within which nothing leaks, not negative.
-    """
-    return weights - ball(weights, radius)
 
 
 class _WeightRates(NamedTuple):
@@ -138,9 +107,6 @@ def weight_rates(
     rho_W: Any,
     rho_V: Any,
     direction: _Direction = _static_direction,
-    leaking: Callable[[Any, Any], Any] = whole,
-    W_free: Any = 0.0,
-    V_free: Any = 0.0,
 ) -> _WeightRates:
     """Return (11)-(12), each a descent along the static gradient with a leakage.
     drive : the error that drives the laws, z, ξ̃ or z + τ ξ̃ (2,).
@@ -148,15 +114,12 @@ def weight_rates(
     V : weights (n_h, n_in).   x_bar : network input (n_in,).
     sigma : hidden layer tanh(V x̄) (n_h,).   eta_W : learning rate η1.   eta_V : learning rate η2.
     rho_W : leakage ρ1.   rho_V : leakage ρ2.
-    leaking : what of the weights leaks, from them and the radius: `whole` or `beyond_ball`.
-    W_free : radius of the dead zone of W, which `whole` does not read [U].
-    V_free : radius of the dead zone of V, which `whole` does not read [-].
     """
     g = direction(A_d, drive)  # (zᵀ A_d⁻¹)ᵀ as printed
     leak = ca.norm_2(xi_tilde)
     slope = 1 - sigma**2  # diagonal of I - Λ, (13)
-    W_dot = -eta_W * g @ sigma.T - rho_W * leak * leaking(W, W_free)  # (11)
-    V_dot = -eta_V * (slope * (W.T @ g)) @ x_bar.T - rho_V * leak * leaking(V, V_free)  # (12)
+    W_dot = -eta_W * g @ sigma.T - rho_W * leak * W  # (11)
+    V_dot = -eta_V * (slope * (W.T @ g)) @ x_bar.T - rho_V * leak * V  # (12)
     return _WeightRates(W_dot, V_dot)
 
 
@@ -188,44 +151,6 @@ INPUT_SOURCES: Mapping[str, Callable[[Any, Any], Any]] = {  # of ξ and ξ̂
     "estimated": lambda _, xi_hat: xi_hat,
 }
 
-# One step of an ordinary differential equation, with its inputs held over the step.
-
-Derivative = Callable[[list[Any]], list[Any]]
-Projection = Callable[[list[Any]], list[Any]]
-Integrator = Callable[[Derivative, list[Any], Any, Projection], list[Any]]
-
-
-def _ahead(state: list[Any], rate: list[Any], h: Any) -> list[Any]:
-    return [s + h * r for s, r in zip(state, rate, strict=True)]
-
-
-def euler(
-    derivative: Derivative, state: list[Any], dt: Any, project: Projection = list
-) -> list[Any]:
-    """Return the state one explicit Euler step later.
-    project : puts a state back within its bounds; Euler has no inner stage that needs it.
-    """
-    del project
-    return _ahead(state, derivative(state), dt)
-
-
-def rk4(derivative: Derivative, state: list[Any], dt: Any, project: Projection = list) -> list[Any]:
-    """Return the state one classical fourth-order Runge-Kutta step later.
-
-    The inner stages are projected: else a high gain leaves the bounds within the step, and the
-    slopes there carry it beyond them.
-    """
-    k1 = derivative(state)
-    k2 = derivative(project(_ahead(state, k1, dt / 2)))
-    k3 = derivative(project(_ahead(state, k2, dt / 2)))
-    k4 = derivative(project(_ahead(state, k3, dt)))
-    mean = [(a + 2 * b + 2 * c + d) / 6 for a, b, c, d in zip(k1, k2, k3, k4, strict=True)]
-    return _ahead(state, mean, dt)
-
-
-INTEGRATORS: Mapping[str, Integrator] = {"euler": euler, "rk4": rk4}
-
-
 # Gains of the identifier, with their units.
 #
 # With the force unit U (kN for a car) the axle impulse ξ is in U s, the filtered error z in U s².
@@ -242,13 +167,7 @@ class Gains:
     forgetting : λ of (9)-(10) [1/s].
     eta_W : learning rate of W: η1 [1/s⁴], or [1/s³] for the instantaneous law.
     eta_V : learning rate of V: η2 [1/(U² s⁴)], or [1/(U² s³)] for the instantaneous law.
-    rho_W : leakage of W, ρ1 [1/(U s²)]; 0 where a projection bounds W.
-    rho_V : leakage of V, ρ2 [1/(U s²)]; 0 where a projection bounds V.
-    W_max : radius of the projection of W, Frobenius norm [U]; infinite: no projection.
-    V_max : radius of the projection of V, Frobenius norm [-]; infinite: no projection.
-    W_free : radius of the dead zone of the leakage of W, Frobenius norm [U]: within it nothing
-        leaks, beyond it what lies beyond; 0, the paper's: all of W leaks.
-    V_free : radius of the dead zone of the leakage of V, Frobenius norm [-]; 0, the paper's.
+    rho_W : leakage of W, ρ1 [1/(U s²)].   rho_V : leakage of V, ρ2 [1/(U s²)].
     lead : τ of the PI-lead law z + τ ξ̃ [s]; the other laws do not read it.
     """
 
@@ -258,10 +177,6 @@ class Gains:
     eta_V: float
     rho_W: float
     rho_V: float
-    W_max: float = np.inf
-    V_max: float = np.inf
-    W_free: float = 0.0
-    V_free: float = 0.0
     lead: float = 0.0
 
     def __post_init__(self) -> None:
@@ -272,28 +187,14 @@ class Gains:
         poles = np.linalg.eigvals(A_d)
         if not poles.real.max() < 0.0:
             raise NotHurwitzError(f"A_d must be Hurwitz, its eigenvalues are {poles}")
-        for name in ("eta_W", "eta_V", "rho_W", "rho_V", "W_free", "V_free", "lead"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise ValueError(f"{name} must not be negative, it is {getattr(self, name)}")
         if not 0.0 < self.forgetting < np.inf:
             raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
-        for name in ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "W_free", "V_free", "lead"):
-            if getattr(self, name) != 0.0:
-                require_within(
-                    ValueError, CHOSEN.least, CHOSEN.largest, **{name: getattr(self, name)}
-                )
-        for name in ("W_max", "V_max"):
-            if not getattr(self, name) > 0.0:
-                raise ValueError(f"{name} must be positive, it is {getattr(self, name)}")
-            if getattr(self, name) != np.inf:
-                require_within(
-                    ValueError, CHOSEN.least, CHOSEN.largest, **{name: getattr(self, name)}
-                )
-        for free, rho in (("W_free", "rho_W"), ("V_free", "rho_V")):
-            if getattr(self, free) > 0.0 and getattr(self, rho) == 0.0:
-                raise ValueError(
-                    f"{free} is the dead zone of a leakage, and {rho} is 0: it must be positive"
-                )
+        for name in ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "lead"):
+            value = getattr(self, name)
+            if not 0.0 <= value < np.inf:
+                raise ValueError(f"{name} must not be negative, it is {value}")
+            if value != 0.0:
+                require_within(ValueError, CHOSEN.least, CHOSEN.largest, **{name: value})
 
     @property
     def matrix(self) -> Array:

@@ -99,16 +99,13 @@ class Network:
         return ca.vertcat(*(signals[name] * (1 / scale) for name, scale in pairs))
 
 
-def natural_network(
-    vehicle: Vehicle, *, hidden: int = 10, inputs: tuple[str, ...] = Network().inputs
-) -> Network:
-    """Return a network whose input scales fit the size of the car.
-    hidden : number of hidden units.
-    """
-    ratio = np.sqrt(vehicle.wheelbase / REFERENCE_WHEELBASE)
-    froude = {"v_y": ratio, "v_x": ratio, "r": 1 / ratio}
-    scale = tuple(float(SIGNALS[name] * froude.get(name, 1.0)) for name in inputs)
-    return Network(hidden=hidden, inputs=inputs, scale=scale)
+def natural_network(vehicle: Vehicle) -> Network:
+    """Return a network whose input scales fit the size of the car."""
+    ratio = float(np.sqrt(vehicle.wheelbase / REFERENCE_WHEELBASE))
+    usual = Network()
+    froude = {"v_y": ratio, "r": 1 / ratio}
+    scale = tuple(float(SIGNALS[name] * froude.get(name, 1.0)) for name in usual.inputs)
+    return Network(scale=scale)
 
 
 def hidden_layer(V: Any, x_bar: Any) -> Any:

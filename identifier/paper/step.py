@@ -16,14 +16,10 @@ import casadi as ca
 from identifier.paper.chosen import CHOSEN
 from identifier.paper.laws import (
     INPUT_SOURCES,
-    INTEGRATORS,
     LAWS,
-    ball,
-    beyond_ball,
     filter_rate,
     observer_rate,
     weight_rates,
-    whole,
 )
 from identifier.paper.network import Network, hidden_layer, network_signals
 from identifier.setup import AXLE_FORCE, Port
@@ -43,9 +39,7 @@ PORTS = (
     Port("z", "U s^2", "filtered error, front and rear"),
 )
 OVER = ("x", "u", "v_x")
-GAINS = (
-    "eta_W", "eta_V", "rho_W", "rho_V", "forgetting", "W_max", "V_max", "lead", "W_free", "V_free",
-)  # fmt: skip
+GAINS = ("eta_W", "eta_V", "rho_W", "rho_V", "forgetting", "lead")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -57,9 +51,6 @@ class Structure:
     network: Network
     law: str
     input_source: str
-    integrator: str
-    projects: bool
-    rests: bool = False
 
 
 def _plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
@@ -90,71 +81,58 @@ def build_step(structure: Structure) -> ca.Function:
     gains, sampling = ca.SX.sym("gains", len(GAINS)), ca.SX.sym("sampling", 3)
 
     parameters = BicycleParameters(*ca.vertsplit(vehicle))
-    eta_W, eta_V, rho_W, rho_V, lam, W_max, V_max, lead, W_free, V_free = ca.vertsplit(gains)
+    eta_W, eta_V, rho_W, rho_V, lam, lead = ca.vertsplit(gains)
     dt, unit, min_speed = ca.vertsplit(sampling)
     speed = ca.fmax(v_x, min_speed)
     model = bicycle(parameters, speed)
     xi = model.K_inv @ x / unit
     law, source = LAWS[structure.law], INPUT_SOURCES[structure.input_source]
     error = law.error(lead)
-    bounded = ball if structure.projects else whole
 
-    def layers(xi_hat: Any, V: Any) -> tuple[Any, Any]:
-        x_read = unit * model.K @ source(xi, xi_hat)
-        x_bar = network.normalized_input(network_signals(parameters, speed, x_read, u))
-        return x_bar, hidden_layer(V, x_bar)
-
-    def derivative(state: list[Any]) -> list[Any]:
-        xi_hat, z, W, V = state
-        x_bar, sigma = layers(xi_hat, V)
-        xi_tilde = xi - xi_hat
-        rates = weight_rates(
-            drive=error.drive(z, xi_tilde),
-            xi_tilde=xi_tilde,
-            W=W,
-            V=V,
-            x_bar=x_bar,
-            sigma=sigma,
-            A_d=A_d,
-            eta_W=eta_W,
-            eta_V=eta_V,
-            rho_W=rho_W,
-            rho_V=rho_V,
-            direction=law.direction,
-            leaking=beyond_ball if structure.rests else whole,
-            W_free=W_free,
-            V_free=V_free,
-        )
-        xi_hat_dot = observer_rate(A_d, model.A_xi, model.B_xi / unit, xi, xi_hat, u, W @ sigma)
-        return [xi_hat_dot, filter_rate(lam, z, xi_tilde), *rates]
-
-    def kept(state: list[Any]) -> list[Any]:
-        """Return a state within its projections, which inner stages must see too."""
-        return [state[0], state[1], bounded(state[2], W_max), bounded(state[3], V_max)]
+    x_read = unit * model.K @ source(xi, xi_hat)
+    x_bar = network.normalized_input(network_signals(parameters, speed, x_read, u))
+    sigma = hidden_layer(V, x_bar)
+    xi_tilde = xi - xi_hat
+    rates = weight_rates(
+        drive=error.drive(z, xi_tilde),
+        xi_tilde=xi_tilde,
+        W=W,
+        V=V,
+        x_bar=x_bar,
+        sigma=sigma,
+        A_d=A_d,
+        eta_W=eta_W,
+        eta_V=eta_V,
+        rho_W=rho_W,
+        rho_V=rho_V,
+        direction=law.direction,
+    )
+    xi_hat_dot = observer_rate(A_d, model.A_xi, model.B_xi / unit, xi, xi_hat, u, W @ sigma)
 
     moving = v_x >= min_speed
     plausible_sample = ca.logic_and(
         _plausible(parameters, speed, x, u), v_x <= CHOSEN.largest_speed
     )
     used = ca.logic_and(moving, plausible_sample)
-    f_hat = ca.if_else(used, W @ layers(xi_hat, V)[1], 0)
+    f_hat = ca.if_else(used, W @ sigma, 0)
     linear = ca.if_else(used, linear_axle_force(parameters, speed, x, u), 0)
     ahead = ca.if_else(used, dt, 0)  # else nothing moves on: weights keep their values
-    xi_hat_next, z_next, W_next, V_next = INTEGRATORS[structure.integrator](
-        derivative, [xi_hat, z, W, V], ahead, kept
-    )
     return ca.Function(
         f"identifier_{structure.law}",
         [xi_hat, z, W, V, x, u, v_x, vehicle, A_d, gains, sampling],
         [
             # at rest the observer follows the measurement, as far as it can be believed
-            ca.if_else(ca.logic_or(moving, ca.logic_not(plausible_sample)), xi_hat_next, xi),
-            ca.if_else(moving, z_next, 0),
-            bounded(W_next, W_max),
-            bounded(V_next, V_max),
+            ca.if_else(
+                ca.logic_or(moving, ca.logic_not(plausible_sample)),
+                xi_hat + ahead * xi_hat_dot,
+                xi,
+            ),
+            ca.if_else(moving, z + ahead * filter_rate(lam, z, xi_tilde), 0),
+            W + ahead * rates.W_dot,
+            V + ahead * rates.V_dot,
             f_hat,
             linear + unit * f_hat,
-            ca.if_else(used, xi - xi_hat, 0),
+            ca.if_else(used, xi_tilde, 0),
         ],
         [*CARRY, *OVER, "vehicle", "A_d", "gains", "sampling"],
         [*(f"{name}_next" for name in CARRY), "f_hat", "axle_force", "xi_tilde"],

@@ -14,79 +14,51 @@ That is continuous time from rest. `sampled_bound.py` carries it to the identifi
 the steering inside a sample makes that large.
 """
 
-import math
-
 import numpy as np
-from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
-from identifier.stability.lyapunov import lyapunov, peak_gain, require_hurwitz, sampled_peak_gain
-from models.rules import require_positive
+from identifier.stability.lyapunov import sampled_peak_gain
 
 
 def small_gain(
-    A_d: ArrayLike,
+    A_d: Array,
     *,
     law: DrivingError,
     forgetting: float,
     eta_W: float,
     n_h: int,
-    dt: float | None = None,
-    direction: Array | None = None,
+    dt: float,
+    direction: Array,
 ) -> float:
     """θ = c_z γ η_W |A_d⁻¹| n_h/λ² [-]; below 1 the law is bounded.
     A_d : (2, 2) Hurwitz error dynamics [1/s].   forgetting : λ [1/s].
     eta_W : learning rate of (11).   n_h : hidden units; |s|² <= n_h.
-    dt : step of explicit Euler [s]; None for continuous time.
-    direction : (2, 2) D [s], None for -A_d⁻ᵀ.
+    dt : step of explicit Euler [s].
+    direction : (2, 2) D [s].
     """
-    require_positive(ValueError, forgetting=forgetting)
-    c_z, _ = law
-    gain: float = c_z * _peak(A_d, dt) * eta_W * _size(A_d, direction) * n_h / forgetting**2
+    peak, size = sampled_peak_gain(A_d, dt), float(np.linalg.norm(direction, 2))
+    gain: float = law.z * peak * eta_W * size * n_h / forgetting**2
     return gain
 
 
 def steady_capacity(
-    A_d: ArrayLike,
+    direction: Array,
     *,
     law: DrivingError,
     forgetting: float,
     eta_W: float,
     rho_W: float,
     n_h: int,
-    direction: Array | None = None,
 ) -> float:
     """n_h η_W |A_d⁻¹| (c_z/λ + c_ξ)/ρ_W [U]: the largest force that leakage lets W hold.
 
     In steady state learning balances leakage, η_W |s|² |A_d⁻¹| (c_z/λ + c_ξ) |ξ̃| = ρ_W |ξ̃| |f_hat|:
     a residual above it leaves an error however long one learns. It shrinks with |s|²/n_h.
-    A_d : (2, 2) Hurwitz error dynamics [1/s].   forgetting : λ [1/s].
+    direction : (2, 2) D [s].   forgetting : λ [1/s].
     eta_W : learning rate of (11).   rho_W : leakage gain of (11) [1/(U s²)].
-    direction : (2, 2) D [s], None for -A_d⁻ᵀ.
     """
-    require_positive(ValueError, forgetting=forgetting, rho_W=rho_W)
     c_z, c_xi = law
-    weight: float = n_h * eta_W * _size(A_d, direction) * (c_z / forgetting + c_xi) / rho_W
-    return weight
-
-
-def transient_peak(A_d: ArrayLike) -> float:
-    """A bound on max over t of |exp(A_d t)| [-]: 1, or sqrt(cond P), A_dᵀ P + P A_d = -I.
-    A_d : (2, 2) Hurwitz error dynamics [1/s].
-    """
-    matrix = require_hurwitz(A_d)
-    if np.linalg.eigvalsh(matrix + matrix.T)[-1] <= 0.0:
-        return 1.0  # |exp(A_d t)| never grows
-    return math.sqrt(float(np.linalg.cond(lyapunov(matrix, np.eye(2)).P)))
-
-
-def _peak(A_d: ArrayLike, dt: float | None) -> float:
-    """γ of continuous time or of the Euler step [s]."""
-    return peak_gain(A_d) if dt is None else sampled_peak_gain(A_d, dt)
-
-
-def _size(A_d: ArrayLike, direction: Array | None) -> float:
-    """|D| [s]."""
-    dynamics = require_hurwitz(A_d)
-    return float(np.linalg.norm(np.linalg.inv(dynamics) if direction is None else direction, 2))
+    size = float(np.linalg.norm(direction, 2))
+    capacity: float = n_h * eta_W * size * (c_z / forgetting + c_xi) / rho_W
+    return capacity

@@ -1,7 +1,6 @@
 """Is a set of gains safe to drive with? All properties of a design, with limits and advice.
 
-Judged at the worst regressor (|s|² = n_h, no leakage), so that a pass holds on every road; the
-same loop at the regressors of a recorded run is in `along`.
+Judged at the worst regressor (|s|² = n_h, no leakage), so that a pass holds on every road.
 """
 
 import math

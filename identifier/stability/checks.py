@@ -10,7 +10,7 @@ from identifier.certificate import Property, Status, at_least, statement
 from identifier.paper.laws import DrivingError, Gains
 from identifier.stability.bounds import small_gain, steady_capacity
 from identifier.stability.chosen import CHOSEN
-from identifier.stability.loop import ComplexArray, Loop, eigenvalues, exact
+from identifier.stability.loop import Loop, eigenvalues
 from identifier.stability.lyapunov import lyapunov
 from identifier.stability.margins import drift_frequency, gain_margin, phase_margin
 from identifier.stability.operation import Operation, Proven
@@ -21,12 +21,15 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     """A_d and λ: stable as they are sampled, resolved by the step, faster than the x_hat loop.
     gains : of (8) to (12).
     """
-    A_d, dt = gains.matrix, operation.dt
-    poles = _state_space_poles(A_d)
+    import control  # takes a second to import, so only where it is needed
+
+    A_d, dt, eye = gains.matrix, operation.dt, np.eye(2)
+    # of ξ̃' = A_d ξ̃ + (f - f_hat)
+    poles = np.asarray(control.poles(control.ss(A_d, eye, eye, np.zeros((2, 2)))))
     step = float(np.abs(poles).max()) * dt
-    sampled = np.abs(operation.step(poles * dt))
+    sampled = np.abs(1.0 + poles * dt)
     slowest = -math.log(float(sampled.max())) / dt
-    lyapunov(A_d, np.eye(2))  # raises where P does not solve its equation
+    lyapunov(A_d, eye)  # raises where P does not solve its equation
     finer = f"slow A_d down or sample every {1e3 * dt * CHOSEN.largest_step / step:.3g} ms"
     title = "fastest pole of A_d times the sampling interval"
     sampling = Property.judged(
@@ -68,12 +71,12 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
 def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
     """Gain margin in continuous time and sampled, phase margin, damping."""
     return [
-        _gain_check("gain_continuous", "continuous time", loop, operation, sampled=False),
-        _gain_check("gain_sampled", "sampled", loop, operation, sampled=True),
+        _gain_check("gain_continuous", "continuous time", loop, None),
+        _gain_check("gain_sampled", "sampled", loop, operation.dt),
         Property.judged(
             "phase_margin",
             "phase margin of the sampled loop",
-            phase_margin(loop, operation.step, operation.dt),
+            phase_margin(loop, operation.dt),
             "deg",
             limit=CHOSEN.enough_phase,
             bad=1e-9,
@@ -106,9 +109,9 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
         free = math.sqrt(gains.eta_W / gains.eta_V) / operation.x_bar_max
         limit = max(judged, free)
     holds = math.isfinite(kept) and kept <= limit * (1.0 + 1e-9)
-    advice = "project W, or raise rho_W and keep theta below 1"
+    advice = "raise rho_W and keep theta below 1"
     if math.isfinite(limit):
-        advice = f"the margins hold up to |W| = {limit:.3g}: set W_max to it, or raise rho_W"
+        advice = f"the margins hold up to |W| = {limit:.3g}: raise rho_W"
     return Property(
         name="weight_range",
         title="largest |W| that is proven, against the one that the margins are judged at",
@@ -119,17 +122,6 @@ def weight_check(gains: Gains, operation: Operation, kept: float, judged: float)
         unit="U",
         advice="" if holds else advice,
     )
-
-
-def _state_space_poles(A_d: Array) -> ComplexArray:
-    """Poles of ξ̃' = A_d ξ̃ + (f - f_hat), by python-control (2,) [1/s].
-    A_d : (2, 2) error dynamics [1/s].
-    """
-    import control  # takes a second to import, so only where it is needed
-
-    eye = np.eye(2)
-    error_dynamics = control.ss(A_d, eye, eye, np.zeros((2, 2)))
-    return np.asarray(control.poles(error_dynamics), dtype=np.complex128)
 
 
 def drift_check(
@@ -158,10 +150,8 @@ def _worst_damping(loop: Loop) -> float:
     return float(np.min(-turning.real / np.abs(turning)))
 
 
-def _gain_check(
-    name: str, how: str, loop: Loop, operation: Operation, *, sampled: bool
-) -> Property:
-    found = gain_margin(loop, operation.step if sampled else exact, operation.dt)
+def _gain_check(name: str, how: str, loop: Loop, dt: float | None) -> Property:
+    found = gain_margin(loop, dt)
     value = float(np.linalg.eigvalsh(loop.G)[-1])
     status: Status = at_least(found.factor, good=CHOSEN.enough_gain, bad=1.0)
     advice = ""
@@ -220,10 +210,10 @@ def bound_checks(
         forgetting=gains.forgetting,
         eta_W=gains.eta_W,
         n_h=operation.n_h,
-        dt=operation.dt if operation.integrator == "euler" else None,
+        dt=operation.dt,
         direction=direction,
     )
-    fewer = "" if theta < 1.0 else f"multiply eta_W by {0.9 / theta:.2g}, or project W"
+    fewer = "" if theta < 1.0 else f"multiply eta_W by {0.9 / theta:.2g}"
     title = "theta: below 1 error and weights are proven bounded"
     entries = [
         Property.judged("small_gain", title, theta, "-", limit=1.0, advice=fewer),
@@ -236,8 +226,7 @@ def bound_checks(
     ]
     if gains.rho_W > 0.0:
         entries.append(_capacity(gains, law, operation, direction))
-        if gains.W_free == gains.V_free == 0.0:  # (14) is of a leakage that never rests
-            entries += printed_bounds(gains, law, operation, trivial)
+        entries += printed_bounds(gains, law, operation, trivial)
     return entries
 
 
@@ -251,18 +240,14 @@ def _stated(proven: Proven) -> list[Property]:
             ),
             statement("weight_bound", "proven bound of |W|", proven.leakage.W, "U", _CONDITION),
         ]
-    if proven.projection is not None:
-        value = proven.projection.xi_tilde
-        title = f"{error} by the projection"
-        entries.append(statement("projection_bound", title, value, "U s", _CONDITION))
-    if not math.isfinite(proven.xi_tilde):
-        advice = "lower eta_W until theta is below 1 and give W a leakage, or project W"
+    else:
+        advice = "lower eta_W until theta is below 1 and give W a leakage"
         none = statement("error_bound", f"{error}: there is none", math.inf, "U s", advice)
         entries.append(replace(none, status="warn"))
     if math.isfinite(proven.V):
         entries.append(statement("V_bound", "proven bound of |V|", proven.V, "-", _CONDITION))
     else:
-        advice = "give V a leakage below that of one sample, or project V"
+        advice = "give V a leakage below that of one sample"
         none = statement("V_bound", "proven bound of |V|: there is none", math.inf, "-", advice)
         entries.append(replace(none, status="warn"))
     return entries
@@ -276,14 +261,12 @@ def _leakage(name: str, layer: str, step: float, rho: float) -> Property:
 
 
 def _capacity(gains: Gains, law: DrivingError, operation: Operation, direction: Array) -> Property:
-    """Judge the force that leakage lets W hold: beyond the dead zone it holds what it did."""
-    resting = math.sqrt(operation.n_h) * gains.W_free
-    capacity = resting + steady_capacity(
-        gains.matrix, law=law, forgetting=gains.forgetting, eta_W=gains.eta_W, rho_W=gains.rho_W,
-        n_h=operation.n_h, direction=direction,
+    """Judge the force that leakage lets W hold."""
+    capacity = steady_capacity(
+        direction, law=law, forgetting=gains.forgetting, eta_W=gains.eta_W, rho_W=gains.rho_W,
+        n_h=operation.n_h,
     )  # fmt: skip
-    need, advice = operation.needed_force, ""
-    if capacity < need:
-        advice = f"rho_W below {gains.rho_W * (capacity - resting) / (need - resting):.3g}"
+    need = operation.needed_force
+    advice = f"rho_W below {gains.rho_W * capacity / need:.3g}" if capacity < need else ""
     title = "largest steady force of the network with this leakage"
     return Property.judged("capacity", title, capacity, "U", limit=need, least=True, advice=advice)

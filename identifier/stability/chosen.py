@@ -1,6 +1,5 @@
 """Numbers that were chosen here, file by file, with their units and reasons."""
 
-import math
 from typing import NamedTuple
 
 
@@ -12,10 +11,6 @@ class Chosen(NamedTuple):
     enough_phase: float = 30.0  # deg, of the phase margin
     enough_damping: float = 0.2  # [-], of the poles
     largest_step: float = 0.2  # fastest pole times dt that Euler resolves well
-    # gain_design
-    # a/Ω for 45 degrees of lag through two equal poles
-    lag_rule: float = 1.0 / math.tan(math.radians(22.5))
-    fastest: float = 0.2  # largest a dt
     # margins
     largest_factor: float = 1e6  # of gains at which a margin is looked for, either way
     at_once: int = 150  # points of a grid whose eigenvalues are found together

@@ -9,11 +9,10 @@ With f_hat = p = W s and s = tanh(V x_bar) held, the identifier (8) and the laws
 G = η_W |s|² I + η_V |x_bar|² W (I - Λ)² Wᵀ is the loop gain [1/s⁴, 1/s³ for the instantaneous
 law], l the leakage rate ρ |ξ̃| [1/s]. (c_z, c_ξ) is the law: (1, 0) the integral law, (0, 1) the
 instantaneous one, (1, τ) the PI-lead law. l = 0 is the worst case.
-A numerical integrator R acts on the eigenvalues μ of this matrix as R(μ dt), so that continuous
-time, Euler and Runge-Kutta 4 share one eigenvalue computation.
+A step dt of explicit Euler acts on the eigenvalues μ of this matrix as 1 + μ dt, so that continuous
+time and the sampled loop share one eigenvalue computation.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -24,32 +23,8 @@ from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
 from identifier.paper.laws import DrivingError, Law
-from identifier.stability.lyapunov import require_square
 
 ComplexArray = npt.NDArray[np.complex128]
-Integrator = Callable[[ComplexArray], ComplexArray]
-
-
-def exact(mu: ComplexArray) -> ComplexArray:
-    """Continuous time: exp(μ dt).   mu : eigenvalues times the step [-]."""
-    return np.exp(mu)
-
-
-def euler(mu: ComplexArray) -> ComplexArray:
-    """Explicit Euler: 1 + μ dt.   mu : eigenvalues times the step [-]."""
-    return 1.0 + mu
-
-
-def rk4(mu: ComplexArray) -> ComplexArray:
-    """Runge-Kutta of order 4: 1 + μ + μ²/2 + μ³/6 + μ⁴/24, with μ times dt.
-    mu : eigenvalues times the step [-].
-    """
-    return 1.0 + mu * (1.0 + mu / 2.0 * (1.0 + mu / 3.0 * (1.0 + mu / 4.0)))
-
-
-INTEGRATORS: dict[str, Integrator] = {"exact": exact, "euler": euler, "rk4": rk4}
-
-
 INTEGRAL = DrivingError(1.0, 0.0)
 INSTANTANEOUS = DrivingError(0.0, 1.0)
 
@@ -58,7 +33,7 @@ def direction_matrix(law: Law, A_d: ArrayLike) -> Array:
     """Return D of the law, (2, 2) [s]: -A_d⁻ᵀ as printed, P for the PI-lead law.
     law : of `identifier.paper.laws.LAWS`.   A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
-    found: Array = -np.array(ca.DM(law.direction(ca.DM(require_square(A_d)), ca.DM.eye(2))))
+    found: Array = -np.array(ca.DM(law.direction(ca.DM(np.asarray(A_d)), ca.DM.eye(2))))
     return found
 
 
@@ -80,22 +55,13 @@ class Loop:
     input_feedback: Array | None = None
     direction: Array | None = None
 
-    def __post_init__(self) -> None:
-        """Check shapes and signs once, here."""
-        object.__setattr__(self, "A_d", require_square(self.A_d))
-        object.__setattr__(self, "G", require_square(self.G))
-        if not self.forgetting > 0.0:
-            raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
-        if not self.leakage >= 0.0:
-            raise ValueError(f"leakage must not be negative, it is {self.leakage}")
-
     def matrix(self) -> Array:
         """Return the (6, 6) matrix of the states (ξ̃, z, p)."""
         eye, zero = np.eye(2), np.zeros((2, 2))
         c_z, c_xi = self.law
         printed = -np.linalg.inv(self.A_d).T  # (zᵀ A_d⁻¹)ᵀ = A_d⁻ᵀ z
-        drive = self.G @ (printed if self.direction is None else require_square(self.direction))
-        feedback = zero if self.input_feedback is None else require_square(self.input_feedback)
+        drive = self.G @ (printed if self.direction is None else self.direction)
+        feedback = zero if self.input_feedback is None else self.input_feedback
         return np.block(
             [
                 [self.A_d + feedback, zero, -eye],
@@ -133,25 +99,18 @@ def root_locus(loop: Loop, factors: ArrayLike) -> ComplexArray:
     return eigenvalues(scaled_matrices(loop, factors))
 
 
-def growth_rate(matrices: ArrayLike, integrator: Integrator = exact, dt: float = 1.0) -> Array:
-    """Log max|R(μ dt)| / dt [1/s]: negative is stable; the spectral abscissa for `exact`.
-    matrices : (..., n, n) loop matrices.   dt : step [s]; irrelevant for `exact`.
+def growth_rate(matrices: ArrayLike, dt: float | None = None) -> Array:
+    """Log max|1 + μ dt| / dt, or max Re μ in continuous time [1/s]: negative is stable.
+    matrices : (..., n, n) loop matrices.   dt : step of Euler [s]; None for continuous time.
     """
     mu = eigenvalues(matrices)
     growth = np.max(mu.real, axis=-1)
-    if integrator is not exact:
-        growth = np.log(np.max(np.abs(integrator(mu * dt)), axis=-1)) / dt
+    if dt is not None:
+        growth = np.log(np.max(np.abs(1.0 + mu * dt), axis=-1)) / dt
     return np.asarray(growth, dtype=np.float64)
 
 
-def spectral_radius(matrices: ArrayLike, integrator: Integrator, dt: float) -> Array:
-    """max|R(μ dt)|: below one the sampled loop is stable.
-    matrices : (..., n, n) loop matrices.   dt : step [s].
-    """
-    return np.exp(growth_rate(matrices, integrator, dt) * dt)
-
-
-# How large the loop gain G is: at the worst regressor, and along a recorded run.
+# How large the loop gain G is at the worst regressor.
 #
 # G = η_W |s|² I + η_V |x_bar|² W (I - Λ)² Wᵀ, with s = tanh(V x_bar), Λ = diag(s²) of (13):
 # what one unit of A_d⁻ᵀ z moves the network's output p per second through (11) and (12).
@@ -170,42 +129,8 @@ def worst_gain(
     eta_W : learning rate of (11).   eta_V : learning rate of (12).
     n_h : hidden units; |s|² <= n_h.   W_max : bound on |W| (Frobenius) [U]; needed where V learns.
     """
-    if not (eta_W >= 0.0 and eta_V >= 0.0 and n_h >= 1):
-        raise ValueError(f"eta_W, eta_V >= 0 and n_h >= 1, they are {(eta_W, eta_V, n_h)}")
-    through_V = 0.0
-    if eta_V > 0.0:
-        through_V = eta_V * x_bar_max**2 * W_max**2
-        if not (x_bar_max > 0.0 and W_max > 0.0 and math.isfinite(through_V)):
-            raise ValueError(f"where V learns, give x_bar_max and W_max: {(x_bar_max, W_max)}")
+    through_V = eta_V * x_bar_max**2 * W_max**2 if eta_V > 0.0 else 0.0
     return (n_h - 1) * eta_W + max(eta_W, through_V)
-
-
-def regressor_gains(
-    *, eta_W: float, eta_V: float, s: ArrayLike, x_bar: ArrayLike, W: ArrayLike
-) -> Array:
-    """G along a run, (n, 2, 2).
-    eta_W : learning rate of (11).   eta_V : learning rate of (12).
-    s : (n, n_h) hidden units tanh(V x_bar).   x_bar : (n, n_in) network input.
-    W : (n, 2, n_h) or (2, n_h) output weights [U].
-    """
-    s, x_bar, W = np.atleast_2d(s), np.atleast_2d(x_bar), np.asarray(W, dtype=np.float64)
-    n, n_h = s.shape
-    if x_bar.shape[0] != n or W.shape[-2:] != (2, n_h) or (W.ndim == 3 and W.shape[0] != n):
-        raise ValueError(f"shapes disagree: s {s.shape}, x_bar {x_bar.shape}, W {W.shape}")
-    slope = np.broadcast_to(W, (n, 2, n_h)) * (1.0 - s**2)[:, None, :]  # W (I - Λ)
-    through_W = eta_W * np.sum(s**2, axis=1)[:, None, None] * np.eye(2)
-    through_V = eta_V * np.sum(x_bar**2, axis=1)[:, None, None]
-    gains: Array = through_W + through_V * (slope @ slope.transpose(0, 2, 1))
-    return gains
-
-
-def strongest(gains: ArrayLike) -> tuple[int, float]:
-    """Index of the sample with the largest λ_max(G), and that value.
-    gains : (n, 2, 2) loop gains along a run.
-    """
-    largest = np.linalg.eigvalsh(np.asarray(gains))[:, -1]
-    worst = int(np.argmax(largest))
-    return worst, float(largest[worst])
 
 
 FINEST = 2.0**-50  # share of x, SciPy's own

@@ -17,26 +17,22 @@ from numpy.typing import ArrayLike
 from codegen.arrays import Array
 from identifier.driving import SPEED_SPREAD, YAW_OVERSHOOT, Driving
 from identifier.paper.laws import DrivingError, Gains
-from identifier.stability.loop import INTEGRATORS, Integrator, Loop, spectral_radius, worst_gain
+from identifier.stability.loop import Loop, worst_gain
 from identifier.stability.sampled_bound import (
     Disturbance,
-    ErrorGains,
-    Learning,
     SampledBounds,
     by_leakage,
-    by_projection,
     error_gains,
     output_layer,
 )
 from models.bicycle import bicycle
-from models.rules import require_positive
 from models.vehicle import GRAVITY, Vehicle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Operation:
     """Where and how the identifier runs: what the certificate must know besides the gains.
-    n_h : hidden units.   dt : sampling interval T_s [s].   integrator : "euler", "rk4" or "exact".
+    n_h : hidden units.   dt : sampling interval T_s [s].
     bandwidth : highest frequency of steering that matters [Hz].
     needed_force : that the network should be able to hold against its leakage [U].
     x_bar_max : bound on |x_bar| [-], without what the error adds where the network reads x_hat.
@@ -49,7 +45,6 @@ class Operation:
 
     n_h: int
     dt: float
-    integrator: str
     bandwidth: float
     disturbance: Disturbance
     needed_force: float
@@ -59,117 +54,57 @@ class Operation:
     W_large: float = math.inf
     input_per_error: float = 0.0
 
-    def __post_init__(self) -> None:
-        require_positive(
-            ValueError, n_h=self.n_h, dt=self.dt, bandwidth=self.bandwidth,
-            needed_force=self.needed_force, x_bar_max=self.x_bar_max,
-        )  # fmt: skip
-        if self.integrator not in INTEGRATORS:
-            raise ValueError(
-                f"integrator must be one of {list(INTEGRATORS)}, not {self.integrator!r}"
-            )
-        if not self.W_large > 0.0:
-            raise ValueError(f"W_large must be positive, it is {self.W_large}")
-        for name in ("V_start", "input_per_error"):
-            if not getattr(self, name) >= 0.0:
-                raise ValueError(f"{name} must not be negative, it is {getattr(self, name)}")
-
-    @property
-    def step(self) -> Integrator:
-        return INTEGRATORS[self.integrator]
-
     def resolves(self, A_d: Array) -> bool:
         """Whether the step keeps the error dynamics stable.   A_d : (2, 2) error dynamics [1/s]."""
-        return bool(spectral_radius(A_d, self.step, self.dt) < 1.0)
+        return bool(np.abs(1.0 + self.dt * np.linalg.eigvals(A_d)).max() < 1.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proven:
     """What is proven of a design; None and inf where nothing is.
-    V : bound on |V_hat| [-].
+    leakage : bounds that the leakage gives.   V : bound on |V_hat| [-].
     leakage_step : largest share of W that one sample leaks, ρ_W dt |ξ̃|; an estimate where no bound
-        is proven.
+        is proven.   leakage_step_V : that of V.
     """
 
-    leakage: SampledBounds | None
-    projection: SampledBounds | None
-    V: float
-    leakage_step: float
-    leakage_step_V: float
-
-    @property
-    def xi_tilde(self) -> float:
-        """Smallest bound on |ξ̃| [U s]."""
-        return min((found.xi_tilde for found in self._found), default=math.inf)
-
-    @property
-    def stage(self) -> float:
-        """Smallest bound on |ξ̃| that holds at the inner stages too [U s]."""
-        return min((found.stage for found in self._found), default=math.inf)
+    leakage: SampledBounds | None = None
+    V: float = math.inf
+    leakage_step: float = 0.0
+    leakage_step_V: float = 0.0
 
     @property
     def W(self) -> float:
-        """Smallest bound on |W_hat| [U]."""
-        return min((found.W for found in self._found), default=math.inf)
-
-    @property
-    def _found(self) -> list[SampledBounds]:
-        return [found for found in (self.leakage, self.projection) if found is not None]
-
-
-_NOTHING = Proven(leakage=None, projection=None, V=math.inf, leakage_step=0.0, leakage_step_V=0.0)
+        """Bound on |W_hat| [U]."""
+        return math.inf if self.leakage is None else self.leakage.W
 
 
 def proven_bounds(
     gains: Gains, law: DrivingError, operation: Operation, direction: Array
 ) -> Proven:
     """Return all bounds that are proven, for the start of `sampled_bound.py`."""
-    A_d, dt, n_h = gains.matrix, operation.dt, operation.n_h
+    A_d, dt, n_h, acting = gains.matrix, operation.dt, operation.n_h, operation.disturbance
     if not operation.resolves(A_d):
-        return _NOTHING
-    error = error_gains(A_d, operation.integrator, dt)
-    learning = output_layer(gains, law, direction, n_h=n_h, integrator=operation.integrator, dt=dt)
-    acting = operation.disturbance
-    projection = None
-    if math.isfinite(gains.W_max):
-        projection = by_projection(error, A_d, acting, n_h=n_h, W_max=gains.W_max)
+        return Proven()
+    error = error_gains(A_d, dt)
+    learning = output_layer(gains, law, direction, n_h=n_h, dt=dt)
     leakage = by_leakage(error, learning, A_d, acting, n_h)
-    if leakage is not None and leakage.W + max(learning.beyond(leakage.stage)) > gains.W_max:
-        leakage = leakage if operation.integrator != "rk4" else None  # a stage would be projected
-    found = Proven(
-        leakage=leakage, projection=projection, V=math.inf, leakage_step=0.0, leakage_step_V=0.0
-    )
-    X = found.stage if math.isfinite(found.stage) else _unleaked(error, learning, operation, A_d)
-    return replace(
-        found,
-        V=_kept_V(gains, learning, found, operation, direction),
+    if leakage is None:  # |ξ̃| is estimated: leakage of small steps, in continuous time
+        V = math.inf
+        smooth = by_leakage(error, replace(learning, dt=0.0), A_d, acting, n_h)
+        X = error.force * acting.residual if smooth is None else smooth.X
+    else:
+        X = leakage.X
+        x_bar = operation.x_bar_max + operation.input_per_error * X
+        drive = gains.eta_V * float(np.linalg.norm(direction, 2)) * leakage.W * x_bar
+        kept = replace(learning, leakage=gains.rho_V, drive=drive).kept(X)
+        idle = drive == 0.0 and gains.rho_V == 0.0
+        V = operation.V_start if idle else max(operation.V_start, kept)
+    return Proven(
+        leakage=leakage,
+        V=V,
         leakage_step=gains.rho_W * dt * X,
         leakage_step_V=gains.rho_V * dt * X,
     )
-
-
-def _unleaked(error: ErrorGains, learning: Learning, operation: Operation, A_d: Array) -> float:
-    """Estimate |ξ̃| where nothing is proven: leakage of small steps, in continuous time."""
-    smooth = replace(learning, dt=0.0)
-    found = by_leakage(error, smooth, A_d, operation.disturbance, operation.n_h)
-    return error.force * operation.disturbance.residual if found is None else found.stage
-
-
-def _kept_V(
-    gains: Gains, learning: Learning, found: Proven, operation: Operation, direction: Array
-) -> float:
-    """Bound on |V_hat|: |x_bar| and |W_hat| drive it; its leakage or projection keep it [-]."""
-    X, W = found.stage, found.W
-    if not math.isfinite(X):
-        return gains.V_max
-    if found.leakage is not None:  # inner stages go beyond, as far as the projection lets them
-        W = min(found.leakage.W + max(learning.beyond(X)), gains.W_max)
-    x_bar = operation.x_bar_max + operation.input_per_error * X
-    drive = gains.eta_V * float(np.linalg.norm(direction, 2)) * W * x_bar
-    if drive == 0.0 and gains.rho_V == 0.0:
-        return min(operation.V_start, gains.V_max)
-    kept = replace(learning, leakage=gains.rho_V, drive=drive, free=gains.V_free).kept(X)
-    return min(max(operation.V_start, kept), gains.V_max)
 
 
 def worst_loop(
@@ -212,7 +147,6 @@ def estimated_input_feedback(
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
     stiffness_lost : (2,) C - F' of front and rear axle [N/rad]; C itself at full saturation.
     """
-    require_positive(ValueError, m=m, I_z=I_z, l_f=l_f, l_r=l_r, v_x=v_x)
     lost = np.asarray(stiffness_lost, dtype=np.float64)
     if lost.shape != (2,) or not np.all(np.isfinite(lost)):
         raise ValueError(f"stiffness_lost must be two numbers, it is {lost.tolist()}")
@@ -220,11 +154,6 @@ def estimated_input_feedback(
     slip = np.array([[1.0, l_f], [1.0, -l_r]])
     feedback: Array = np.diag(lost) @ (slip @ K) / v_x
     return feedback
-
-
-def minimal_decay(feedback: ArrayLike) -> float:
-    """Smallest a [1/s] with -a I + J_f K Hurwitz.   feedback : (2, 2) J_f K [1/s]."""
-    return float(np.max(np.linalg.eigvals(np.asarray(feedback)).real))
 
 
 # From a car and how hard it is driven to what a certificate must know: signals and disturbances.
@@ -244,7 +173,6 @@ def _largest_signals(
     vehicle: Vehicle, *, v_x: float, slip: float, friction: float
 ) -> dict[str, float]:
     """Bound of every signal that a network may read, SI."""
-    require_positive(ValueError, v_x=v_x, slip=slip, friction=friction)
     r = YAW_OVERSHOOT * friction * GRAVITY / v_x
     v_y = vehicle.l_r * r + v_x * slip
     return {
@@ -272,7 +200,6 @@ def _residual_bound(vehicle: Vehicle, *, slip: float) -> float:
     """Force that the linear tire can miss at most at any instant, |f| <= hypot(C_f, C_r) slip [N].
     vehicle : the car; its stiffness is at least half that of the tires.
     """
-    require_positive(ValueError, slip=slip)
     return slip * math.hypot(vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear)
 
 
@@ -281,7 +208,6 @@ def expected_residual(vehicle: Vehicle, *, slip: float, friction: float) -> floa
 
     No bound, but what the network must be able to hold where both axles are at the slip [N].
     """
-    require_positive(ValueError, slip=slip, friction=friction)
     peak = friction * np.array(vehicle.axle_loads)
     linear = slip * _stiffness(vehicle)
     state = peak * np.sin(1.5 * np.arctan(linear / (1.5 * peak)))
@@ -314,12 +240,9 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
     wrong_turn = fast * n_x[1] + driving.noise_v_x * (r + n_x[1])
     misread = float(np.linalg.norm(C * wrong_slip + K_inv[:, 0] * wrong_turn))
 
-    turning = K_inv[:, 0] * fast * r
     return Disturbance(
         residual=(_residual_bound(vehicle, slip=driving.slip) + held + misread) / unit,
         noise=float(np.linalg.norm(K_inv @ n_x)) / unit,
-        rate=float(np.linalg.norm(push + turning)) / unit,
-        known=(float(np.linalg.norm(C * driving.slip + turning)) + misread) / unit,
     )
 
 

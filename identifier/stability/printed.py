@@ -21,10 +21,8 @@ from identifier.stability.lyapunov import (
     lyapunov,
     lyapunov_residual,
     peak_gain,
-    require_hurwitz,
 )
 from identifier.stability.operation import Operation
-from models.rules import require_positive
 
 
 def _printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W: float) -> float:
@@ -32,7 +30,6 @@ def _printed_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_
     W_M : bound on the ideal weights (Frobenius) [U].   n_h : hidden units; |s| <= √n_h.
     eta_W : learning rate of (11).   rho_W : leakage gain of (11) [1/(U s²)].
     """
-    require_positive(ValueError, rho_W=rho_W)
     inverse = float(np.linalg.norm(np.linalg.inv(pair.A_d), 2))
     coupling = float(np.linalg.norm(pair.P, 2)) + eta_W / rho_W * inverse
     return (W_M + math.sqrt(n_h) * coupling) / 2.0
@@ -44,7 +41,6 @@ def _tight_k_b(pair: LyapunovPair, *, W_M: float, n_h: int, eta_W: float, rho_W:
     W_M/2 for a symmetric A_d and P = -(η/ρ) A_d⁻¹, the pair of `_canceling_pair`. Arguments are
     those of `_printed_k_b`.
     """
-    require_positive(ValueError, rho_W=rho_W)
     coupling = float(np.linalg.norm(pair.P + eta_W / rho_W * np.linalg.inv(pair.A_d), 2))
     return (W_M + math.sqrt(n_h) * coupling) / 2.0
 
@@ -54,8 +50,7 @@ def _canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPa
     A_d : (2, 2) Hurwitz error dynamics [1/s].   eta_W : learning rate of (11).
     rho_W : leakage gain of (11) [1/(U s²)].
     """
-    require_positive(ValueError, eta_W=eta_W, rho_W=rho_W)
-    matrix = require_hurwitz(A_d)
+    matrix = np.asarray(A_d)
     inverse = np.linalg.inv(matrix)
     P = -eta_W / rho_W * (inverse + inverse.T) / 2.0
     Q = -(matrix.T @ P + P @ matrix)
@@ -90,7 +85,6 @@ def ultimate_bound(pair: LyapunovPair, *, w_bar: float, k_b: float, rho_W: float
     w_bar : bound on the approximation error [U].   k_b : of `_printed_k_b` or `_tight_k_b` [U].
     rho_W : leakage gain of (11) [1/(U s²)].
     """
-    require_positive(ValueError, rho_W=rho_W)
     p = np.linalg.eigvalsh(pair.P)
     b, curve = _bound_14(pair, w_bar=w_bar, k_b=k_b), 2.0 / np.linalg.eigvalsh(pair.Q)[0]
     w_b = k_b + math.sqrt(k_b**2 + p[1] * w_bar)

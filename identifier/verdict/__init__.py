@@ -2,12 +2,10 @@
 
 from identifier.verdict.bands import calibrated, within_band
 from identifier.verdict.friction import Road, RoadFriction, road_friction
-from identifier.verdict.guaranteed import BoundViolatedError, contradictions, guaranteed
 from identifier.verdict.judging import judge, judge_identification, judge_prediction
 from identifier.verdict.verdict import Number, Objection, Verdict, WindowForces
 
 __all__ = [
-    "BoundViolatedError", "Number", "Objection", "Road", "RoadFriction", "Verdict", "WindowForces",
-    "calibrated", "contradictions", "guaranteed", "judge", "judge_identification",
-    "judge_prediction", "road_friction", "within_band",
+    "Number", "Objection", "Road", "RoadFriction", "Verdict", "WindowForces", "calibrated", "judge",
+    "judge_identification", "judge_prediction", "road_friction", "within_band",
 ]  # fmt: skip

@@ -22,10 +22,11 @@ from identifier.run import History
 from identifier.tire_model import TireModel
 from identifier.verdict.chosen import CHOSEN
 from identifier.verdict.judging import judge
-from identifier.verdict.motion import Evidence, Windows, evidence, modelled_force
-from identifier.verdict.parts import asked_run, taught_elsewhere
+from identifier.verdict.motion import Evidence, evidence, modelled_force
+from identifier.verdict.parts import evaluated_run, taught_elsewhere
 from identifier.verdict.verdict import Verdict
 from models.recordings import Recording
+from models.recordings.evidence import Windows
 from models.recordings.portion import portion
 
 
@@ -46,7 +47,7 @@ def within_band(model: TireModel, recording: Recording, level: float = LEVEL) ->
     return share
 
 
-class Missed(NamedTuple):
+class ModelErrors(NamedTuple):
     """What was missed where a model was not taught, window by window, axle by axle.
 
     error : [static axle loads], nan where no part was left out (m, 2).   share : of the window in
@@ -74,11 +75,11 @@ def calibrated(
     model = history.freeze(t)
     if (band := model.band) is None:
         return model
-    if history.design.whole:
+    if history.method.whole:
         share = (verdict or judge(history, t)).force_missed
         whole: TireModel = band.calibrated_by(None, None if share is None else np.array(share))
         return whole
-    run = asked_run(history, t)
+    run = evaluated_run(history, t)
     recording = run.portion.recording
     found = evidence(model, recording, run.road)
     if found is None:
@@ -89,23 +90,23 @@ def calibrated(
     one, each = found.measured.shape, (len(AXLE_CHOSEN.centers), *found.measured.shape)
     within = np.searchsorted(AXLE_CHOSEN.speeds, speeds / model.vehicle.froude_speed, side="right")
     empty = np.zeros((3, *each))
-    missed = Missed(np.full(one, np.nan), empty[0], empty[1], empty[2], within)
+    errors = ModelErrors(np.full(one, np.nan), empty[0], empty[1], empty[2], within)
     given = BandCalibration.declared(speed)
     for mine, other in taught_elsewhere(run.taught, recording, found):
         if other is None or other.band is None:
             continue
-        asked_of = _missed(other.band.calibrated_by(given), recording, found)
-        for into, values in zip(missed[:-1], asked_of, strict=True):
+        evaluated = _model_errors(other.band.calibrated_by(given), recording, found)
+        for into, values in zip(errors[:-1], evaluated, strict=True):
             into[..., mine, :] = values[..., mine, :]
     given = replace(given, noise=sensor_noise(recording, model.vehicle))
     judged, _ = found.but_a_segment()
-    found_of = calibration(missed, found.noise, found.windows, given)
-    tires: TireModel = band.calibrated_by(found_of, judged.missed)
+    found_of = calibration(errors, found.noise, found.windows, given)
+    tires: TireModel = band.calibrated_by(found_of, judged.model_error)
     return tires
 
 
-def _missed(model: TireModel, recording: Recording, found: Evidence) -> tuple[Array, ...]:
-    """Return error, share, scaled and fixed of `Missed` in all windows, of a model with a band."""
+def _model_errors(model: TireModel, recording: Recording, found: Evidence) -> tuple[Array, ...]:
+    """Return what `ModelErrors` has of all windows but its `within`, of a model with a band."""
     assert model.band is not None
     spread = _spread_by_range(model.band, recording, found.windows)
     return found.measured - modelled_force(model, recording, found.windows), *spread
@@ -114,7 +115,7 @@ def _missed(model: TireModel, recording: Recording, found: Evidence) -> tuple[Ar
 def _spread_by_range(
     band: Band[Any], recording: Recording, windows: Windows
 ) -> tuple[Array, Array, Array]:
-    """Return share, scaled and fixed of `Missed`, (6, m, 2) each."""
+    """Return share, scaled and fixed of `ModelErrors`, (6, m, 2) each."""
     size, count = np.abs(band.model.lagged_slip(recording)), len(AXLE_CHOSEN.centers)
     within, v_x = ranges_of(size), np.tile(windows.mean(recording.v_x), count)
     share = np.array([windows.mean(1.0 * (within == k)) for k in range(count)])
@@ -125,7 +126,7 @@ def _spread_by_range(
 
 
 def calibration(
-    missed: Missed, noise: Array, windows: Windows, given: BandCalibration
+    errors: ModelErrors, noise: Array, windows: Windows, given: BandCalibration
 ) -> BandCalibration | None:
     """Return factors and color of errors on segments that did not teach; None: too few windows.
     noise : variance of the sensors' white noise in them (2,).
@@ -135,9 +136,9 @@ def calibration(
         np.ones((2, len(AXLE_CHOSEN.at_speeds))),
     )
     for i in range(2):
-        asked = np.isfinite(missed.error[:, i])
-        share, *spread = (values[:, asked, i] for values in missed[1:-1])
-        needed = BandSpread(*spread).needed_factor(missed.error[asked, i], noise[i])
+        known = np.isfinite(errors.error[:, i])
+        share, *spread = (values[:, known, i] for values in errors[1:-1])
+        needed = BandSpread(*spread).needed_factor(errors.error[known, i], noise[i])
         everywhere = quantile(needed.ravel(), share.ravel())
         if not np.isfinite(everywhere):
             continue
@@ -145,11 +146,11 @@ def calibration(
         factors[i] = CHOSEN.elsewhere * np.sqrt(squares)
         needed = needed / np.maximum(squares[:, None], AXLE_CHOSEN.least_factor**2)
         for k in range(len(AXLE_CHOSEN.at_speeds)):
-            mine = missed.within[asked] == k
+            mine = errors.within[known] == k
             speeds[i, k] = np.sqrt(_shared(needed[:, mine].ravel(), share[:, mine].ravel(), 1.0))
     if (factors == 1.0).all():
         return None
-    color = [color_of(missed.error[:, i], windows) for i in range(2)]
+    color = [color_of(errors.error[:, i], windows) for i in range(2)]
     return replace(
         given,
         factors=np.clip(factors, AXLE_CHOSEN.least_factor, AXLE_CHOSEN.most_factor),
@@ -160,10 +161,10 @@ def calibration(
 
 def _shared(values: Array, share: Array, everywhere: float) -> float:
     """Return the quantile of a range, `CHOSEN.shared` windows of all ranges counted in."""
-    own, count = quantile(values, share), float(share.sum())
+    here, count = quantile(values, share), float(share.sum())
     return (
-        (count * own + CHOSEN.shared * everywhere) / (count + CHOSEN.shared)
-        if np.isfinite(own)
+        (count * here + CHOSEN.shared * everywhere) / (count + CHOSEN.shared)
+        if np.isfinite(here)
         else everywhere
     )
 

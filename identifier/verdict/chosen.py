@@ -34,10 +34,6 @@ class Chosen(NamedTuple):
     likely: float = 0.5  # probability down to which it is taken to go on
     two_sigma: float = 2.0  # of its doubt: a friction nearer to that which taught is not reported
     similar: float = 0.1  # of ln μ: by so much roads of a tire are not similar
-    # guaranteed
-    overlapping: int = 4  # moments that begin within the length of one
-    reserve: float = 2.1  # over the least bound: chosen on 68 random cars of seeds 400 to 425
-    slowest: float = 1e-3  # static axle loads/s: a drive straight ahead shows no rate
     # judging
     secant: float = 0.01  # rad, to which the slope of a curve is taken: play makes none at zero
     roads: int = 3  # segments of another friction that are listed one by one

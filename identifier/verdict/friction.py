@@ -99,8 +99,8 @@ def road_friction(
     road : what a banked road pushes to the left at each sample of `portion(recording)`, taken off
         [weights]; None where nobody knows of it.
     """
-    asked = portion(recording)
-    band, found = model.band, evidence(model, asked.recording, road)
+    part = portion(recording)
+    band, found = model.band, evidence(model, part.recording, road)
     if band is None or not band.calibrated or found is None:
         return None
     windows = found.windows
@@ -112,9 +112,9 @@ def road_friction(
     for k, mu in enumerate(np.exp(grid)):
         tires = model.at_friction(float(mu))
         assert tires.band is not None
-        away[k] = found.measured - modelled_force(tires, asked.recording, windows)
-        slope[k] = windows.mean(tires.band.slope_over(asked.recording))
-    half = band.of_curves(asked.recording) / np.array(model.vehicle.axle_loads)
+        away[k] = found.measured - modelled_force(tires, part.recording, windows)
+        slope[k] = windows.mean(tires.band.slope_over(part.recording))
+    half = band.of_curves(part.recording) / np.array(model.vehicle.axle_loads)
     sd = windows.mean(half) / normal_quantile(LEVEL)
     beside = (
         CHOSEN.beside
@@ -122,7 +122,7 @@ def road_friction(
         else math.hypot(CHOSEN.beside, CHOSEN.of_estimate)
     )
     variance = sd**2 + found.noise + beside**2 + (CHOSEN.of_force * found.measured) ** 2
-    t = recording.t[asked.samples[windows.starts + windows.n]]
+    t = recording.t[part.samples[windows.starts + windows.n]]
     return filtered(t, grid, away, slope, variance)
 
 

@@ -35,7 +35,7 @@ from models.vehicle import GRAVITY
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Rules:
     """Limits of a verdict; set on random cars of four classes, confirmed on recordings.
-    missed : share of the force, rms, that a model may miss at an axle [-].
+    model_error : share of the force, rms, that a model may miss at an axle [-].
     force : below which there is no force to judge by [static axle loads].
     doubt : standard deviation of the curve over the prior's, where the force is [-].
     stiffness : that tires have, over the static load [1/rad].
@@ -44,7 +44,7 @@ class _Rules:
     rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
     """
 
-    missed: float = MOST_MISSED
+    model_error: float = MOST_MISSED
     force: float = 0.1
     doubt: float = 0.5
     stiffness: tuple[float, float] = (2.0, 100.0)
@@ -56,17 +56,18 @@ class _Rules:
 RULES = _Rules()
 
 
-class _Asked(NamedTuple):
+class _Evaluated(NamedTuple):
     """A model and a drive.
 
-    portion : what of the drive is asked.   found : what the model explains of it.   own : whether
-    the drive taught the model.   left_out : a segment that is not judged, from and to [s].
+    portion : what of the drive is evaluated.   found : what the model explains of it.
+    taught : whether the drive taught the model.   left_out : a segment that is not judged, from
+    and to [s].
     """
 
     model: TireModel
     portion: Portion
     found: Evidence
-    own: bool
+    taught: bool
     left_out: tuple[float, float] | None
 
     @property
@@ -84,7 +85,7 @@ def judge(history: History, t: float | None = None) -> Verdict:
     """
     model, whole = history.freeze(t), history.recording
     end = float(whole.t[-1]) if t is None else t
-    limits = history.design.limits
+    limits = history.method.limits
     reached = model.drives.at_bounds if limits is None else limits.active(history.state_at(end))
     return judge_identification(model, whole, state_index(whole, end), reached)
 
@@ -99,40 +100,34 @@ def judge_identification(
     frozen : samples that taught; None is all of them.
     reached : numbers that rest at their bounds; None asks the model.
     """
-    asked = _asked(model, recording, own=True, frozen=frozen)
-    if asked is None:
+    evaluated = _evaluated(model, recording, taught=True, frozen=frozen)
+    if evaluated is None:
         return _too_short(model, CHOSEN.fewest_taught)
     bounds = model.drives.at_bounds if reached is None else reached
     notes = [Objection(code, None, text, False) for code, text in model.drives.notes]
-    return _verdict(asked, [*_findings(asked), *map(_at_bound, bounds), *notes], recording)
+    return _verdict(evaluated, [*_findings(evaluated), *map(_at_bound, bounds), *notes], recording)
 
 
-def judge_prediction(
-    model: TireModel, recording: Recording, *, another_road: bool = True
-) -> Verdict:
-    """Return the verdict on a stored model over a drive: does it give back the drive's motion?
-    another_road : whether the road may be another one than that which taught, and its friction is
-        reported; of a drive that taught the model it is not.
-    """
-    asked = _asked(model, recording, own=False)
-    if asked is None:
+def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
+    """Return the verdict on a stored model over a drive: does it give back the drive's motion?"""
+    evaluated = _evaluated(model, recording, taught=False)
+    if evaluated is None:
         return _too_short(model, CHOSEN.fewest)
-    road = _road(asked.recording, model)
-    friction = road_friction(model, recording, road) if another_road else None
-    verdict = _verdict(asked, [*_findings(asked), *_roads(friction)], recording)
+    friction = road_friction(model, recording, _road(evaluated.recording, model))
+    verdict = _verdict(evaluated, [*_findings(evaluated), *_roads(friction)], recording)
     return replace(verdict, friction=friction)
 
 
-def _asked(
-    model: TireModel, recording: Recording, *, own: bool, frozen: int | None = None
-) -> _Asked | None:
+def _evaluated(
+    model: TireModel, recording: Recording, *, taught: bool, frozen: int | None = None
+) -> _Evaluated | None:
     """Return what is judged; None where too little is driven."""
     part = portion(recording) if frozen is None else portion(recording, frozen)
     found = evidence(model, part.recording, _road(part.recording, model))
-    if own and found is not None:
+    if taught and found is not None:
         other = model.drives.road_differs(recording.t[part.samples])
         found = found.where(~other[found.windows.starts])
-    fewest = CHOSEN.fewest_taught if own else CHOSEN.fewest
+    fewest = CHOSEN.fewest_taught if taught else CHOSEN.fewest
     if found is None or len(found.windows) < fewest:
         return None
     judged, some = found.but_a_segment()
@@ -140,7 +135,7 @@ def _asked(
     if some is not None:
         t, starts = recording.t[part.samples], found.windows.starts
         left_out = float(t[starts[some[0]]]), float(t[starts[some[1] - 1] + found.windows.n])
-    return _Asked(model, part, judged, own, left_out)
+    return _Evaluated(model, part, judged, taught, left_out)
 
 
 def _road(recording: Recording, model: TireModel) -> Array | None:
@@ -157,16 +152,16 @@ def _road(recording: Recording, model: TireModel) -> Array | None:
     return bank
 
 
-def _findings(asked: _Asked) -> list[Objection]:
+def _findings(evaluated: _Evaluated) -> list[Objection]:
     rules = (
-        _v_y_stuck, _no_force, _missed, _left_out, _unsure, _no_tire, _beyond, _turning,
+        _v_y_stuck, _no_force, _model_error, _left_out, _unsure, _no_tire, _beyond, _turning,
         _unobserved,
     )  # fmt: skip
-    return [finding for rule in rules for finding in rule(asked)]
+    return [finding for rule in rules for finding in rule(evaluated)]
 
 
-def _v_y_stuck(asked: _Asked) -> Iterator[Objection]:
-    recording, brisk = asked.recording, asked.found.windows.starts
+def _v_y_stuck(evaluated: _Evaluated) -> Iterator[Objection]:
+    recording, brisk = evaluated.recording, evaluated.found.windows.starts
     v_y = recording.logged_v_y
     if v_y is None:
         return
@@ -176,54 +171,56 @@ def _v_y_stuck(asked: _Asked) -> Iterator[Objection]:
         yield Objection("v_y_stuck", None, text, True)
 
 
-def _no_force(asked: _Asked) -> Iterator[Objection]:
-    forceless, noise = asked.forceless, np.sqrt(asked.found.noise)
-    for axle, peak, none, sd in zip(AXLES, asked.found.peak, forceless, noise, strict=True):
+def _no_force(evaluated: _Evaluated) -> Iterator[Objection]:
+    forceless, noise = evaluated.forceless, np.sqrt(evaluated.found.noise)
+    for axle, peak, none, sd in zip(AXLES, evaluated.found.peak, forceless, noise, strict=True):
         if not none:
             continue
         if sd > RULES.force:
             advice = "noise of v_y and yaw rate hides it: repair the sensors"
-        elif asked.own:
+        elif evaluated.taught:
             advice = "its numbers are default values; drive a slalom"
         else:
             advice = "this drive cannot judge the model"
         need = f"{RULES.force:g} are needed"
         text = f"lateral force reaches {peak:.2g} of the static load, {need}: {advice}"
-        yield Objection("no_force", axle, text, asked.own or all(forceless))
+        yield Objection("no_force", axle, text, evaluated.taught or all(forceless))
 
 
-def _missed(asked: _Asked) -> Iterator[Objection]:
-    limit = RULES.missed
-    for axle, missed, none in zip(AXLES, asked.found.missed, asked.forceless, strict=True):
-        if not (missed <= limit or none):
+def _model_error(evaluated: _Evaluated) -> Iterator[Objection]:
+    limit = RULES.model_error
+    for axle, share, none in zip(
+        AXLES, evaluated.found.model_error, evaluated.forceless, strict=True
+    ):
+        if not (share <= limit or none):
             text = (
-                f"model error {PERCENT * missed:.0f} % of the force in the motion (limit "
+                f"model error {PERCENT * share:.0f} % of the force in the motion (limit "
                 f"{PERCENT * limit:.0f} %); tireid doctor looks for the cause"
             )
             yield Objection("force_missed", axle, text, True)
 
 
-def _left_out(asked: _Asked) -> Iterator[Objection]:
-    if asked.left_out is not None:
-        begin, end = asked.left_out
+def _left_out(evaluated: _Evaluated) -> Iterator[Objection]:
+    if evaluated.left_out is not None:
+        begin, end = evaluated.left_out
         text = (
             f"from {begin:.4g} to {end:.4g} s the motion is not explained, elsewhere it is (model "
-            f"error {PERCENT * float(asked.found.missed.max()):.0f} % of the force): a sensor that "
-            "had not settled, or a banked or slippery segment"
+            f"error {PERCENT * float(evaluated.found.model_error.max()):.0f} % of the force): a "
+            "sensor that had not settled, or a banked or slippery segment"
         )
         yield Objection("segment", None, text, False)
 
 
-def _unsure(asked: _Asked) -> Iterator[Objection]:
-    if not asked.own or (band := asked.model.band) is None:
+def _unsure(evaluated: _Evaluated) -> Iterator[Objection]:
+    if not evaluated.taught or (band := evaluated.model.band) is None:
         return
-    car, windows = asked.model.vehicle, asked.found.windows
-    slip = np.abs(windows.mean(np.asarray(asked.recording.alpha(car.l_f, car.l_r))))
+    car, windows = evaluated.model.vehicle, evaluated.found.windows
+    slip = np.abs(windows.mean(np.asarray(evaluated.recording.alpha(car.l_f, car.l_r))))
     for i, axle in enumerate(AXLES):
         doubt = band.relative_sd(np.maximum(slip[:, i], 1e-4))
-        power = asked.found.measured[:, i] ** 2
+        power = evaluated.found.measured[:, i] ** 2
         mean = float(np.sqrt(np.sum(power * doubt[:, i] ** 2) / max(float(power.sum()), 1e-12)))
-        if not (mean <= RULES.doubt or asked.forceless[i]):
+        if not (mean <= RULES.doubt or evaluated.forceless[i]):
             text = (
                 f"the drive reduced the uncertainty of the curve to {PERCENT * mean:.0f} % of the "
                 f"prior's (limit {PERCENT * RULES.doubt:.0f} %): drive longer"
@@ -231,9 +228,9 @@ def _unsure(asked: _Asked) -> Iterator[Objection]:
             yield Objection("prior", axle, text, True)
 
 
-def _no_tire(asked: _Asked) -> Iterator[Objection]:
-    loads = np.array(asked.model.vehicle.axle_loads)
-    stiffness = asked.model.force(np.array([CHOSEN.secant]))[0] / CHOSEN.secant
+def _no_tire(evaluated: _Evaluated) -> Iterator[Objection]:
+    loads = np.array(evaluated.model.vehicle.axle_loads)
+    stiffness = evaluated.model.force(np.array([CHOSEN.secant]))[0] / CHOSEN.secant
     least, most = RULES.stiffness
     for axle, each, C in zip(AXLES, stiffness / loads, stiffness, strict=True):
         if not least <= each <= most:
@@ -244,9 +241,9 @@ def _no_tire(asked: _Asked) -> Iterator[Objection]:
             yield Objection("no_tire", axle, text, True)
 
 
-def _beyond(asked: _Asked) -> Iterator[Objection]:
-    beyond, known = beyond_known(asked.model, asked.recording), asked.model.known_slip
-    if beyond is None or known is None or asked.own:
+def _beyond(evaluated: _Evaluated) -> Iterator[Objection]:
+    beyond, known = beyond_known(evaluated.model, evaluated.recording), evaluated.model.known_slip
+    if beyond is None or known is None or evaluated.taught:
         return
     for axle, share, slip in zip(AXLES, beyond, known, strict=True):
         if share > RULES.beyond:
@@ -257,9 +254,9 @@ def _beyond(asked: _Asked) -> Iterator[Objection]:
             yield Objection("beyond_known", axle, text, False)
 
 
-def _turning(asked: _Asked) -> Iterator[Objection]:
+def _turning(evaluated: _Evaluated) -> Iterator[Objection]:
     """Judge an estimated v_y by the accelerometer; means tell of bank and offset, and are left."""
-    recording, windows = asked.recording, asked.found.windows
+    recording, windows = evaluated.recording, evaluated.found.windows
     if recording.logged_v_y is not None or recording.v_y is None or recording.a_y is None:
         return
     felt = windows.mean(recording.a_y)
@@ -277,15 +274,15 @@ def _turning(asked: _Asked) -> Iterator[Objection]:
         yield Objection("a_y_disagrees", None, text, True)
 
 
-def _unobserved(asked: _Asked) -> Iterator[Objection]:
+def _unobserved(evaluated: _Evaluated) -> Iterator[Objection]:
     """Refuse where the side slip that the model is judged at is hardly known."""
-    recording = asked.recording
+    recording = evaluated.recording
     if recording.logged_v_y is not None or recording.a_y is None:
         return
-    found = asked.model.estimated_v_y(recording.as_logged())
+    found = evaluated.model.estimated_v_y(recording.as_logged())
     if found is None:
         return
-    at = asked.found.windows.starts
+    at = evaluated.found.windows.starts
     sd = float(np.median(found.sd[at] / recording.v_x[at]))
     if not sd <= RULES.side_slip:
         text = (
@@ -310,8 +307,8 @@ def _roads(found: RoadFriction | None) -> list[Objection]:
     return listed
 
 
-def _verdict(asked: _Asked, listed: list[Objection], whole: Recording) -> Verdict:
-    model, recording, found = asked.model, asked.recording, asked.found
+def _verdict(evaluated: _Evaluated, listed: list[Objection], whole: Recording) -> Verdict:
+    model, recording, found = evaluated.model, evaluated.recording, evaluated.found
     if len(recording) < len(whole):
         minutes = len(recording) * whole.dt / 60.0, whole.duration / 60.0
         text = "judged by {:.3g} of {:.3g} minutes: those with the hardest cornering of each part"
@@ -322,22 +319,22 @@ def _verdict(asked: _Asked, listed: list[Objection], whole: Recording) -> Verdic
     )
     lateral, yaw = (None, None) if motion is None else motion.explained
     measures: dict[str, tuple[float, ...] | float | None] = {
-        "force_missed": tuple(map(float, found.missed)),
+        "force_missed": tuple(map(float, found.model_error)),
         "rms_force_static_loads": tuple(map(float, found.force)),
         "peak_force_static_loads": tuple(map(float, found.peak)),
         "explained_lateral": lateral,
         "explained_yaw": yaw,
     }
     refused = {one.axle for one in listed if one.refuses}
-    missed = dict(zip(AXLES, found.missed, strict=True))
+    errors = dict(zip(AXLES, found.model_error, strict=True))
     numbers = tuple(
         Number(
-            *one.with_missed(float(missed[one.axle])),
+            *one.with_missed(float(errors[one.axle])),
             valid=one.identified and not refused & {None, one.axle},
         )
         for one in model.estimates()
     )
-    clock, starts, n = whole.t[asked.portion.samples], found.windows.starts, found.windows.n
+    clock, starts, n = whole.t[evaluated.portion.samples], found.windows.starts, found.windows.n
     middle = 0.5 * (clock[starts] + clock[starts + n])
     return Verdict(
         findings=tuple(listed),
@@ -345,7 +342,7 @@ def _verdict(asked: _Asked, listed: list[Objection], whole: Recording) -> Verdic
         measures=measures,
         reach=_reach(model, recording),
         blind=WITHOUT_V_Y if recording.logged_v_y is None else (),
-        shown=WindowForces(middle, found.measured, found.modelled),
+        forces=WindowForces(middle, found.measured, found.modelled),
     )
 
 

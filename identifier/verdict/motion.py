@@ -16,59 +16,14 @@ from identifier.axle.car import Car, axle_impulse, car_numbers
 from identifier.tire_model import TireModel
 from identifier.verdict.chosen import CHOSEN
 from models.recordings import Recording
-from models.sensors import white_noise
+from models.recordings.evidence import Windows
+from models.recordings.samples import white_noise
 from models.vehicle import GRAVITY, Vehicle
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Windows:
-    """Where means are taken: half-overlapping windows of n samples in which the car drives.
-    starts : index of the first sample of each window (m,).   duration : T [s].
-    """
-
-    starts: NDArray[np.intp]
-    n: int
-    duration: float
-
-    @classmethod
-    def of(cls, recording: Recording, min_speed: float) -> "Windows":
-        """Return the windows of a recording.
-        min_speed : a window counts where the car is never slower [m/s], in one segment.
-        """
-        return cls.where(recording.v_x >= min_speed, recording, CHOSEN.window)
-
-    @classmethod
-    def where(
-        cls, counts: NDArray[np.bool_], recording: Recording, length: float, overlapping: int = 2
-    ) -> "Windows":
-        """Return the windows of a length in one segment of which every sample counts.
-        counts : which samples do (n,).   length : of a window [s].
-        """
-        n = max(2, round(length / recording.dt))
-        starts = np.arange(0, max(len(recording) - n, 0), max(1, n // overlapping))
-        total = np.concatenate([[0], np.cumsum(~counts)])
-        whole = total[starts + n + 1] == total[starts] if starts.size else starts > 0
-        whole &= recording.within_a_segment(starts, n)
-        return cls(starts=starts[whole], n=n, duration=n * recording.dt)
-
-    def __len__(self) -> int:
-        return int(self.starts.size)
-
-    def mean(self, signal: Array) -> Array:
-        """Return means over the windows by the trapezoidal rule, (m,) or (m, k).
-        signal : samples (n,) or (n, k).
-        """
-        steps = 0.5 * (signal[1:] + signal[:-1])
-        total = np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
-        means: Array = (total[self.starts + self.n] - total[self.starts]) / self.n
-        return means
-
-    def rate(self, signal: Array) -> Array:
-        """Return rates of change over the windows, (m,) or (m, k).
-        signal : samples (n,) or (n, k).
-        """
-        change: Array = signal[self.starts + self.n] - signal[self.starts]
-        return change / self.duration
+def brisk_windows(recording: Recording, min_speed: float) -> Windows:
+    """Return windows of 0.3 s, half-overlapping, where a car is never slower than a speed [m/s]."""
+    return Windows.where(recording.v_x >= min_speed, recording, CHOSEN.window)
 
 
 def measured_force(
@@ -144,7 +99,7 @@ class Evidence:
         return peak
 
     @property
-    def missed(self) -> Array:
+    def model_error(self) -> Array:
         """Share of the measured force that is not explained, noise taken off, (2,); else one."""
         size = np.sqrt(np.mean(self.measured**2, axis=0))
         rms = clean_rms(self.measured - self.modelled, self.noise)
@@ -166,14 +121,13 @@ class Evidence:
         One segment may be missed, as before a sensor has settled, where all the rest is explained:
         it is left out. None is where all is explained, or more than one segment is missed.
         """
-        if (self.missed <= CHOSEN.rest_missed).all():
+        if (self.model_error <= CHOSEN.rest_missed).all():
             return self, None
         first, last = self._worst_segment()
         place = np.arange(len(self.windows))
         rest = self.where((place < first) | (place >= last))
-        confined = (
-            rest.missed <= np.minimum(CHOSEN.rest_missed, CHOSEN.confined * self.missed.max())
-        ).all()
+        most = min(CHOSEN.rest_missed, CHOSEN.confined * float(self.model_error.max()))
+        confined = (rest.model_error <= most).all()
         if len(rest.windows) >= CHOSEN.fewest and confined:
             return rest, (first, last)
         return self, None
@@ -182,8 +136,8 @@ class Evidence:
         """Return the segment in which most is missed: first window, past last."""
         n = max(1, int(CHOSEN.segment * len(self.windows)))
         size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
-        missed = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
-        total = np.concatenate([[0.0], np.cumsum(missed)])
+        residual = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
+        total = np.concatenate([[0.0], np.cumsum(residual)])
         first = int(np.argmax(total[n:] - total[:-n]))
         return first, first + n
 
@@ -204,7 +158,7 @@ def brisk_from(model: TireModel) -> float:
 def evidence(model: TireModel, recording: Recording, road: Array | None = None) -> Evidence | None:
     """Return what a model explains of a drive; None where too little of it is driven."""
     vehicle = model.vehicle
-    windows = Windows.of(recording, brisk_from(model))
+    windows = brisk_windows(recording, brisk_from(model))
     if len(windows) < CHOSEN.fewest:
         return None
     return Evidence(
@@ -248,7 +202,7 @@ def motion_error(
     force : lateral axle forces (n, 2) [N], frame of the body.
     counted : samples that count (n,); a window counts where all of its samples do, in one segment.
     """
-    windows = Windows.where(counted, recording, CHOSEN.moment, round(CHOSEN.moment / recording.dt))
+    windows = Windows.where(counted, recording, CHOSEN.moment, 1)
     if not len(windows):
         return None
     m, I_z, l_f, l_r = vehicle.bicycle[:4]
@@ -260,6 +214,6 @@ def motion_error(
     r_dot = windows.rate(recording.r)
     with np.errstate(over="ignore", invalid="ignore"):  # of a law that diverged
         F = windows.mean(force)
-        missed = a_y - F.sum(axis=1) / m, r_dot - (l_f * F[:, 0] - l_r * F[:, 1]) / I_z
-        lateral, yaw, *sizes = (float(np.sqrt(np.mean(s**2))) for s in (*missed, a_y, r_dot))
+        residual = a_y - F.sum(axis=1) / m, r_dot - (l_f * F[:, 0] - l_r * F[:, 1]) / I_z
+        lateral, yaw, *sizes = (float(np.sqrt(np.mean(s**2))) for s in (*residual, a_y, r_dot))
     return MotionError(lateral=lateral, yaw=yaw, lateral_rms=sizes[0], yaw_rms=sizes[1])

@@ -1,4 +1,4 @@
-"""What of a run is asked: a portion of its drive, and parts of it, each left out once."""
+"""What of a run is evaluated: a portion of its drive, and parts of it, each left out once."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -19,7 +19,7 @@ PARTS = 4  # of the drive, each of which is left out once
 _Teach = Callable[[Recording], TireModel]
 
 
-class _AskedRun(NamedTuple):
+class _EvaluatedRun(NamedTuple):
     """A run whose frozen model is asked about a portion of its drive, k samples.
 
     model : frozen.   history : the run.   portion : of its recording.   end : time of the freeze
@@ -37,39 +37,39 @@ class _AskedRun(NamedTuple):
     def taught(self, recording: Recording) -> TireModel:
         """Return what the run's method learns of another drive until the freeze."""
         run = self.history
-        return learn(recording, run.vehicle, run.design, run.start, self.until)
+        return learn(recording, run.vehicle, run.method, run.start, self.until)
 
 
-def asked_run(history: History, t: float | None = None) -> _AskedRun:
-    """Return what of a run is asked.
+def evaluated_run(history: History, t: float | None = None) -> _EvaluatedRun:
+    """Return what of a run is part.
     t : time of the freeze in the recording's own clock [s]; None is the end.
     """
     model, whole = history.freeze(t), history.recording
     end = float(whole.t[-1]) if t is None else t
     frozen = state_index(whole, end)
-    asked = portion(whole, frozen)
-    n = asked.place(frozen)
-    until = None if n == len(asked.recording) else float(asked.recording.t[n])
+    part = portion(whole, frozen)
+    n = part.place(frozen)
+    until = None if n == len(part.recording) else float(part.recording.t[n])
     roads = _felt.setdefault(history, {})
     if frozen not in roads:
-        roads[frozen] = _road_felt(history, asked)
-    return _AskedRun(model, history, asked, end, until, roads[frozen])
+        roads[frozen] = _road_felt(history, part)
+    return _EvaluatedRun(model, history, part, end, until, roads[frozen])
 
 
 # What is felt takes as long as learning: it is found once of each run and sample of the freeze.
 _felt: WeakKeyDictionary[History, dict[int, Array | None]] = WeakKeyDictionary()
 
 
-def _road_felt(history: History, asked: Portion) -> Array | None:
+def _road_felt(history: History, part: Portion) -> Array | None:
     """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
-    method = history.design
-    without = asked.recording.logged_v_y is None
+    method = history.method
+    without = part.recording.logged_v_y is None
     if method.accelerometer is None or ("v_y" in method.needs) == without:
         return None  # it was learnt of another motion than that which is asked
     pushes = []
-    for block in history.blocks(asked.samples):
-        first, last = np.searchsorted(asked.samples, [block.part.start, block.part.stop])
-        mine = asked.samples[first:last] - block.part.start
+    for block in history.blocks(part.samples):
+        first, last = np.searchsorted(part.samples, [block.part.start, block.part.stop])
+        mine = part.samples[first:last] - block.part.start
         pushes.append(method.accelerometer.beside_force(block.state)[mine])
     return np.concatenate(pushes)
 

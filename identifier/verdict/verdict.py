@@ -95,7 +95,7 @@ class Verdict:
     blind : what else is not observable in this drive.
     friction : of the road over that of the identification drive, window by window; None of a run,
         and where not observable.
-    shown : force in the motion and of the model, window by window; None where too little
+    forces : in the motion and of the model, window by window; None where too little
         is driven.
     """
 
@@ -105,7 +105,7 @@ class Verdict:
     reach: str = ""
     blind: tuple[str, ...] = ()
     friction: RoadFriction | None = field(default=None, compare=False, repr=False)
-    shown: WindowForces | None = field(default=None, compare=False, repr=False)
+    forces: WindowForces | None = field(default=None, compare=False, repr=False)
 
     @property
     def valid(self) -> bool:

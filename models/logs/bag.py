@@ -36,10 +36,10 @@ from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.growing import Growing
-from models.logs.log import Listed, RecordingError
+from models.logs.log import Listed, RecordingError, dense, few
 from models.logs.magic import BAG_METADATA, MCAP, ROS1, SQLITE
 from models.logs.stamps import typical_rate
-from models.schema import CHUNK, most_unpacked, read_text, require_dense, require_few
+from models.schema import CHUNK, most_unpacked, read_text
 
 _STAMPS = ("header.stamp.", "stamp.")
 _TIME = ("sec", "nanosec")
@@ -143,7 +143,7 @@ def _moving(path: Path, bag: Any) -> list[_Moving]:
             times.append(ns)
             rows.append(values)
             count += 1
-        require_few(RecordingError, str(path), count, "samples", "transforms")
+        few(path, count, "samples", "transforms")
     return [
         _Moving(name, np.array(times), np.array(rows))
         for name, (times, rows) in found.items()
@@ -352,9 +352,7 @@ class _Reading:
         self.clock.extend(ns)
         for name, numbers_of in values.items():
             self.parts[name].extend(numbers_of)
-        require_few(
-            RecordingError, str(self.path), len(self.clock), "samples", "messages of a topic"
-        )
+        few(self.path, len(self.clock), "samples", "messages of a topic")
         self.times, self.raws, self.bytes = [], [], 0
 
     def finish(self) -> Samples:
@@ -483,14 +481,14 @@ def _require_shallow(path: Path) -> None:
         depth += 1 if mark in "[{" else -1
         deepest = max(deepest, depth)
     indent = max((len(line) - len(line.lstrip()) for line in text.splitlines()), default=0) // 2
-    require_few(RecordingError, str(path), max(deepest, indent), "depth", "levels of metadata")
+    few(path, max(deepest, indent), "depth", "levels of metadata")
     if _DEEP.search(text):
         raise RecordingError(f"{path}: must not hold lists in lists")
 
 
 def _require_allowed(path: Path, size: int, packed: int) -> None:
-    require_few(RecordingError, str(path), size / 1e6, "block", "megabytes of a chunk")
-    require_dense(RecordingError, str(path), size, packed, "chunks")
+    few(path, size / 1e6, "block", "megabytes of a chunk")
+    dense(path, size, packed, "chunks")
 
 
 def _require_small(path: Path, zstd: Any) -> None:
@@ -499,5 +497,5 @@ def _require_small(path: Path, zstd: Any) -> None:
     with zstd.open(path, "rb") as file:
         while size <= most and (part := file.read(CHUNK)):
             size += len(part)
-            require_dense(RecordingError, str(path), size, path.stat().st_size, "zstd data")
-    require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes unpacked")
+            dense(path, size, path.stat().st_size, "zstd data")
+    few(path, size / 1e6, "megabytes", "megabytes unpacked")

@@ -30,11 +30,11 @@ from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples
 from models.logs.growing import Growing
-from models.logs.log import Listed, RecordingError
+from models.logs.log import Listed, RecordingError, few
 from models.logs.magic import HEAD, frames_in
 from models.logs.mdf import is_bus, opened
 from models.logs.stamps import nanoseconds, since, typical_rate
-from models.schema import LONGEST_NAME, read_bytes, require_few
+from models.schema import LONGEST_NAME, read_bytes
 
 _FRAME = "CAN_DataFrame"  # of MDF
 _NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
@@ -110,15 +110,10 @@ class _Gathered:
 
 def _in_order(frames: _Frames) -> _Frames:
     """Return frames in the order of their times: groups of a file follow one another."""
-    t, data = frames
-    if all(np.all(np.diff(t[part]) >= 0.0) for part in blocks(t.size, overlap=1)):
+    if np.all(frames.t[1:] >= frames.t[:-1]):
         return frames
-    order = np.argsort(t, kind="stable")
-    sorted_data = Growing(np.uint8)
-    for part in blocks(t.size):
-        sorted_data.extend(data[order[part]].reshape(-1))
-    times = filled(t.size, lambda part: t[order[part]])
-    return _Frames(times, sorted_data.finished().reshape(-1, data.shape[1]))
+    order = np.argsort(frames.t, kind="stable")
+    return _Frames(frames.t[order], frames.data[order])
 
 
 class _Log(NamedTuple):
@@ -150,7 +145,7 @@ def _gather(path: Path, kind: str, known: _Known) -> _Log:
             found[key].add(message.timestamp, message.data)
             count += 1
             if count % CHOSEN.frames_at_once == 0:
-                require_few(RecordingError, str(path), count, "samples", "frames")
+                few(path, count, "samples", "frames")
     frames = {key: one.finished() for key, one in found.items()}
     first = min((float(kept.t.min()) for kept in frames.values()), default=0.0)
     if first > CHOSEN.calendar:
@@ -289,9 +284,7 @@ def _require_whole_blf(path: Path) -> None:
                 if size_of > 0 and _METHOD.unpack_from(data)[0] == CHOSEN.deflated:
                     unpacked = zlib.decompressobj().decompress(data[_METHOD.size :], int(most) + 1)
                     size_of = len(unpacked)
-                require_few(
-                    RecordingError, str(path), size_of / 1e6, "block", "megabytes of a block"
-                )
+                few(path, size_of / 1e6, "block", "megabytes of a block")
                 body = 0
             file.seek(body + length % 4, 1)
 
@@ -305,22 +298,19 @@ def _of_mdf(path: Path, known: _Known) -> _Log:
             raise RecordingError(f"{path}: an MDF3 file holds no frames; leave the DBC out")
         for number, group in enumerate(file.groups):
             samples = int(group.channel_group.cycles_nr)
-            require_few(RecordingError, str(path), samples, "samples", "frames")
+            few(path, samples, "samples", "frames")
             if not is_bus(group):
                 continue
-            names = _names(group)
+            names = {channel.name for channel in group.channels}
             if not {f"{_FRAME}.ID", f"{_FRAME}.DataBytes"} <= names:  # no data frames of a CAN bus
                 known_others = {name.partition(".")[0] for name in names} & set(_NO_DATA)
                 others["error and remote" if known_others else "other"] += samples
                 continue
             for first in range(0, samples, CHOSEN.frames_at_once):
-                part = _of_group(file, number, first, min(CHOSEN.frames_at_once, samples - first))
+                count = min(CHOSEN.frames_at_once, samples - first)
+                part = _of_group(file, names, number, first, count)
                 _sort(part, known, found, others)
     return _Log("CAN MDF4", {key: _in_order(one.finished()) for key, one in found.items()}, others)
-
-
-def _names(group: Any) -> set[str]:
-    return {channel.name for channel in group.channels}
 
 
 class _Part(NamedTuple):
@@ -333,9 +323,7 @@ class _Part(NamedTuple):
     data: NDArray[np.uint8]
 
 
-def _of_group(file: Any, number: int, first: int, count: int) -> _Part:
-    names = _names(file.groups[number])
-
+def _of_group(file: Any, names: set[str], number: int, first: int, count: int) -> _Part:
     def signal(name: str) -> Any:
         full = f"{_FRAME}.{name}"
         if full not in names:
@@ -463,11 +451,11 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
             )
         log = _gather(path, kind, given.known)
         senders = Counter((bus, given.known.named(one)) for bus, one in log.frames)
-        found = [
-            (_group(bus, identifier, senders[bus, given.known.named(identifier)]), listed, place)
-            for (bus, identifier), frames in log.frames.items()
-            for listed, place in _channels(given, identifier, frames)
-        ]
+        found = []
+        for (bus, identifier), frames in log.frames.items():
+            several = senders[bus, given.known.named(identifier)] > 1  # of J1939: which
+            group = f"bus {bus}" + f" from {identifier & 0xFF:02X}" * several
+            found += [(group, *one) for one in _channels(given, identifier, frames)]
     said = tuple(
         f"{count} {what} frames are not read" for what, count in log.others.items() if count
     )
@@ -481,11 +469,6 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
         _samples,
         missing=f"frame that {dbc} knows",
     )
-
-
-def _group(bus: str, identifier: int, senders: int) -> str:
-    """Return what frames are said to be of: their bus and, of several senders of J1939, which."""
-    return f"bus {bus}" + f" from {identifier & 0xFF:02X}" * (senders > 1)
 
 
 def _channels(given: _Dbc, identifier: int, frames: _Frames) -> Iterator[tuple[Listed, _Place]]:

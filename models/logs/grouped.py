@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.foreign import one_line
-from models.logs.log import Channel, Heading, Listed, RecordingError, chosen, one_run, some
+from models.logs.log import Channel, Heading, Listed, RecordingError, chosen, few, one_run, some
 from models.logs.stamps import Stamps, risen
 from models.logs.units import TIME, to_si
-from models.schema import require_few
 
 _MOST_NOTED = 5  # names that a note lists
 
@@ -83,7 +82,7 @@ class GroupedLog(Generic[_P]):
         if not found:
             why = "".join(f"; {one}" for one in (*said, remedy) if one)
             raise RecordingError(f"{path}: holds no {missing}{why}")
-        require_few(RecordingError, str(path), len(found), "columns", "channels")
+        few(path, len(found), "columns", "channels")
         names = _unique((group, listed.name) for group, listed, _ in found)
         return cls(
             path=path,
@@ -195,5 +194,5 @@ def noted(what: str, names: Sequence[str]) -> tuple[str, ...]:
 
 def require_room(path: Path, samples: float, width: float) -> None:
     """Refuse what is read whole where it is too large."""
-    require_few(RecordingError, str(path), samples, "samples", "samples of a channel")
-    require_few(RecordingError, str(path), samples * width / 1e6, "block", "megabytes of a block")
+    few(path, samples, "samples", "samples of a channel")
+    few(path, samples * width / 1e6, "block", "megabytes of a block")

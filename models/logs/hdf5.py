@@ -14,9 +14,9 @@ from codegen.arrays import Array
 from models.logs.chosen import CHOSEN
 from models.logs.foreign import need
 from models.logs.grouped import require_room
-from models.logs.log import RecordingError
+from models.logs.log import few
 from models.logs.tree import Leaf, Tree, Unread
-from models.schema import require_few, swells
+from models.schema import swells
 
 _OWN = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
 
@@ -36,7 +36,7 @@ class _Reader:
 
     def members(self, group: Any) -> list[tuple[str, Any]]:
         """Return what a group holds itself, not by links to elsewhere."""
-        require_few(RecordingError, str(self.path), len(group), "columns", "members of a group")
+        few(self.path, len(group), "columns", "members of a group")
         hard = [
             name for name in group if isinstance(group.get(name, getlink=True), self.h5py.HardLink)
         ]
@@ -44,8 +44,8 @@ class _Reader:
 
     def tree(self, node: Any, depth: int) -> Tree:
         self.count += 1
-        require_few(RecordingError, str(self.path), depth, "depth", "levels of groups")
-        require_few(RecordingError, str(self.path), self.count, "values", "groups and arrays")
+        few(self.path, depth, "depth", "levels of groups")
+        few(self.path, self.count, "values", "groups and arrays")
         kind = _matlab_class(node)
         if "MATLAB_object_decode" in node.attrs and kind not in ("struct", "cell"):
             return Unread(kind or "an object")
@@ -80,7 +80,7 @@ class _Reader:
         if "MATLAB_empty" in node.attrs or node.shape is None:
             return Leaf(shape=(0, 0), load=lambda: np.zeros((0, 0)))
         if self.h5py.check_ref_dtype(node.dtype) is self.h5py.Reference:
-            require_few(RecordingError, str(self.path), node.size, "values", "cells")
+            few(self.path, node.size, "values", "cells")
             references = np.asarray(node[()]).reshape(-1)
             return [self.tree(self.file[one], depth + 1) for one in references if one]
         text = self.h5py.check_string_dtype(node.dtype)

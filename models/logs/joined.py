@@ -1,18 +1,15 @@
 """Logs in pieces: a folder with a file for each message, a table with a row for each value."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from codegen.arrays import Array
 from models.logs.grouped import GroupedLog, Samples, noted
-from models.logs.log import Listed, LogFile, RecordingError, some
+from models.logs.log import Listed, LogFile, RecordingError, few, some
 from models.logs.stamps import find_clock, in_seconds, require_times, typical_rate
 from models.logs.table import Kind, Table, TableLog, kind_of
-from models.schema import require_few
 
 # A table with a row for each value: what the columns of names and of values are called.
 _NAMES = ("name", "signal", "signalname", "channel", "variable", "topic", "key", "field", "sensor")
@@ -85,7 +82,7 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
     unit_of = dict(zip(table.first_rows(name), given, strict=False))
     kinds = {clock.column: kind_of(clock), name: Kind.WORD, value: Kind.NUMBER}
     cells = table.cells(kinds)
-    require_few(RecordingError, str(table.path), len(cells.words[name].names), "columns", "names")
+    few(table.path, len(cells.words[name].names), "columns", "names")
     stamps, codes = cells.columns[clock.column], cells.words[name].codes
     require_times(str(table.path), clock, stamps, cells.rows, table.place)
     t = in_seconds(clock, stamps)
@@ -98,11 +95,11 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
         listed = Listed(name=word, unit=unit_of.get(word, ""), samples=rows.size, rate=rate)
         found.append(("", listed, rows))
     said = (f"a row for each value: {names[name]} names it; time is {clock.words}",)
-    read = partial(_of_rows, t, cells.columns[value])
+    values = cells.columns[value]
+
+    def read(asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:
+        return [Samples(one.name, t[rows], {one.name: values[rows]}) for one, rows in asked]
+
     return GroupedLog.of(
         table.path, f"{table.format} of values", "a table", "row", found, said, read, missing="name"
     )
-
-
-def _of_rows(t: Array, values: Array, asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:
-    return [Samples(one.name, t[rows], {one.name: values[rows]}) for one, rows in asked]

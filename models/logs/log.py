@@ -17,12 +17,23 @@ from codegen.arrays import Array
 from codegen.errors import TireidError
 from codegen.escape import shown, visible
 from models.logs.chosen import CHOSEN
+from models.schema import require_dense, require_few
 
 _T = TypeVar("_T")
 
 
 class RecordingError(TireidError, ValueError):
     """A log or a recording breaks a rule; one line: file or name, column, rule, value, remedy."""
+
+
+def few(path: object, count: float, limit: str, what: str) -> None:
+    """Refuse more of a log than a limit allows, as `require_few`."""
+    require_few(RecordingError, str(path), count, limit, what)
+
+
+def dense(path: object, size: float, packed: float, what: str) -> None:
+    """Refuse data of a log that swell as none does, as `require_dense`."""
+    require_dense(RecordingError, str(path), size, packed, what)
 
 
 class Heading(NamedTuple):

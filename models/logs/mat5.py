@@ -8,7 +8,7 @@ Nothing here trusts a size: each lies in what holds it, and depth and what is in
 import math
 import struct
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -18,9 +18,9 @@ import numpy as np
 from codegen.arrays import Array
 from codegen.errors import TireidError
 from models.logs.grouped import require_room
-from models.logs.log import RecordingError
+from models.logs.log import dense, few
 from models.logs.tree import Leaf, Tree, Unread
-from models.schema import most_unpacked, require_dense, require_few, swells
+from models.schema import most_unpacked, swells
 
 _HEADER = 128  # bytes
 _MATRIX, _COMPRESSED = 14, 15  # types of an element
@@ -33,8 +33,6 @@ _NUMERIC = range(6, 16)
 _COMPLEX = 0x0800  # flag
 _BEGINNING = 4096  # bytes that hold what a variable of numbers says of itself
 _LARGEST_DIMENSION = 2**40
-
-_Load = Callable[[], memoryview]
 
 
 class _DamagedError(TireidError, ValueError):
@@ -84,8 +82,8 @@ def read_tree(path: Path) -> dict[str, Tree]:
                 if (found := variable.tree()) is not None:
                     result[found.name] = found.tree
                     held, packed = held + found.held, packed + (length if found.held else 0)
-                require_dense(RecordingError, str(path), held, packed, "structs and cells")
-                require_few(RecordingError, str(path), len(result), "columns", "variables")
+                dense(path, held, packed, "structs and cells")
+                few(path, len(result), "columns", "variables")
             place += length + (0 if kind == _COMPRESSED else -length % 8)
     return result
 
@@ -108,9 +106,9 @@ class _Variable(NamedTuple):
             return memoryview(raw)
         allowed = most_unpacked(self.length)
         inflated = zlib.decompressobj().decompress(raw, (allowed + 1) if most is None else most + 8)
-        size, where = len(inflated), str(self.path)
-        require_few(RecordingError, where, size / 1e6, "block", "megabytes of a variable")
-        require_dense(RecordingError, where, size, self.length, "variables")
+        size = len(inflated)
+        few(self.path, size / 1e6, "block", "megabytes of a variable")
+        dense(self.path, size, self.length, "variables")
         if len(inflated) < 8:
             raise _DamagedError(f"the variable at byte {self.place} is cut off")
         kind, length = struct.unpack(self.order + "II", inflated[:8])
@@ -206,14 +204,14 @@ def _load(path: Path, begin: _Beginning, order: str) -> Array:
 
 
 def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
-    require_few(RecordingError, str(path), depth, "depth", "levels of structs and cells")
+    few(path, depth, "depth", "levels of structs and cells")
     begin = _beginning(data, order)
     if begin.kind in _NUMERIC and not begin.is_complex and begin.dimensions == 2:
         return Leaf(shape=begin.shape, load=lambda: _load(path, begin, order))
     if begin.kind == _CHAR:
         return _words(begin, order)
     count = begin.shape[0] * begin.shape[1]
-    require_few(RecordingError, str(path), count, "values", "cells")
+    few(path, count, "values", "cells")
     elements = _elements(begin.rest, order)
     if begin.kind == _CELL:
         cells: list[Tree] = [
@@ -232,7 +230,7 @@ def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
     names = [
         raw[k : k + longest].split(b"\0")[0].decode("latin-1") for k in range(0, len(raw), longest)
     ]
-    require_few(RecordingError, str(path), count * len(names), "values", "fields")
+    few(path, count * len(names), "values", "fields")
     structs: list[Tree] = [
         {
             name: _tree(path, one.data, order, depth + 1)

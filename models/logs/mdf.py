@@ -20,9 +20,9 @@ from models.limits import limits
 from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples, noted, require_room
-from models.logs.log import Listed, RecordingError
+from models.logs.log import Listed, RecordingError, dense, few
 from models.logs.stamps import typical_rate
-from models.schema import LONGEST_NAME, require_dense, require_few
+from models.schema import LONGEST_NAME
 
 _NUMERIC_4, _NUMERIC_3 = frozenset(range(6)), frozenset((0, 1, 2, 3, *range(9, 17)))
 _WORDS_4, _WORDS_3 = frozenset((7, 8, 9, 10, 11)), frozenset((11, 12))
@@ -244,7 +244,7 @@ def opened(path: Path, format: str) -> Iterator[Any]:
     _require_ends(path)
     with asammdf.MDF(path, process_bus_logging=False) as file:
         count = sum(len(group.channels) for group in file.groups)
-        require_few(RecordingError, str(path), count, "columns", "channels")
+        few(path, count, "columns", "channels")
         for group in file.groups:
             _require_fitting(path, group, str(file.version) >= "4")
         yield file
@@ -266,7 +266,7 @@ def _require_ends(path: Path) -> None:
             for records in _linked(path, file, form, _link(file, group + form.inner, form), seen):
                 first = _link(file, records + form.inner, form)
                 for _ in _linked(path, file, form, first, seen):
-                    require_few(RecordingError, str(path), len(seen) / 3, "columns", "channels")
+                    few(path, len(seen) / 3, "columns", "channels")
 
 
 def _linked(path: Path, file: BinaryIO, form: _Form, place: int, seen: set[int]) -> Iterator[int]:
@@ -306,9 +306,9 @@ def _require_fitting(path: Path, group: Any, is_4: bool) -> None:
     file_size, total, packed = path.stat().st_size, 0, 0
     for number, block in enumerate(group.get_data_blocks()):
         inflated, stored = int(block.original_size or 0), int(block.compressed_size or 0)
-        require_few(RecordingError, str(path), inflated / 1e6, "block", "megabytes of a block")
+        few(path, inflated / 1e6, "block", "megabytes of a block")
         total, packed = total + inflated, packed + stored
-        require_dense(RecordingError, str(path), total, packed, "groups of channels")
+        dense(path, total, packed, "groups of channels")
         here = group.data_location == 0
         if (
             number > CHOSEN.most_blocks

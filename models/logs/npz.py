@@ -11,9 +11,8 @@ from numpy.lib import format as npy
 
 from codegen.arrays import Array
 from models.logs.grouped import require_room
-from models.logs.log import RecordingError
+from models.logs.log import dense, few
 from models.logs.tree import Leaf, Tree, Unread
-from models.schema import require_dense, require_few
 
 _LONGEST_TEXTS = 1_000_000  # bytes of names of columns
 
@@ -24,11 +23,9 @@ def read_tree(path: Path) -> dict[str, Tree]:
         return _top(path, "", "data")
     with zipfile.ZipFile(path) as file:
         members = [one for one in file.infolist() if one.filename.endswith(".npy")]
-        require_few(RecordingError, str(path), len(members), "columns", "arrays")
+        few(path, len(members), "columns", "arrays")
         for one in members:
-            require_dense(
-                RecordingError, str(path), one.file_size, one.compress_size, _shown_name(one)
-            )
+            dense(path, one.file_size, one.compress_size, _shown_name(one))
         found: dict[str, Tree] = {}
         for one in members:
             found |= _top(path, one.filename, _shown_name(one))

@@ -12,11 +12,11 @@ from codegen.escape import shown
 from models.logs.arrow import doubles, whole_numbers, words
 from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
-from models.logs.log import RecordingError
+from models.logs.log import RecordingError, dense, few
 from models.logs.spelling import unit_in_name
 from models.logs.stamps import MISSING, nanoseconds
 from models.logs.table import Cells, Columns, Gathered, Kind, TableLog
-from models.schema import LONGEST_NAME, require_dense, require_few, require_file
+from models.schema import LONGEST_NAME, require_file
 
 _WHAT = "a Parquet file"  # that a file is read as
 
@@ -26,15 +26,15 @@ def open_parquet(path: Path) -> TableLog:
     require_file(path, RecordingError, limit="megabytes")
     with one_line(path, _WHAT), parquet.ParquetFile(path) as file:
         about = file.metadata
-        require_few(RecordingError, str(path), about.num_columns, "columns", "columns")
-        require_few(RecordingError, str(path), about.num_rows, "samples", "rows")
+        few(path, about.num_columns, "columns", "columns")
+        few(path, about.num_rows, "samples", "rows")
         groups = [about.row_group(k) for k in range(about.num_row_groups)]
         size = sum(group.total_byte_size for group in groups)
-        require_few(RecordingError, str(path), size / 1e6, "megabytes", "megabytes")
+        few(path, size / 1e6, "megabytes", "megabytes")
         for one in (group.column(k) for group in groups for k in range(group.num_columns)):
             unpacked, packed = one.total_uncompressed_size, one.total_compressed_size
             what = f"the cells of {shown(one.path_in_schema)}"
-            require_dense(RecordingError, str(path), unpacked, packed, what)
+            dense(path, unpacked, packed, what)
         table = _ParquetTable(path=path, schema=file.schema_arrow, rows=about.num_rows)
         return TableLog(table=table)
 

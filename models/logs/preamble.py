@@ -20,12 +20,11 @@ from typing import NamedTuple
 
 from codegen.escape import shown
 from models.logs.chosen import CHOSEN
-from models.logs.log import RecordingError
+from models.logs.log import RecordingError, few
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
 from models.logs.stamps import nanoseconds
 from models.logs.table import Columns
 from models.logs.units import PER_SECOND, quantities, time_unit
-from models.schema import require_few
 
 HEAD, _LINES = 1 << 18, 1500  # bytes and lines that are looked at
 BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
@@ -126,7 +125,7 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     way = _way(filled[-CHOSEN.tail :])
     if way is None:
         return _no_data(path, lines, encoding)
-    require_few(RecordingError, str(path), way.width, "columns", "columns")
+    few(path, way.width, "columns", "columns")
     table = [_Line(k, line, way.delimiter) for k, line in enumerate(lines, start=1)]
     return _table(path, table, way, encoding)
 
@@ -443,7 +442,7 @@ def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
     number, text = next((k, line) for k, line in enumerate(lines, start=1) if line.strip())
     delimiter = max(_DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
     names = cells_of(text, delimiter)
-    require_few(RecordingError, str(path), len(names), "columns", "columns")
+    few(path, len(names), "columns", "columns")
     after = cells_of(lines[number], delimiter) if number < len(lines) else ()
     under = len(after) == len(names) and is_units_row(after)
     words = (_encoding_word(encoding), f"names in line {number}")

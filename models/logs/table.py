@@ -14,7 +14,17 @@ from numpy.typing import NDArray
 from codegen.escape import shown
 from models.logs.chosen import CHOSEN
 from models.logs.growing import Growing
-from models.logs.log import Channel, Clock, Heading, Listed, RecordingError, chosen, one_run, some
+from models.logs.log import (
+    Channel,
+    Clock,
+    Heading,
+    Listed,
+    RecordingError,
+    chosen,
+    few,
+    one_run,
+    some,
+)
 from models.logs.spelling import unit_in_name, without_unit
 from models.logs.stamps import (
     MISSING,
@@ -27,7 +37,7 @@ from models.logs.stamps import (
     started,
     typical_rate,
 )
-from models.schema import LONGEST_NAME, limits, require_few
+from models.schema import LONGEST_NAME, limits
 
 _RUN = "run"
 
@@ -141,7 +151,7 @@ class Gathered:
         """
         self._seen += rows.size
         if self._seen > self._most:
-            require_few(RecordingError, str(self._path), self._seen, "samples", "rows")
+            few(self._path, self._seen, "samples", "rows")
         coded = {column: self._coded(column, columns[column], rows) for column in self._codes}
         keep: Any = slice(None)
         if self._run is not None:

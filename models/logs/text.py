@@ -22,11 +22,11 @@ from numpy.typing import NDArray
 from codegen.escape import shown
 from models.logs import arrow
 from models.logs.chosen import CHOSEN
-from models.logs.log import RecordingError
+from models.logs.log import RecordingError, few
 from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
 from models.logs.stamps import nanoseconds
 from models.logs.table import Cells, Columns, Gathered, Kind, TableLog, Words
-from models.schema import pieces, require_few
+from models.schema import pieces
 
 _BLANK = re.compile(rb"[ \t]+")
 _MARGIN = re.compile(rb"^ | $", re.MULTILINE)
@@ -41,7 +41,7 @@ def open_text(path: Path) -> TableLog:
             head, whole = head[:HEAD], False
             break
     layout = find_layout(path, head, whole)
-    require_few(RecordingError, str(path), len(layout.columns.names), "columns", "columns")
+    few(path, len(layout.columns.names), "columns", "columns")
     table = TextTable(path=path, layout=layout)
     return TableLog(table=table)
 

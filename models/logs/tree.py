@@ -119,7 +119,8 @@ def _line(values: Array, place: int, leaf: Leaf) -> Array:
     return values[:, place] if leaf.shape[0] >= leaf.shape[1] else values[place]
 
 
-_Clockless = tuple[str, str, Leaf, tuple[list[str], list[str]] | None]
+_Columns = tuple[list[str], list[str]] | None  # names and units of those of a matrix
+_Clockless = tuple[str, str, Leaf, _Columns]
 
 
 class _Walk:
@@ -171,7 +172,7 @@ class _Walk:
         name: str,
         unit: str,
         clocks: tuple[Clock, ...],
-        columns: tuple[list[str], list[str]] | None,
+        columns: _Columns,
     ) -> None:
         rows, width = leaf.shape
         if rows * width < 2:
@@ -184,8 +185,7 @@ class _Walk:
             along = 0 if rows == samples else 1
             if leaf.shape[1 - along] > CHOSEN.most_columns:
                 break
-            for signal in _lines(leaf, name, unit, along, clock, columns):
-                self.signals.append(signal)
+            self.signals += _lines(leaf, name, unit, along, clock, columns)
             return
         own = _clock_inside(leaf, name)
         if own is not None:
@@ -210,7 +210,7 @@ def _lines(
     unit: str,
     along: int,
     clock: Clock,
-    columns: tuple[list[str], list[str]] | None,
+    columns: _Columns,
 ) -> Iterator[Signal]:
     """Yield the signal of a vector, or those of the columns or rows of a matrix."""
     width = leaf.shape[1 - along]
@@ -283,16 +283,13 @@ def _pick(node: dict[str, Tree], names: Sequence[str]) -> Tree | None:
 
 def _several(node: dict[str, Tree]) -> bool:
     """Whether a struct holds other vectors than one signal and its time."""
-    other = [
-        key
-        for key, child in node.items()
-        if isinstance(child, Leaf)
+    return any(
+        isinstance(child, Leaf)
         and max(child.shape) > 1
-        and key.lower() not in _DATA
+        and key.lower() not in (*_DATA, "dimensions", "x", "quality")
         and _unit_of_clock(key) is None
-        and key.lower() not in ("dimensions", "x", "quality")
-    ]
-    return bool(other)
+        for key, child in node.items()
+    )
 
 
 def _text(node: dict[str, Tree], names: Sequence[str]) -> str:
@@ -306,7 +303,7 @@ def _unit(node: dict[str, Tree]) -> str:
     return _text(node, _UNIT) or (_text(about, _UNIT) if isinstance(about, dict) else "")
 
 
-def _columns(node: dict[str, Tree]) -> tuple[list[str], list[str]] | None:
+def _columns(node: dict[str, Tree]) -> _Columns:
     """Return the names and units that a struct tells of the columns of its matrix."""
 
     def words(names: Sequence[str]) -> list[str]:

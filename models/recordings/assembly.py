@@ -369,7 +369,7 @@ def _on_wheels(
     label: str, segments: Sequence[Segment], log_map: LogMap, dt: float
 ) -> tuple[list[Segment], str]:
     """Return segments with v_x in place of wheels, and how far these were trusted, in words."""
-    found, gated, held, n = [], 0, 0, 0
+    found, gated, untrusted, n = [], 0, 0, 0
     wheels, repair, sign = log_map.wheels, log_map.repair, AXES[log_map.axes]
     for one in segments:
         still = np.zeros(one.t.size)
@@ -385,12 +385,12 @@ def _on_wheels(
             raise RecordingError(f"{label}: {error}") from None
         signals = {"v_x": given.v_x, **_without_wheels(one.signals)}
         found.append(one._replace(signals=signals))
-        gated, held, n = gated + given.gated, held + given.held, n + one.t.size
+        gated, untrusted, n = gated + given.gated, untrusted + given.untrusted, n + one.t.size
     names = ", ".join(name for name in WHEELS if name in segments[0].signals)
     return found, (
         f"vx is computed from {names}: at {100.0 * gated / n:.2g} % of the samples a wheel "
-        f"slipped and was left out, at {100.0 * held / n:.2g} % all were, and the speed went on "
-        "as before"
+        f"slipped and was left out, at {100.0 * untrusted / n:.2g} % all were, and the speed went "
+        "on as before"
     )
 
 

@@ -7,8 +7,6 @@ and each bound lies inside that gap. One error nobody can see: a log whose later
 the right throughout (SAE, NED) obeys the same laws.
 """
 
-from typing import Protocol
-
 import numpy as np
 
 from codegen.arrays import Array, thinning
@@ -31,6 +29,8 @@ from models.recordings.evidence import (
     windows,
 )
 from models.recordings.record import Recording, peak
+from models.recordings.samples import multiple
+from models.vehicle import Vehicle
 
 _DOCTOR = "tireid doctor LOG --vehicle FILE looks for other faults, and repairs them"
 
@@ -58,10 +58,16 @@ def physics_contradiction(recording: Recording) -> str | None:
     found = _check_signs_are_there(recording)
     if found is not None:
         return found
+    largest = float(np.percentile(np.abs(w.v_x_r), 95))
+    if largest > CHOSEN.largest_v_x_r:
+        return (
+            f"r must be in rad/s, |v_x r| below {CHOSEN.largest_v_x_r:g} m/s^2, it is "
+            f"{largest:.4g}; degrees per second? multiply r by pi/180"
+        )
     turn = steering(w)
-    found = _check_v_x_r(w) or _check_turns(w) or _check_lateral_acceleration(w)
+    found = _check_turns(w) or _check_lateral_acceleration(w)
     if turn is not None:
-        found = found or _check_steering(recording, w, turn)
+        found = found or _check_steering(w, turn)
         found = found or _check_lateral_velocity(recording, w, turn)
     return found or _check_forces(w, turn)
 
@@ -150,10 +156,8 @@ def _check_turns(w: Means) -> str | None:
     r_delta = pair(turn, steered, w.grips)
     if felt is None:
         return _check_two(r_delta)
-    factor = float(felt @ w.r) / max(float(w.r @ w.r), 1e-300)
-    rest = felt - w.r * factor
-    alike = 0.5 < factor / float(np.mean(w.v_x)) < 2.0
-    if float(rest @ rest) < CHOSEN.copy**2 * float(felt @ felt) and not alike:
+    factor = multiple(w.r, felt)
+    if factor is not None and not 0.5 < factor / float(np.mean(w.v_x)) < 2.0:
         return (
             "ay must be an acceleration, it is r times a number: a copy of the yaw rate? "
             "leave it out"
@@ -275,37 +279,30 @@ def _blame(slope: float, law: str) -> str:
     return f"ay {law}; check its axis, unit and time stamps, or leave the column ay out"
 
 
-def _check_v_x_r(w: Means) -> str | None:
-    """Answer with a centripetal acceleration above 60 m/s^2 in 5 % of the moving windows."""
-    largest = float(np.percentile(np.abs(w.v_x_r), 95))
-    if largest > CHOSEN.largest_v_x_r:
-        return (
-            f"r must be in rad/s, |v_x r| below {CHOSEN.largest_v_x_r:g} m/s^2, it is "
-            f"{largest:.4g}; degrees per second? multiply r by pi/180"
-        )
-    return None
-
-
-def _check_steering(recording: Recording, w: Means, turn: Steering) -> str | None:
+def _check_steering(w: Means, turn: Steering) -> str | None:
     """Answer with steering that turns the wrong way or an effective wheelbase out of all cars.
 
     Upper bound 7.5 m + 0.03 v_x^2 (a bus, with three times a sedan's understeer) where small
     steering says the same as large, since a car that slides over its front wheels reads long;
     lower bound 0.03 m (half a 1:43 car) rising to 0.12 m at 8 m/s (a sedan in degrees/s 0.05).
     """
-    some = slice(None, None, thinning(len(recording)))
-    front, rear = (np.mean(angle[some] ** 2) for angle in (recording.delta_f, recording.delta_r))
+    front, rear = (np.mean(angle**2) for angle in (w.delta_f, w.delta_r))
     column = "delta_f" if front >= rear else "delta_r"
     L = turn.wheelbase
     if turn.correlation < 0.7:
         return None
     v = float(np.sqrt(np.mean(w.v_x**2)))
     longest = 7.5 + 0.03 * v**2
-    too_long = longest < L and proportional(w)
-    if too_long:
+    if longest < L and proportional(w):
+        in_degrees = "degrees? multiply it by pi/180"
+        wheel = (
+            "the angle of the steering wheel? divide it by the steering ratio (12 to 20 in cars)"
+        )
+        likely = L * np.pi / 180.0 > (0.1 if v < 8.0 else 1.5)
+        both = (in_degrees, wheel) if likely else (wheel, in_degrees)
         return (
             f"{column} must be in rad, the effective wheelbase v_x delta/r is "
-            f"{L:.4g} m, above {longest:.3g}; {_too_large(L, v)}"
+            f"{L:.4g} m, above {longest:.3g}; {'; or '.join(both)}"
         )
     shortest = min(max(0.015 * v, 0.03), 0.12)
     if shortest > L:
@@ -314,15 +311,6 @@ def _check_steering(recording: Recording, w: Means, turn: Steering) -> str | Non
             f"{L:.3g} m, below {shortest:.2g}; degrees per second? multiply r by pi/180"
         )
     return None
-
-
-def _too_large(L: float, v: float) -> str:
-    """Return which angle was taken for that of the road wheels, by the effective wheelbase."""
-    in_degrees = "degrees? multiply it by pi/180"
-    wheel = "the angle of the steering wheel? divide it by the steering ratio (12 to 20 in cars)"
-    shortest = 0.1 if v < 8.0 else 1.5
-    both = (in_degrees, wheel) if L * np.pi / 180.0 > shortest else (wheel, in_degrees)
-    return "; or ".join(both)
 
 
 def _check_lateral_velocity(recording: Recording, w: Means, turn: Steering) -> str | None:
@@ -392,23 +380,7 @@ def _check_forces(w: Means, turn: Steering | None) -> str | None:
 # The checks that need the axle positions: slip angles against accelerations and forces.
 
 
-class _Axles(Protocol):
-    """What the check must know of a vehicle: its mass and the distances of its axles."""
-
-    @property
-    def l_f(self) -> float:
-        """Center of gravity to front axle [m]."""
-
-    @property
-    def l_r(self) -> float:
-        """Center of gravity to rear axle [m]."""
-
-    @property
-    def mass(self) -> float:
-        """Mass [kg]."""
-
-
-def check_against_vehicle(recording: Recording, vehicle: _Axles) -> None:
+def check_against_vehicle(recording: Recording, vehicle: Vehicle) -> None:
     """Refuse a recording whose slip angles contradict this vehicle.
 
     Rules, each silent without excitation (2 s of motion, rms lateral acceleration 0.3 m/s^2):
@@ -417,15 +389,12 @@ def check_against_vehicle(recording: Recording, vehicle: _Axles) -> None:
     each axle's force, or failing that the lateral acceleration for the rear, rises with its slip
     angle (correlation above -0.3); the mass that the forces accelerate is a third to three times
     the vehicle's.
-    vehicle : anything with l_f and l_r [m] and mass [kg].
     """
     _refuse(recording, vehicle_contradiction(recording, vehicle))
 
 
-def vehicle_contradiction(recording: Recording, vehicle: _Axles) -> str | None:
-    """Return how a recording contradicts a vehicle, by the rules of `check_against_vehicle`.
-    vehicle : anything with l_f and l_r [m] and mass [kg].
-    """
+def vehicle_contradiction(recording: Recording, vehicle: Vehicle) -> str | None:
+    """Return how a recording contradicts a vehicle, by the rules of `check_against_vehicle`."""
     w = windows(recording)
     a = w.acceleration
     if w.r.size * CHOSEN.stride < 2.0 or np.sqrt(np.mean(a**2)) < 0.3:
@@ -460,15 +429,13 @@ def vehicle_contradiction(recording: Recording, vehicle: _Axles) -> str | None:
             )
     if w.force is None:
         return None if slip is None else _check_rear_rises(slip[:, 1], w, l_r, other)
-    found = None
-    if slip is not None:
-        found = _check_rises(slip[:, 1], w.force[:, 1], "Fyr", other)
-        found = found or _check_rises(slip[:, 0], w.force[:, 0], "Fyf", other)
-    return found or _check_mass(w.force.sum(axis=1), a, vehicle.mass)
-
-
-def _check_mass(force: Array, a: Array, mass: float) -> str | None:
-    """Answer with a vehicle whose mass is far from the one that the forces accelerate."""
+    for column, k in (("Fyr", 1), ("Fyf", 0)):
+        if slip is not None and (falls := _falls(slip[:, k], w.force[:, k])) is not None:
+            return (
+                f"{column} {_RISES}, their correlation is {falls:.2f}; change the sign of {column} "
+                f"or of vy{other}"
+            )
+    force, mass = w.force.sum(axis=1), vehicle.mass
     moved = float(force @ a / (a @ a))
     if correlation(force, a) > 0.8 and not mass / 3.0 < moved < 3.0 * mass:
         return (
@@ -481,15 +448,12 @@ def _check_mass(force: Array, a: Array, mass: float) -> str | None:
 _RISES = "must rise with its slip angle (paper's sign, alpha = delta - atan2(v_y +- l r, v_x))"
 
 
-def _check_rises(alpha: Array, force: Array, column: str, other: str) -> str | None:
-    """Answer with a force that falls with the slip angle that makes it."""
-    together = correlation(alpha, force)
-    if together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003:
-        return (
-            f"{column} {_RISES}, their correlation is {together:.2f}; change the sign of {column} "
-            f"or of vy{other}"
-        )
-    return None
+def _falls(alpha: Array, pushed: Array) -> float | None:
+    """Return the correlation of a slip angle with a push that falls with it, None where none does.
+    alpha : [rad] (k,).   pushed : force, or acceleration (k,).
+    """
+    together = correlation(alpha, pushed)
+    return together if together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003 else None
 
 
 def _check_rear_rises(alpha: Array, w: Means, l_r: float, other: str) -> str | None:
@@ -497,9 +461,8 @@ def _check_rear_rises(alpha: Array, w: Means, l_r: float, other: str) -> str | N
 
     Where an accelerometer has the slope 1 on v̇_y the sign of v_y is right, and the car is wrong.
     """
-    a = w.acceleration
-    together = correlation(alpha, a)
-    if not (together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003):
+    falls = _falls(alpha, w.acceleration)
+    if falls is None:
         return None
     car = f"name the right vehicle; this file declares l_r = {l_r:g} m"
     place = "move vy to the center of gravity"
@@ -510,4 +473,4 @@ def _check_rear_rises(alpha: Array, w: Means, l_r: float, other: str) -> str | N
             remedy = f"vy has the sign of ay: {car}, or {place}"
         elif slope < -0.3 < -error:
             remedy = "change the sign of vy"
-    return f"lateral acceleration {_RISES}, their correlation is {together:.2f}; {remedy}"
+    return f"lateral acceleration {_RISES}, their correlation is {falls:.2f}; {remedy}"

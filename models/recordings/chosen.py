@@ -19,7 +19,6 @@ class Chosen(NamedTuple):
     largest_v_x_r: float = 60.0  # [m/s^2], 6 g: beyond downforce cars; 1 m/s^2 in degrees reads 57
     sure_pair: float = 0.9  # correlation from which two channels are of one bend
     no_pair: float = 0.3  # correlation up to which they are of none
-    copy: float = 1e-4  # of a channel, rms, that is left of it beside another one which it copies
     # slope of a_y on v_x r, below zero, up to which it is not turned but lacks v_x r
     lacks: float = 0.35
     # a_y on v_x r is 1, with roll up to 1.2; km/h 0.28, g 0.10, degrees 0.017

@@ -1,19 +1,74 @@
 """What a recording says about itself, in window means that noise and lag do not upset.
 
 Over a window of length T the lateral kinematics hold without differentiating a signal:
-mean(a_y) = (v_y(t + T) - v_y(t))/T + mean(v_x r). A mean is that of the samples from t to before
-t + T, so it lies half a step early: of what a signal changes over a window it misses dt/(2 T).
+mean(a_y) = (v_y(t + T) - v_y(t))/T + mean(v_x r).
 """
 
-from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import LONG, Array, thinning
+from codegen.arrays import LONG, Array, filled, thinning
 from models.recordings.chosen import CHOSEN
 from models.recordings.record import Recording
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Windows:
+    """Where means are taken: windows of n steps in one segment.
+    starts : index of the first sample of each window (m,).   duration : T [s].
+    """
+
+    starts: NDArray[np.intp]
+    n: int
+    duration: float
+
+    @classmethod
+    def where(
+        cls,
+        counts: NDArray[np.bool_],
+        recording: Recording,
+        length: float,
+        every: int | None = None,
+    ) -> "Windows":
+        """Return the windows of a length in one segment of which every sample counts.
+        counts : which samples do (n,).   length : of a window [s].
+        every : steps from one window to the next; None lets them overlap by half.
+        """
+        n = max(2, round(length / recording.dt))
+        starts = np.arange(0, max(len(recording) - n, 0), every or max(1, n // 2))
+        windows = cls(starts=starts, n=n, duration=n * recording.dt)
+        whole = (windows.mean(~counts) == 0.0) & recording.within_a_segment(starts, n)
+        return replace(windows, starts=starts[whole])
+
+    def __len__(self) -> int:
+        return int(self.starts.size)
+
+    def mean(self, signal: NDArray[Any], by: Array | None = None) -> Array:
+        """Return means over the windows by the trapezoidal rule, (m,) or (m, k).
+        signal : samples (n,) or (n, k).   by : what they are multiplied by, of the same shape.
+        """
+        if len(signal) > LONG and len(self) * self.n < len(signal):  # far apart: these alone
+            total = np.zeros((len(self), *signal.shape[1:]))
+            for k in range(self.n + 1):
+                at = self.starts + k
+                weight = 1.0 if 0 < k < self.n else 0.5
+                total += weight * (signal[at] if by is None else signal[at] * by[at])
+            return total / self.n
+        signal = signal if by is None else signal * by
+        steps = 0.5 * (signal[1:] + signal[:-1])
+        total = np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
+        means: Array = (total[self.starts + self.n] - total[self.starts]) / self.n
+        return means
+
+    def rate(self, signal: Array) -> Array:
+        """Return rates of change over the windows, (m,) or (m, k).
+        signal : samples (n,) or (n, k).
+        """
+        change: Array = signal[self.starts + self.n] - signal[self.starts]
+        return change / self.duration
 
 
 class Means(NamedTuple):
@@ -81,41 +136,34 @@ class Pair(NamedTuple):
     seconds: float
 
 
+def moving(speed: Array) -> float:
+    """Return the speed from which a car moves [m/s]: 30 % of what is usual, its 95th percentile.
+    speed : of samples (n,).
+    """
+    usual = np.percentile(speed[:: thinning(speed.size)], 95) if speed.size else 0.0
+    return max(CHOSEN.slowest, 0.3 * float(usual))
+
+
 def windows(recording: Recording) -> Means:
     """Average a recording over windows of 0.2 s in which the car moves forward all the time.
 
     No window reaches from one segment into the next.
-
-    Moving: v_x above 0.5 m/s and above 30 % of its 95th percentile.
     """
-    n, dt = len(recording), recording.dt
-    width = max(round(CHOSEN.evidence_window / dt), 1)
-    start = np.arange(0, max(n - width, 0), max(round(CHOSEN.stride / dt), 1) * thinning(n))
-    fast = max(CHOSEN.slowest, 0.3 * float(np.percentile(recording.v_x[:: thinning(n)], 95)))
-    start = start[_sums(lambda at: (recording.v_x[at] < fast) + 0.0, n, start, width) == 0.0]
-    start = start[recording.within_a_segment(start, width)]
-
-    def mean(signal: Array, by: Array | None = None) -> Array:
-        product = signal.__getitem__ if by is None else lambda at: signal[at] * by[at]
-        means: Array = _sums(product, n, start, width) / width
-        return means
-
-    def slope(signal: Array) -> Array:
-        slopes: Array = (signal[start + width] - signal[start]) / (width * dt)
-        return slopes
-
+    every = max(round(CHOSEN.stride / recording.dt), 1) * thinning(len(recording))
+    counts = recording.v_x >= moving(recording.v_x)
+    w = Windows.where(counts, recording, CHOSEN.evidence_window, every)
     v_y, force = recording.logged_v_y, recording.axle_force
     return Means(
-        v_x=mean(recording.v_x),
-        v_y=None if v_y is None else mean(v_y),
-        r=mean(recording.r),
-        delta_f=mean(recording.delta_f),
-        delta_r=mean(recording.delta_r),
-        v_y_dot=None if v_y is None else slope(v_y),
-        r_dot=slope(recording.r),
-        v_x_r=mean(recording.v_x, recording.r),
-        a_y=None if recording.a_y is None else mean(recording.a_y),
-        force=None if force is None else np.column_stack([mean(force[:, 0]), mean(force[:, 1])]),
+        v_x=w.mean(recording.v_x),
+        v_y=None if v_y is None else w.mean(v_y),
+        r=w.mean(recording.r),
+        delta_f=w.mean(recording.delta_f),
+        delta_r=w.mean(recording.delta_r),
+        v_y_dot=None if v_y is None else w.rate(v_y),
+        r_dot=w.rate(recording.r),
+        v_x_r=w.mean(recording.v_x, recording.r),
+        a_y=None if recording.a_y is None else w.mean(recording.a_y),
+        force=None if force is None else w.mean(force),
     )
 
 
@@ -183,31 +231,23 @@ def _less_offset(signal: Array, some: NDArray[np.bool_]) -> Array:
 def course_rate(recording: Recording) -> tuple[Array, Array] | None:
     """Return how fast the direction of (v_x, v_y) turns, and the yaw rate, [rad/s], (k,) each.
 
-    Over windows of 0.2 s one after the other; None without a v_y, or with less than 2 s.
+    From one window of 0.2 s to the next; None without a v_y, or with less than 2 s.
     """
-    v_y, dt = recording.logged_v_y, recording.dt
-    width = round(max(CHOSEN.evidence_window / dt, 1.0))
-    n = len(recording) // width
-    if v_y is None or n * width * dt < 2.0:
+    v_x, v_y = recording.v_x, recording.logged_v_y
+    if v_y is None:
         return None
-    some = np.arange(n)[:: thinning(len(recording))] * width
-    some = some[some < (n - 1) * width]
-    some = some[recording.within_a_segment(some, 2 * width - 1)]
-
-    def mean(signal: Array, at: NDArray[np.intp]) -> Array:
-        means: Array = np.mean([signal[at + k] for k in range(width)], axis=0)
-        return means
-
-    before, after = (mean(recording.v_x, at) + 1j * mean(v_y, at) for at in (some, some + width))
-    r = 0.5 * (mean(recording.r, some) + mean(recording.r, some + width))
-    speed = np.abs(before)
-    fast = (
-        speed > max(CHOSEN.slowest, 0.3 * float(np.percentile(speed, 95)))
-        if speed.size
-        else speed > 0
+    speed = filled(len(recording), lambda part: np.hypot(v_x[part], v_y[part]))
+    n = max(round(CHOSEN.evidence_window / recording.dt), 1)
+    both = Windows.where(
+        speed >= moving(speed), recording, 2 * n * recording.dt, n * thinning(len(recording))
     )
-    turned: Array = np.angle(after[fast] * np.conj(before[fast])) / (width * dt)
-    return (turned, r[fast]) if turned.size * CHOSEN.evidence_window >= 2.0 else None
+    before = replace(both, n=n)
+    first, second = (
+        w.mean(v_x) + 1j * w.mean(v_y) for w in (before, replace(before, starts=both.starts + n))
+    )
+    turned: Array = np.angle(second * np.conj(first)) / (n * recording.dt)
+    enough = turned.size * CHOSEN.evidence_window >= 2.0
+    return (turned, both.mean(recording.r)) if enough else None
 
 
 def steering(w: Means) -> Steering | None:
@@ -262,11 +302,3 @@ def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
     some = turning(r, kinematic)
     x, y = (_less_offset(one, some) for one in (r, kinematic))
     return Steering(float(np.sqrt((y @ y) / (x @ x))), together.correlation)
-
-
-def _sums(signal: Callable[[Any], Array], n: int, start: NDArray[np.intp], width: int) -> Array:
-    if n > LONG:  # windows are far apart: their samples are looked at alone
-        sums: Array = np.sum([signal(start + k) for k in range(width)], axis=0)
-        return sums
-    total = np.concatenate([[0.0], np.cumsum(signal(slice(n)))])
-    return np.asarray(total[start + width] - total[start])

@@ -28,12 +28,12 @@ from models.recordings.wheels import DRIVEN, Wheels
 
 class _Rolled(NamedTuple):
     """Forward speed of a segment [m/s], (n,), and what of it is not what all wheels say.
-    gated, held : samples at which a wheel was left out, and at which all were.
+    gated, untrusted : samples at which a wheel was left out, and at which all were.
     """
 
     v_x: Array
     gated: int
-    held: int
+    untrusted: int
 
 
 def rolled(
@@ -50,7 +50,7 @@ def rolled(
     free = [bool(wheels.driven) and not set(group) & set(_pushed(wheels)) for group in names]
     rule = np.array([dt, most, most + CHOSEN.noise / (span * dt)])
     scan, constants = _trust_scan(len(names)), {"rule": rule, "free": np.array(free, dtype=float)}
-    gated = held = 0
+    gated = untrusted = 0
     trust: Array | None = None
     for part in blocks(n):
         early = slice(max(part.start - span, 0), part.stop)
@@ -64,26 +64,26 @@ def rolled(
         if trust is None:
             trust = _begun(rows[0], free)
         samples = {"row": rows, "rates": rates}
-        record = scan(len(rows), {"trust": trust, **samples, **constants}, ports=("v", "held"))
+        record = scan(len(rows), {"trust": trust, **samples, **constants}, ports=("v", "untrusted"))
         trust = record["trust_final"]
         v_x[part] = record["v"].ravel()
-        held += int(np.count_nonzero(record["held"] > 0.0))
+        untrusted += int(np.count_nonzero(record["untrusted"] > 0.0))
         agree = np.abs(rows - v_x[part, None]) <= CHOSEN.noise + CHOSEN.slip * np.abs(
             v_x[part, None]
         )
         gated += int(np.count_nonzero(~agree.all(axis=1)))
-    return _Rolled(v_x, gated, held)
+    return _Rolled(v_x, gated, untrusted)
 
 
 class _Trust(NamedTuple):
     """What is carried from sample to sample: the speed, its change, and since when none is known.
 
-    v [m/s]; a [m/s²]; held: time since a wheel was trusted [s]; known: the speed then [m/s].
+    v [m/s]; a [m/s²]; untrusted: time since a wheel was trusted [s]; known: the speed then [m/s].
     """
 
     v: ca.SX
     a: ca.SX
-    held: ca.SX
+    untrusted: ca.SX
     known: ca.SX
 
 
@@ -186,9 +186,9 @@ def _trust_scan(k: int) -> Scan:
     step = ca.Function(
         f"rolled_{k}",
         [trust, row, rates, rule, free],
-        [ca.vertcat(*after), after.v, after.held],
+        [ca.vertcat(*after), after.v, after.untrusted],
         ["trust", "row", "rates", "rule", "free"],
-        ["trust_next", "v", "held"],
+        ["trust_next", "v", "untrusted"],
     )
     return Scan(step, carry=("trust",), over=("row", "rates"))
 

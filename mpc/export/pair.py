@@ -122,13 +122,11 @@ def build_pair(
     identifier: Package,
     problem: Problem | None = None,
     *,
-    delay: float = DELAY,
     single: bool = False,
     caution: float = 0.0,
 ) -> Pair:
     """Return the tracker that goes with an identifier, one step a sample, and what joins them.
     identifier : package of the identifier; its weights are the tire that is begun with.
-    delay : from a measurement until its command acts [s].
     single : whether float is the default precision of the tracker.
     caution : of the tracker, from 0 to 1; a number of the parameters.
     """
@@ -137,7 +135,7 @@ def build_pair(
         prediction_tire(frozen_start(identifier)),
         problem,
         period=specialized.dt,
-        delay=delay,
+        delay=DELAY,
         name=f"{specialized.name}_mpc",
         single=single,
         caution=caution,

@@ -76,12 +76,10 @@ def _forces(tire: PredictionTire, v_x: float, largest: float) -> tuple[Array, Ar
 @cache
 def _statics(structure: Any, n: int) -> ca.Function:
     """Return steady axle forces (2, n) at states (3, n) = v_y, r, δ."""
-    states, v_x = ca.MX.sym("states", 3, n), ca.MX.sym("v_x")
-    car, w = ca.MX.sym("car", 4), ca.MX.sym("w", structure.n_weights)
-    one, speed = ca.SX.sym("one", 3), ca.SX.sym("v_x")
-    numbers, weights = ca.SX.sym("car", 4), ca.SX.sym("w", structure.n_weights)
+    one, v_x, car = ca.SX.sym("one", 3), ca.SX.sym("v_x"), ca.SX.sym("car", 4)
+    w = ca.SX.sym("w", structure.n_weights)
     v_y, r, delta = ca.vertsplit(one)
-    at = Point(v_y, r, delta, speed, Car(*ca.vertsplit(numbers)), weights)
-    force = structure.force(structure.slip(at), at)
-    at_one = ca.Function("one", [one, speed, numbers, weights], [ca.vertcat(*force)])
-    return ca.Function("statics", [states, v_x, car, w], [at_one.map(n)(states, v_x, car, w)])
+    at = Point(v_y, r, delta, v_x, Car(*ca.vertsplit(car)), w)
+    force = ca.vertcat(*structure.force(structure.slip(at), at))
+    at_one = ca.Function("statics", [one, v_x, car, w], [force])
+    return at_one.map(n, [False, True, True, True], [False])

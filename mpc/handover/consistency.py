@@ -11,43 +11,24 @@ seen after 1.7/l. A channel that is stuck, flipped, scaled or noisy breaks the s
 """
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
-from models.rules import require_positive_fields
 from models.sensors import LARGEST_SHOWN, is_shown
 from mpc.loop.sensing import Measured
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tolerances:
-    """How far good sensors may disagree.
-    rate : l, at which an observer is pulled to its measurement [1/s].
-    along : of v_x against the position [m/s], and ...
-    along_share : ... for each m/s of speed [-]: a wheel's radius is known to about that.
-    across : of v_y against the position [m/s].
-    heading : of r against the heading [rad/s].
-    lateral : of v_y against a_y and v_x r [m/s²].
-    steering : of δ against what was asked [rad], and ...
-    steering_time : ... for each rad/s of steering: the actuator's lag is known to about that [s].
-    calm : time of agreement after which learning goes on [s]. It doubles each time a disagreement
-        comes back within ...
-    relapse : ... this time of agreement, and to no more than this [s].
-    """
-
-    rate: float = 5.0
-    along: float = 0.2
-    along_share: float = 0.02
-    across: float = 0.15
-    heading: float = 0.02
-    lateral: float = 0.6
-    steering: float = 0.01
-    steering_time: float = 0.03
-    calm: float = 0.5
-    relapse: float = 10.0
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
+# How far good sensors may disagree.
+RATE = 5.0  # [1/s] l, at which an observer is pulled to its measurement
+ALONG = 0.2  # [m/s] of v_x against the position, and ...
+ALONG_SHARE = 0.02  # ... for each m/s of speed [-]: a wheel's radius is known to about that
+ACROSS = 0.15  # [m/s] of v_y against the position
+HEADING = 0.02  # [rad/s] of r against the heading
+LATERAL = 0.6  # [m/s²] of v_y against a_y and v_x r
+STEERING = 0.01  # [rad] of δ against what was asked, and ...
+STEERING_TIME = 0.03  # ... for each rad/s of steering [s]: the lag is known to about that
+# Time of agreement after which learning goes on [s]. It doubles each time a disagreement comes back
+# within RELAPSE of agreement, and to no more than that [s].
+CALM = 0.5
+RELAPSE = 10.0
 
 
 class Residual(NamedTuple):
@@ -74,8 +55,7 @@ class Consistency:
     """
 
     def __init__(self, dt: float) -> None:
-        self._dt, self._allowed = dt, Tolerances()
-        self._calm, self._calm_asked = math.inf, self._allowed.calm
+        self._dt, self._calm, self._calm_asked = dt, math.inf, CALM
         self._begin()
         self.agrees, self.worst = True, _NONE
 
@@ -92,20 +72,19 @@ class Consistency:
         is not known.
         """
         self.worst = self._judged(measured, asked)
-        calm, relapse = self._allowed.calm, self._allowed.relapse
         if self.worst.share > 1.0:
-            if self.agrees and self._calm < relapse:  # a channel that is bad now and then
-                self._calm_asked = min(2.0 * self._calm_asked, relapse)
+            if self.agrees and self._calm < RELAPSE:  # a channel that is bad now and then
+                self._calm_asked = min(2.0 * self._calm_asked, RELAPSE)
             self._calm = 0.0
         else:
             self._calm += self._dt
-            if self._calm >= relapse:
-                self._calm_asked = calm
+            if self._calm >= RELAPSE:
+                self._calm_asked = CALM
         self.agrees = self._calm >= self._calm_asked
         return self.agrees
 
     def _judged(self, m: Measured, asked: float | None) -> Residual:
-        allowed, pull, dt = self._allowed, self._allowed.rate, self._dt
+        dt = self._dt
         if not all(is_shown(channel, getattr(m, channel)) for channel in LARGEST_SHOWN):
             self._begin()
             return _NOT_A_NUMBER
@@ -126,7 +105,7 @@ class Consistency:
         residuals = [a - b for a, b in zip(shown, predicted, strict=True)]
         residuals[2] = math.remainder(residuals[2], math.tau)
         self._predicted = tuple(
-            x + pull * dt * e for x, e in zip(predicted, residuals, strict=True)
+            x + RATE * dt * e for x, e in zip(predicted, residuals, strict=True)
         )
         self._rates = rates
         along, across = (
@@ -137,16 +116,16 @@ class Consistency:
         if asked is not None:
             steering, turning = m.delta - asked, abs(asked - self._last_asked) / dt
             self._last_asked = asked
-        pulled = [pull * one for one in (along, across, residuals[2], residuals[3])]
+        pulled = [RATE * one for one in (along, across, residuals[2], residuals[3])]
         now = (*pulled, steering, turning)
-        self._means = tuple(a + pull * dt * (b - a) for a, b in zip(self._means, now, strict=True))
+        self._means = tuple(a + RATE * dt * (b - a) for a, b in zip(self._means, now, strict=True))
         along, across, heading, lateral, steering, turning = self._means
-        steers = allowed.steering + allowed.steering_time * turning
+        steers = STEERING + STEERING_TIME * turning
         relations = (
-            ("v_x and position", along, "m/s", allowed.along + allowed.along_share * abs(m.v_x)),
-            ("v_y, heading and position", across, "m/s", allowed.across),
-            ("yaw rate and heading", heading, "rad/s", allowed.heading),
-            ("v_y, a_y and yaw rate", lateral, "m/s²", allowed.lateral),
+            ("v_x and position", along, "m/s", ALONG + ALONG_SHARE * abs(m.v_x)),
+            ("v_y, heading and position", across, "m/s", ACROSS),
+            ("yaw rate and heading", heading, "rad/s", HEADING),
+            ("v_y, a_y and yaw rate", lateral, "m/s²", LATERAL),
             ("steering and what was asked of it", steering, "rad", steers),
         )
         found = [

@@ -9,7 +9,6 @@ difference of two samples.) The chi-square Σ (e/σ)² is -2 ln of the likelihoo
 """
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple, cast
 
@@ -19,7 +18,6 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.car import car_numbers
-from models.rules import require_positive_fields
 from models.vehicle import GRAVITY
 from mpc.tires import PredictionTire
 from mpc.tires.tire import Car, Point
@@ -125,27 +123,14 @@ def axle_scan(structure: Any, k: int) -> Scan:
     return Scan(step, carry=("lagged", "begun"), over=("sample",))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ErrorModel:
-    """What errors are expected of a good tire.
-    stretch : time over which forces are averaged [s].
-    settle : time before the first judged stretch, for the lag of the tire [s].
-    error : standard deviation [static axle loads]; 0.02 is 0.2 m/s².
-    relative_error : the same, as a share of the force [-].
-    accelerating : added to that share for each g of acceleration or braking, which shifts load
-        between the axles and takes grip [-].
-    largest : error that counts in full [standard deviations]: one fault alone proves nothing.
-    """
-
-    stretch: float = 0.12
-    settle: float = 0.1
-    error: float = 0.02
-    relative_error: float = 0.05
-    accelerating: float = 0.3
-    largest: float = 5.0
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
+# What errors are expected of a good tire.
+STRETCH = 0.12  # [s] over which forces are averaged
+SETTLE = 0.1  # [s] before the first judged stretch, for the lag of the tire
+ERROR = 0.02  # standard deviation [static axle loads]: 0.2 m/s²
+RELATIVE_ERROR = 0.05  # the same, as a share of the force [-]
+# Added to that share for each g of acceleration or braking, which shifts load and takes grip [-].
+ACCELERATING = 0.3
+LARGEST = 5.0  # error that counts in full [standard deviations]: one fault alone proves nothing
 
 
 class ChiSquare(NamedTuple):
@@ -167,16 +152,13 @@ class ChiSquare(NamedTuple):
 class Judge:
     """Chi-squares of tires over samples that come at one interval.
     dt : sampling interval [s].
-    expected : errors of a good tire; None takes the default.
     """
 
-    def __init__(self, dt: float, expected: ErrorModel | None = None) -> None:
-        self.expected = expected or ErrorModel()
+    def __init__(self, dt: float) -> None:
         self.dt = dt
-        self._h = round(self.expected.stretch / dt)
-        self._settle = round(self.expected.settle / dt)
+        self._h, self._settle = round(STRETCH / dt), round(SETTLE / dt)
         if self._h < 2:
-            raise ValueError(f"a segment of {self.expected.stretch:g} s has no three samples")
+            raise ValueError(f"a segment of {STRETCH:g} s has no three samples")
         centered = np.arange(self._h + 1) - 0.5 * self._h
         self._slope = centered / (dt * np.sum(centered**2))
         self._mean = np.full(self._h + 1, 1.0 / (self._h + 1))
@@ -198,12 +180,10 @@ class Judge:
         tire : structure and car; its weights are not read.   weights : of k tires (k, n_weights).
         """
         e, force = self._errors(tire, weights, samples)
-        expected = self.expected
         a_x = _along(samples[self._settle :, :1], self._slope) / GRAVITY
-        share = expected.relative_error + expected.accelerating * np.abs(a_x)
-        sigma = expected.error + share * np.abs(force)
-        size = np.minimum(np.abs(e) / sigma, self.expected.largest)
-        size = np.where(np.isfinite(size), size, self.expected.largest)
+        sigma = ERROR + (RELATIVE_ERROR + ACCELERATING * np.abs(a_x)) * np.abs(force)
+        size = np.minimum(np.abs(e) / sigma, LARGEST)
+        size = np.where(np.isfinite(size), size, LARGEST)
         mean = np.mean(size**2, axis=(1, 2))
         rms = np.sqrt(np.mean(e**2, axis=1))
         independent = 2.0 * (1.0 + (e.shape[1] - 1) / self._h)

@@ -2,30 +2,17 @@
 
 from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from mpc.handover.consistency import Consistency
-from mpc.handover.rules import Decision, Verdict
+from mpc.handover.rules import Verdict
 from mpc.handover.supervisor import Supervisor
 from mpc.loop.sensing import Measured
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire
 
 _HALVINGS = 6
-
-
-class _Step(NamedTuple):
-    """A move of the weights.
-
-    tire : to steer with now.   share : of the way that was left [-], 0 where nothing could move.
-    jump : of the steering rate that comes from it [rad/s].
-    """
-
-    tire: PredictionTire
-    share: float
-    jump: float
 
 
 def blended(
@@ -35,8 +22,8 @@ def blended(
     *,
     planned: Callable[[PredictionTire], float],
     most: float,
-) -> _Step:
-    """Return the next weights on the way to a target, on which the plan does not jump.
+) -> PredictionTire:
+    """Return the tire with the next weights on the way to a target; the plan does not jump on it.
 
     The share is halved until the tracker, asked what it would plan with the weights in the same
     situation, answers within the bound; where no share of the way is small enough, weights stay.
@@ -49,23 +36,14 @@ def blended(
         raise ValueError(f"weights of {now.structure} cannot move to those of {target.structure}")
     way = target.weights - now.weights
     if not np.any(way):
-        return _Step(target, 1.0, 0.0)
+        return target
     reference = planned(now)
     for _ in range(_HALVINGS):
         tire = target if share >= 1.0 else now._replace(weights=now.weights + share * way)
-        jump = abs(planned(tire) - reference)
-        if jump <= most:
-            return _Step(tire, share, jump)
+        if abs(planned(tire) - reference) <= most:
+            return tire
         share *= 0.5
-    return _Step(now, 0.0, 0.0)
-
-
-class _Moved(NamedTuple):
-    """A move of weights at a time [s]: share of the way, jump of the planned rate [rad/s]."""
-
-    t: float
-    share: float
-    jump: float
+    return now
 
 
 class Learner:
@@ -74,12 +52,11 @@ class Learner:
     Weights go to a new target within the blending time of the rules, in steps that change the
     planned steering rate by no more than they allow.
 
-    Attributes: supervisor; moves, one for each period in which weights moved or could not.
+    Attributes: supervisor.
     """
 
     def __init__(self, supervisor: Supervisor) -> None:
         self.supervisor = supervisor
-        self.moves: list[_Moved] = []
         self._sensors = Consistency(supervisor.identifier.method.dt)
         self._steered: deque[float] = deque()  # what was asked of the wheels, newest last [rad]
         self._left = 0.0  # time in which to arrive [s]
@@ -100,7 +77,9 @@ class Learner:
         )
         changed = decision is not None and decision.verdict is not Verdict.KEEP
         if decision is not None and changed:
-            self._begin(decision)
+            rules = self.supervisor.rules
+            self._quick = decision.verdict is not Verdict.LEARNT
+            self._left = rules.quick_blend if self._quick else rules.blend
         self._move(tracker)
         return f"{decision.verdict.value}: {decision.reason}" if decision and changed else None
 
@@ -117,11 +96,6 @@ class Learner:
         k = len(self._steered) - 1 - int(whole)
         return self._steered[k] + part * (self._steered[k - 1] - self._steered[k])
 
-    def _begin(self, decision: Decision) -> None:
-        rules = self.supervisor.rules
-        self._quick = decision.verdict is not Verdict.LEARNT
-        self._left = rules.quick_blend if self._quick else rules.blend
-
     def _move(self, tracker: Tracker) -> None:
         target = self.supervisor.target
         if tracker.tire is target:
@@ -129,8 +103,7 @@ class Learner:
         rules = self.supervisor.rules
         most = rules.quick_jump if self._quick else rules.jump
         share = min(1.0, tracker.period / max(self._left, tracker.period))
-        step = blended(tracker.tire, target, share, planned=tracker.previewed_rate, most=most)
-        if step.share > 0.0:
-            tracker.set_tire(step.tire)
+        tire = blended(tracker.tire, target, share, planned=tracker.previewed_rate, most=most)
+        if tire is not tracker.tire:
+            tracker.set_tire(tire)
         self._left = max(self._left - tracker.period, tracker.period)
-        self.moves.append(_Moved(self.supervisor.t, step.share, step.jump))

@@ -73,7 +73,7 @@ class Verdict(Enum):
 
 
 class Decision(NamedTuple):
-    """What was decided at a time [s] and why; chi-squares in use and of the candidate [-].
+    """What was decided at a time [s] and why.
 
     friction : of the candidate over that of the tire that it was scaled from [-]; 1 for others.
     """
@@ -81,9 +81,4 @@ class Decision(NamedTuple):
     t: float
     verdict: Verdict
     reason: str
-    in_use: float
-    candidate: float
     friction: float = 1.0
-
-    def __str__(self) -> str:
-        return f"{self.t:.2f} s: {self.verdict.value}, {self.reason}"

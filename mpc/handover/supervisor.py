@@ -91,9 +91,7 @@ class Supervisor:
     where that explains the last moments far better; it is corrected as more is seen.
 
     Attributes: target; decisions, those that changed it, and the last one.
-    judge : of chi-squares; None expects the usual errors.
-    proven : whether that tire is one of this car, so that what it does not explain is the road;
-        else a friction is looked for only after a learnt tire took over.
+    in_use : the tire to begin with, one of this car: what it does not explain is the road.
     """
 
     def __init__(
@@ -101,14 +99,19 @@ class Supervisor:
         identifier: OnlineIdentifier,
         in_use: PredictionTire,
         rules: Rules | None = None,
-        judge: Judge | None = None,
-        *,
-        proven: bool = True,
     ) -> None:
         dt = identifier.method.dt
         self.identifier, self.target = identifier, in_use
-        self.rules, self.judge = rules or Rules(), judge or Judge(dt)
-        self._require_fit_for_use(in_use)
+        self.rules, self.judge = rules or Rules(), Judge(dt)
+        complaint = law_complaint(identifier.method, identifier.vehicle)
+        if complaint is not None:
+            raise ValueError(complaint)
+        learnt = prediction_tire(identifier.model()).structure
+        if learnt != in_use.structure:
+            raise ValueError(
+                f"the identified tire ({learnt}) cannot replace the tracker's "
+                f"({in_use.structure}): begin with a tire of the identifier"
+            )
         longest = max(self.rules.seconds, self.rules.follow)
         self._window = Window(self.judge.lookback(longest), dt)
         self._excitation = Excitation(dt, identifier.vehicle, self.rules.learning_time)
@@ -117,25 +120,13 @@ class Supervisor:
         self._samples, self._dt = 0, dt
         self._sample, self._lost = (0.0, 0.0, 0.0, 0.0), 0
         self._baseline = 1.0  # mean chi-square of the tire in use
-        self._proven = proven
         self._road = Road(in_use)
         # What was steered with and what was learnt, and since when [s], to go back to.
         self._steered = [(-math.inf, in_use, self._road)]
         self._models: list[tuple[float, TireModel | None]] = [(-math.inf, identifier.start)]
         self._agreed, self._trusted_since = True, -math.inf
         self.decisions: list[Decision] = []
-        self.last = Decision(0.0, Verdict.KEEP, "no driving yet", 0.0, 0.0)
-
-    def _require_fit_for_use(self, in_use: PredictionTire) -> None:
-        complaint = law_complaint(self.identifier.method, self.identifier.vehicle)
-        if complaint is not None:
-            raise ValueError(complaint)
-        learnt = prediction_tire(self.identifier.model()).structure
-        if learnt != in_use.structure:
-            raise ValueError(
-                f"the identified tire ({learnt}) cannot replace the tracker's "
-                f"({in_use.structure}): begin with a tire of the identifier"
-            )
+        self.last = Decision(0.0, Verdict.KEEP, "no driving yet")
 
     @property
     def t(self) -> float:
@@ -207,7 +198,7 @@ class Supervisor:
         self._models = [one for one in self._models if one[0] <= before] or self._models[:1]
         _, self.target, self._road = self._steered[-1]
         self.identifier.restart(self._models[-1][1])
-        self.last = Decision(self.t, Verdict.FAULT, fault, 0.0, 0.0)
+        self.last = Decision(self.t, Verdict.FAULT, fault)
         self.decisions.append(self.last)
         return self.last
 
@@ -218,8 +209,8 @@ class Supervisor:
         relapsed = self.t - self._trusted_since < self.rules.relapse
         return min(before, self._trusted_since) if relapsed else before
 
-    def _keep(self, reason: str, in_use: float = 0.0, candidate: float = 0.0) -> Decision:
-        return Decision(self.t, Verdict.KEEP, reason, in_use, candidate)
+    def _keep(self, reason: str) -> Decision:
+        return Decision(self.t, Verdict.KEEP, reason)
 
     def _decide(self, v_x: float) -> Decision:
         rules, judge = self.rules, self.judge
@@ -227,32 +218,24 @@ class Supervisor:
             return self._keep("too few samples")
         moments = self._window.last(judge.lookback(rules.last_moments))
         now = judge.chi_square(self.target, moments)
-        if self._proven:
-            change = look_at_road(
-                self._road,
-                self.target,
-                self._window,
-                t=self.t,
-                baseline=self._baseline,
-                trusted=self._excitation.trusted_slip(self.target),
-                judge=judge,
-                rules=rules,
-            )
-            if change is not None:
-                self._road, self.target = change.road, change.tire
-                return Decision(
-                    self.t,
-                    change.verdict,
-                    change.reason,
-                    change.before,
-                    change.after,
-                    change.road.ratio,
-                )
+        change = look_at_road(
+            self._road,
+            self.target,
+            self._window,
+            t=self.t,
+            baseline=self._baseline,
+            trusted=self._excitation.trusted_slip(self.target),
+            judge=judge,
+            rules=rules,
+        )
+        if change is not None:
+            self._road, self.target = change.road, change.tire
+            return Decision(self.t, change.verdict, change.reason, change.road.ratio)
         share = rules.every / rules.baseline_time
         rise = min(now.mean, 4.0 * self._baseline) - self._baseline  # shall not follow a change
         self._baseline = max(1.0, self._baseline + share * rise)
         if self._samples % self._learnt_every:
-            return self._keep(self.last.reason, now.total)
+            return self._keep(self.last.reason)
         return self._learnt(moments, now, v_x)
 
     def _learnt(self, moments: Array, now: ChiSquare, v_x: float) -> Decision:
@@ -260,25 +243,25 @@ class Supervisor:
         seconds = min(rules.seconds, self.t - self._road.changed_at)
         samples = self._window.last(judge.lookback(seconds))
         if seconds < rules.least_seconds or len(samples) * self._dt < rules.least_seconds:
-            return self._keep("too few seconds to judge the identified tires", now.total)
+            return self._keep("too few seconds to judge the identified tires")
         try:
             model = self.identifier.model()
         except (DivergedError, CannotFreezeError, ValueError) as error:
-            return self._keep(str(error), now.total)
+            return self._keep(str(error))
         complaint = self._excitation.complaint(model, samples)
         candidate = prediction_tire(model)
         trusted = self._excitation.trusted_slip(candidate)
         complaint = complaint or tire_complaint(candidate, v_x, trusted)
         if complaint is not None:
-            return self._keep(complaint, now.total)
+            return self._keep(complaint)
         weights = np.stack([self.target.weights, candidate.weights])
         before, after = judge.chi_squares(candidate, weights, samples)
         reason = f"chi-square of {seconds:.1f} s {before.total:.0f} -> {after.total:.0f}"
         if before.total - after.total < rules.evidence * self._baseline:
-            return self._keep(f"not better: {reason}", before.total, after.total)
+            return self._keep(f"not better: {reason}")
         latest = judge.chi_square(candidate, moments)
         if latest.total > now.total + rules.correction * self._baseline:
-            return self._keep("worse in the last moments", before.total, after.total)
-        self.target, self._proven = candidate, True
+            return self._keep("worse in the last moments")
+        self.target = candidate
         self._road = self._road.on(candidate)
-        return Decision(self.t, Verdict.LEARNT, reason, before.total, after.total)
+        return Decision(self.t, Verdict.LEARNT, reason)

@@ -17,6 +17,7 @@ class Chosen(NamedTuple):
     bias_a_y: float = 0.05  # m/s²: standard deviation from one unit to the next
     bias_r: float = 0.001  # rad/s: standard deviation from one unit to the next
     ramp_time: float = 20.0  # s
+    ramp_speed: float = 20.0  # m/s
     largest_angle: float = 0.3  # rad at friction 1: beyond the peak of any tire for the road
 
 

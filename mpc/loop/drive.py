@@ -76,7 +76,8 @@ def drive(
     sensors = sensors if sensors is not None else CarSensors()
     goal = path.length * (laps if path.closed else 1.0)
     tracker.reset()
-    state = _at_the_start(path, car, profile)
+    X, Y, psi = (float(value) for value in path.pose(0.0))
+    state = car.start(float(profile.at(0.0)), X=X, Y=Y, psi=psi)
     waiting = deque([0.0] * delay)
     record = Recorder(plan_every)
     here, last_s = path.project(state.X, state.Y, 0.0), 0.0
@@ -178,12 +179,6 @@ def _located(measured: Measured, last: _Place, dt: float) -> _Place:
         for channel, time in zip(GUIDES, last.silent, strict=True)
     )
     return _Place(X, Y, psi, v_x, v_y, r, silent)
-
-
-def _at_the_start(path: Path, car: DoubleTrackCar, profile: SpeedProfile) -> CarState:
-    """Return the car on the path, along it, at the wanted speed."""
-    X, Y, psi = (float(value) for value in path.pose(0.0))
-    return car.start(float(profile.at(0.0)), X=X, Y=Y, psi=psi)
 
 
 def _ending(

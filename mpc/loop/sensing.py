@@ -256,25 +256,22 @@ class SpeedProfile:
 # per cent below the sum of what the tires could give to the side alone.
 
 
-def cornering_limit(
-    vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0, *, speed: float = 20.0
-) -> float:
+def cornering_limit(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> float:
     """Return the largest steady lateral acceleration [m/s^2].
 
     tire : of all four wheels; None reads the file named by the chassis.
     mu : friction of the road over that of the tire's measurement [-].
-    speed : at which the car is driven [m/s].
     """
-    return _steady_limit(vehicle, cast(Hashable, tire), mu, speed)
+    return _steady_limit(vehicle, cast(Hashable, tire), mu)
 
 
 @cache
-def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float, speed: float) -> float:
+def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float) -> float:
     """Drive the ramp once for each car and road: setting up a drive asks a dozen times."""
     rate = CHOSEN.largest_angle * mu / CHOSEN.ramp_time
     ramp = StepSteer(
         amplitude=CHOSEN.largest_angle * mu, rate_limit=rate, onset=0.1, duration=CHOSEN.ramp_time
     )
     plant = Plant(vehicle, cast(Tire | None, tire))
-    run = plant.simulate(ramp, speed=speed, friction=Friction(scale=mu))
+    run = plant.simulate(ramp, speed=CHOSEN.ramp_speed, friction=Friction(scale=mu))
     return float(np.abs(run.a_y).max())

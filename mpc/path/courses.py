@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from codegen.arrays import Array
+from mpc.path.chosen import CHOSEN
 from mpc.path.gates import iso_3888_1, iso_3888_2, slalom
 from mpc.path.line import Line, PathError, line_from_heading
 from mpc.path.path import Path
@@ -76,15 +77,11 @@ class Turn:
 Section: TypeAlias = Straight | Turn
 
 
-def line_along(sections: Sequence[Section], *, spacing: float = 0.25) -> Line:
-    """Put sections one after another, from the origin along X.
-    spacing : longest step of the samples [m].
-    """
-    if not (spacing > 0.0 and sections):
-        raise PathError(f"{len(sections)} sections cannot be sampled every {spacing} m")
+def line_along(sections: Sequence[Section]) -> Line:
+    """Put sections one after another, from the origin along X."""
     starts = np.append(0.0, np.cumsum([section.length for section in sections]))
     headings = np.append(0.0, np.cumsum([section.angle for section in sections]))
-    steps = max(4, math.ceil(starts[-1] / spacing - 1e-9))
+    steps = max(4, math.ceil(starts[-1] / CHOSEN.spacing - 1e-9))
     s = np.linspace(0.0, starts[-1], 4 * steps + 1)
     which = np.clip(np.searchsorted(starts, s, side="right") - 1, 0, len(sections) - 1)
     psi, kappa = np.empty_like(s), np.empty_like(s)
@@ -95,15 +92,8 @@ def line_along(sections: Sequence[Section], *, spacing: float = 0.25) -> Line:
     return line_from_heading(psi, kappa, float(starts[-1]) / steps)
 
 
-def constant_radius(
-    radius: float = 40.0,
-    *,
-    turns: float = 1.5,
-    left: bool = True,
-    run_in: float = 30.0,
-    spacing: float = 0.25,
-) -> Path:
-    """Return a straight, turns at constant radius and another straight, as in ISO 4138.
+def constant_radius(radius: float = 40.0, *, turns: float = 1.5) -> Path:
+    """Return a straight, turns to the left at constant radius and another straight, as in ISO 4138.
 
     The curvature rises and falls over a length of radius/2, at most 20 m. With more than one turn
     the path passes places again: project onto it with `near`.
@@ -112,30 +102,23 @@ def constant_radius(
     ----------
     radius : [m].
     turns : how often the car goes round [-].
-    run_in : straights before and after [m].
-    spacing : longest step of the samples [m].
     """
     if not (radius > 0.0 and turns >= 0.1 and math.isfinite(radius * turns)):
         raise PathError(f"radius must be positive and turns 0.1 at least: {radius} m, {turns}")
-    angle = math.copysign(2.0 * math.pi * turns, 1.0 if left else -1.0)
-    turn = Turn(radius=radius, angle=angle, easing=min(0.5 * radius, 20.0))
-    straight = Straight(length=run_in)
-    line = line_along([straight, turn, straight], spacing=spacing)
-    center = run_in + 0.5 * turn.easing, math.copysign(radius, angle)
+    turn = Turn(radius=radius, angle=2.0 * math.pi * turns, easing=min(0.5 * radius, 20.0))
+    straight = Straight(length=30.0)
+    line = line_along([straight, turn, straight])
+    center = straight.length + 0.5 * turn.easing, radius
     around = np.linspace(0.0, 2.0 * math.pi, 24, endpoint=False)
     ring = np.column_stack((np.cos(around), np.sin(around))) * (0.9 * radius) + center
     return Path.from_line(line, name=f"circle of {radius:g} m", cones=ring)
 
 
-def handling_course(*, spacing: float = 0.25) -> Path:
+def handling_course() -> Path:
     """Return a closed course, 802 m a lap, driven counter-clockwise.
 
     Seven left and three right turns of 12 to 60 m; the hairpin to the right runs 25 m beside its
     own entrance, and the turns into and out of it have 30 and 18 m. It starts on a straight.
-
-    Parameters
-    ----------
-    spacing : longest step of the samples [m].
 
     Examples
     --------
@@ -163,7 +146,7 @@ def handling_course(*, spacing: float = 0.25) -> Path:
         Straight(length=21.593884724428456),
         Turn(radius=25.0, angle=radians(130.0), easing=10.0),
     ]
-    line = line_along(sections, spacing=spacing)
+    line = line_along(sections)
     path = Path.from_line(line, name="handling course", closed=True)
     return Path.from_line(line, name=path.name, closed=True, cones=_pairs_beside(path))
 

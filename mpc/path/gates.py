@@ -17,7 +17,6 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from codegen.arrays import Array
-from models.rules import require_positive
 from mpc.path.chosen import CHOSEN
 from mpc.path.line import Line, PathError
 from mpc.path.path import Path
@@ -64,20 +63,17 @@ def line_through_gates(
     end: tuple[float, float],
     clearance: float,
     easing: float,
-    spacing: float = 0.25,
 ) -> Line:
     """Find the line of smallest peak curvature; it starts and ends along x without curvature.
     start : x, y of the first point [m].   end : x, y of the last point [m].
     clearance : smallest distance from the rows of cones, as half the width of the car [m].
     easing : length over which the curvature may rise from zero to its peak [m].
-    spacing : longest step of the samples [m].
     """
-    require_positive(PathError, **{"gates: clearance": clearance, "gates: spacing": spacing})
     for gate in gates:
         if gate.left - gate.right < 2.0 * clearance:
             raise PathError(f"gates: {gate} is too narrow for a clearance of {clearance} m")
     spline, inner = _straightest(tuple(gates), start, end, clearance, easing)
-    return sample(spline, inner, spacing, "gates")
+    return sample(spline, inner, CHOSEN.spacing, "gates")
 
 
 @lru_cache(maxsize=16)
@@ -159,23 +155,13 @@ def _basis(t: Array, x: Array, order: int) -> Any:
 # ours is the one of smallest peak curvature, see the gates above.
 
 
-def iso_3888_1(
-    *,
-    car_width: float = CHOSEN.car_width,
-    margin: float = 0.05,
-    run_in: float = 40.0,
-    run_out: float = 40.0,
-    spacing: float = 0.25,
-) -> Path:
+def iso_3888_1(*, car_width: float = CHOSEN.car_width) -> Path:
     """Return the double lane change of ISO 3888-1, 125 m between the first and the last cones.
 
     Parameters
     ----------
-    car_width : width of the car without mirrors [m]; the lanes grow with it.
-    margin : room between the side of the car and the cones, on top of half its width [m].
-    run_in : lane before the first cones [m].
-    run_out : lane after the last cones [m].
-    spacing : longest step of the samples [m].
+    car_width : width of the car without mirrors [m]; the lanes grow with it. The car keeps 5 cm
+        from the cones, and begins and ends 40 m from them.
     """
     first, middle, last = (share * _checked(car_width) + 0.25 for share in (1.1, 1.2, 1.3))
     right = -0.5 * first
@@ -184,18 +170,10 @@ def iso_3888_1(
         Gate(start=45.0, end=70.0, right=right + 3.5, left=right + 3.5 + middle),
         Gate(start=95.0, end=125.0, right=right, left=right + last),
     )
-    half, runs = 0.5 * car_width + margin, (run_in, run_out)
-    return _path("ISO 3888-1", gates, half, 10.0, runs, spacing, lanes=True)
+    return _path("ISO 3888-1", gates, 0.5 * car_width + CHOSEN.lane_margin, 10.0, lanes=True)
 
 
-def iso_3888_2(
-    *,
-    car_width: float = CHOSEN.car_width,
-    margin: float = 0.05,
-    run_in: float = 40.0,
-    run_out: float = 40.0,
-    spacing: float = 0.25,
-) -> Path:
+def iso_3888_2(*, car_width: float = CHOSEN.car_width) -> Path:
     """Return the obstacle avoidance of ISO 3888-2, 61 m between the first and the last cones.
 
     Arguments are those of `iso_3888_1`.
@@ -215,8 +193,7 @@ def iso_3888_2(
         Gate(start=25.5, end=36.5, right=side, left=side + middle),
         Gate(start=49.0, end=61.0, right=right, left=right + last),
     )
-    half, runs = 0.5 * car_width + margin, (run_in, run_out)
-    return _path("ISO 3888-2", gates, half, 6.0, runs, spacing, lanes=True)
+    return _path("ISO 3888-2", gates, 0.5 * car_width + CHOSEN.lane_margin, 6.0, lanes=True)
 
 
 def _checked(car_width: float) -> float:
@@ -232,16 +209,11 @@ def _path(
     gates: Sequence[Gate],
     clearance: float,
     easing: float,
-    runs: tuple[float, float],
-    spacing: float,
     *,
     lanes: bool = False,
 ) -> Path:
     """Drive through the gates; where they are lanes, the car keeps them before and after."""
-    for what, value in zip(("run_in", "run_out"), runs, strict=True):
-        if not 5.0 <= value <= 1000.0:
-            raise PathError(f"{what} must be 5 to 1000 m, it is {value}")
-    begin, finish = gates[0].start - runs[0], gates[-1].end + runs[1]
+    begin, finish = gates[0].start - CHOSEN.run, gates[-1].end + CHOSEN.run
     line = line_through_gates(
         [replace(gates[0], start=begin), *gates[1:-1], replace(gates[-1], end=finish)]
         if lanes
@@ -250,21 +222,11 @@ def _path(
         end=(finish, 0.0),
         clearance=clearance,
         easing=easing,
-        spacing=spacing,
     )
     return Path.from_line(line, name=name, cones=np.vstack([gate.cones() for gate in gates]))
 
 
-def slalom(
-    *,
-    gap: float = 18.0,
-    cones: int = 8,
-    car_width: float = 1.8,
-    margin: float = 0.3,
-    run_in: float = 40.0,
-    run_out: float = 40.0,
-    spacing: float = 0.25,
-) -> Path:
+def slalom(*, gap: float = 18.0, cones: int = 8) -> Path:
     """Return the line of smallest peak curvature around the cones, the first of them at the origin.
 
     The car passes the first cone on its left side, y > 0, and ends on the line that it came from.
@@ -272,18 +234,11 @@ def slalom(
     Parameters
     ----------
     gap : distance of the cones [m].
-    car_width : width of the car without mirrors [m].
-    margin : room between the side of the car and the cones [m].
-    run_in : way before the first cone [m].
-    run_out : way after the last cone [m].
-    spacing : longest step of the samples [m].
     """
     if not (cones >= 1 and gap >= 5.0 and math.isfinite(gap)):
         raise PathError(f"a slalom needs a cone and 5 m between them, got {cones} and {gap} m")
-    if not (car_width > 0.0 and margin >= 0.0):
-        raise PathError(f"car_width and margin must be positive, they are {car_width}, {margin}")
     sides = (0.0, math.inf), (-math.inf, 0.0)  # right and left of the gates in turn
     places = [(i * gap, *sides[i % 2]) for i in range(cones)]
     gates = [Gate(start=x, end=x, right=right, left=left) for x, right, left in places]
-    half, runs = 0.5 * car_width + margin, (run_in, run_out)
-    return _path("slalom", gates, half, CHOSEN.easing, runs, spacing)
+    half = 0.5 * CHOSEN.car_width + CHOSEN.slalom_margin
+    return _path("slalom", gates, half, CHOSEN.easing)

@@ -43,23 +43,20 @@ def uniform_grid(length: float, spacing: float) -> Array:
     return np.linspace(0.0, length, int(np.ceil(length / spacing - 1e-9)) + 1)
 
 
-def line_from_heading(
-    psi: Array, kappa: Array, spacing: float, start: tuple[float, float] = (0.0, 0.0)
-) -> Line:
-    """Integrate a heading that was sampled four times as fine as the line will be.
+def line_from_heading(psi: Array, kappa: Array, spacing: float) -> Line:
+    """Integrate from the origin a heading that was sampled four times as fine as the line will be.
 
     X and Y by Boole's rule, whose error is of order spacing^6.
     psi : heading [rad], (4 n + 1,), at steps of spacing/4.
     kappa : dψ/ds at the same places [1/m], (4 n + 1,).   spacing : step of the line [m].
-    start : X, Y of the first sample [m].
     """
     if psi.shape != kappa.shape or psi.size % 4 != 1 or psi.size < 5:
         raise PathError(f"psi and kappa must have 4 n + 1 samples, they have {psi.size}")
     boole = np.array([7.0, 32.0, 12.0, 32.0, 7.0]) * spacing / 90.0
     place: list[Array] = []
-    for origin, slope in zip(start, (np.cos(psi), np.sin(psi)), strict=True):
+    for slope in (np.cos(psi), np.sin(psi)):
         steps = np.lib.stride_tricks.sliding_window_view(slope, 5)[::4] @ boole
-        place.append(np.asarray(origin + np.append(0.0, np.cumsum(steps)), dtype=np.float64))
+        place.append(np.append(0.0, np.cumsum(steps)))
     s = np.linspace(0.0, spacing * (place[0].size - 1), place[0].size)
     return Line(s, place[0], place[1], psi[::4], kappa[::4])
 

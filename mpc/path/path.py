@@ -159,10 +159,9 @@ class Path:
         closed: bool = False,
         name: str = "way-points",
         spacing: float = 0.25,
-        smoothing: float = 0.0,
         minimum_radius: float = 3.0,
     ) -> Self:
-        """Draw a spline with continuous curvature through way-points, or close by them.
+        """Draw a spline with continuous curvature through way-points.
 
         Parameters
         ----------
@@ -170,8 +169,6 @@ class Path:
         Y : of the way-points [m], (k,).
         closed : whether the last way-point leads back to the first; that may be repeated.
         spacing : longest step of the samples [m].
-        smoothing : root mean square distance that the path may keep from the way-points [m]; 0
-            passes through them all. Points that were measured need about their noise.
         minimum_radius : tightest turn allowed [m].
 
         Raises
@@ -181,33 +178,21 @@ class Path:
             path turns tighter than minimum_radius.
         """
         line = line_through(
-            X, Y, closed=closed, name=name, spacing=spacing, smoothing=smoothing,
-            minimum_radius=minimum_radius,
+            X, Y, closed=closed, name=name, spacing=spacing, minimum_radius=minimum_radius
         )  # fmt: skip
         return cls.from_line(line, name=name, closed=closed)
 
     @classmethod
-    def from_csv(
-        cls,
-        file: FilePath | str,
-        *,
-        closed: bool | None = None,
-        spacing: float = 0.25,
-        smoothing: float = 0.0,
-        minimum_radius: float = 3.0,
-    ) -> Self:
-        """Read way-points from a CSV with columns X_m, Y_m or x, y [m]; others are ignored.
+    def from_csv(cls, file: FilePath | str, *, closed: bool | None = None) -> Self:
+        """Read way-points from a table with columns X_m, Y_m or x, y [m]; others are ignored.
 
         The name of the path is that of the file without folder and ending.
 
         Parameters
         ----------
-        file : CSV with a header, which may start with "#".
+        file : CSV with a header, or another format of logs.
         closed : as for way-points; None: closed where the last point is no farther from the first
             than 1.5 median gaps between neighbors.
-        spacing : longest step of the samples [m].
-        smoothing : root mean square distance that the path may keep from the way-points [m].
-        minimum_radius : tightest turn allowed [m].
 
         Raises
         ------
@@ -220,9 +205,6 @@ class Path:
             waypoints.Y,
             closed=waypoints.seems_closed() if closed is None else closed,
             name=str(file),
-            spacing=spacing,
-            smoothing=smoothing,
-            minimum_radius=minimum_radius,
         )
         return replace(path, name=FilePath(file).stem)
 
@@ -289,9 +271,7 @@ class Path:
         at = s % self.length if self.closed else s
         return np.asarray(np.interp(at, self.s, np.asarray(values, dtype=np.float64)))
 
-    def project(
-        self, X: float, Y: float, near: float | None = None, *, search_distance: float = 10.0
-    ) -> Projection:
+    def project(self, X: float, Y: float, near: float | None = None) -> Projection:
         """Return the point of the path that a car is at.
 
         Parameters
@@ -299,13 +279,12 @@ class Path:
         X : of the car [m].
         Y : of the car [m].
         near : s of the last projection [m], laps included: the search follows the path from there
-            and does not jump to another leg. None: the nearest point of the whole path.
-        search_distance : how far from `near` to look [m].
+            at most 10 m, and does not jump to another leg. None: the nearest point of the path.
         """
         if not (math.isfinite(X) and math.isfinite(Y) and math.isfinite(near or 0.0)):
             raise PathError(f"{self.name}: cannot project X = {X}, Y = {Y}, near = {near}")
         if near is not None:
-            return _walk_to_foot(self._point, X, Y, near, search_distance)
+            return _walk_to_foot(self._point, X, Y, near, CHOSEN.search_distance)
         nearest = int(np.argmin((self.X - X) ** 2 + (self.Y - Y) ** 2))
         start = float(self.s[nearest])
         if nearest in (0, self.s.size - 1) and not self.closed:  # perhaps far beyond an end

@@ -4,80 +4,19 @@ The spline runs over its own arc length, found by fitting again over the length 
 that way-points need no equal gaps. Open ends are natural: κ = 0, as on the straight beyond them.
 """
 
-import csv
-import io
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.sparse as sparse
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
-from scipy.sparse.linalg import splu
 
 from codegen.arrays import Array
-from codegen.escape import shown
-from models.schema import limits, read_text, require_few
+from models.logs.door import open_log
+from models.logs.log import RecordingError
+from models.schema import require_few
 from mpc.path.chosen import CHOSEN
 from mpc.path.line import Line, PathError, uniform_grid
-
-
-def _smoothed(points: Array, *, closed: bool, distance: float, name: str) -> Array:
-    """Move way-points that were measured a little, so that a line through them bends gently.
-
-    Minimizes Σ |p - q|² + λ Σ g |D³ p|², D³ the third divided difference over the chord length:
-    what it leaves alone is a path of constant bending. λ is as large as the distance permits.
-    points : X, Y [m], (k, 2); where closed, the last repeats the first and will again.
-    distance : root mean square of how far they may move [m].
-    """
-    if len(points) < 4 + closed:
-        return points
-    roughness = _roughness(points, closed)
-    q = points[:-1] if closed else points
-    if closed and (size := _apart(q, q.mean(axis=0))) <= distance:
-        raise PathError(
-            f"{name}: smoothing must be less than {size:.3g} m, at which the closed line shrinks "
-            f"to a point, it is {distance}"
-        )
-    one = sparse.identity(len(q), format="csc")
-    gap = float(np.mean(np.hypot(*np.diff(points, axis=0).T)))
-
-    def moved(exponent: float) -> Array:
-        far = np.full_like(q, np.inf)
-        try:
-            p = np.asarray(splu(one + 10.0**exponent * gap**6 * roughness).solve(q))
-        except RuntimeError:  # singular
-            return far
-        # The mean stays where it is, but for rounding where λ is too large to be solved for.
-        return p if np.abs(np.mean(p - q, axis=0)).max() < 1e-3 * min(gap, distance) else far
-
-    low, high = CHOSEN.least, CHOSEN.most
-    for _ in range(CHOSEN.halvings):  # the distance grows with λ
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if _apart(moved(middle), q) < distance else (low, middle)
-    p = moved(low)
-    return np.vstack((p, p[:1])) if closed else p
-
-
-def _apart(p: Array, q: Array) -> float:
-    """Return the root mean square distance of points (k, 2) [m]."""
-    return float(np.sqrt(np.mean(np.sum((p - q) ** 2, axis=1))))
-
-
-def _roughness(points: Array, closed: bool) -> Any:
-    """Return D' G D of the third divided differences D, weighted by the gaps G."""
-    gaps = np.hypot(*np.diff(points, axis=0).T)
-    if not closed:
-        gaps = np.append(gaps, np.inf)  # differences across the open ends become zero
-    n = gaps.size
-    D: Any = sparse.identity(n, format="csr")
-    around = sparse.csr_matrix((np.ones(n), (np.arange(n), (np.arange(n) + 1) % n)), (n, n))
-    span = np.zeros(n)
-    for order in range(3):
-        span = span + np.roll(gaps, -order)
-        D = sparse.diags(1.0 / span) @ (around @ D - D)
-    return (D.T @ sparse.diags(np.where(np.isfinite(span), span, 0.0) / 3.0) @ D).tocsc()
-
 
 _LOBES, _SHARES = np.polynomial.legendre.leggauss(8)  # nodes on -1 to 1, and weights
 
@@ -104,22 +43,16 @@ def line_through(
     closed: bool,
     name: str,
     spacing: float,
-    smoothing: float,
     minimum_radius: float,
 ) -> Line:
     """Draw the line; the arguments and errors are those of `Path.from_waypoints`.
     X : of the way-points [m], (k,).   Y : of the way-points [m], (k,).
     spacing : longest step of the samples [m].
-    smoothing : root mean square distance that the line may keep from the way-points [m].
     minimum_radius : tightest turn allowed [m].
     """
     if not minimum_radius > 0.0:
         raise PathError(f"{name}: minimum_radius must be positive, it is {minimum_radius}")
     points = _checked(X, Y, closed, name)
-    if not (smoothing >= 0.0 and np.isfinite(smoothing)):
-        raise PathError(f"{name}: smoothing must be finite and not negative, it is {smoothing}")
-    if smoothing > 0.0:
-        points = _smoothed(points, closed=closed, distance=smoothing, name=name)
     spline = _fit(points, closed)
     line = sample(spline, spline.x, spacing, name)
     # A spike between two samples shows in the heading alone.
@@ -130,7 +63,7 @@ def line_through(
         raise PathError(
             f"{name}: no turn may be tighter than {minimum_radius} m, at s = "
             f"{line.s[tightest]:.4g} m, X = {line.X[tightest]:.4g}, Y = {line.Y[tightest]:.4g} "
-            f"the radius is {1.0 / bend[tightest]:.3g} m; smooth or move the way-points"
+            f"the radius is {1.0 / bend[tightest]:.3g} m; move the way-points"
         )
     return line
 
@@ -230,89 +163,30 @@ def _fit(points: Array, closed: bool) -> Any:
     return spline
 
 
-_X_NAMES, _Y_NAMES = ("x_m", "x", "x [m]"), ("y_m", "y", "y [m]")
-# Read way-points from a CSV with a header: X_m, Y_m or x, y, in meters.
-
-_ON_THE_GLOBE = {"lat", "latitude", "lon", "lng", "longitude"}
-
-
 def read_waypoints(file: Path) -> _Waypoints:
-    """Read X and Y [m]; other columns, and lines that start with "#" below the header, are ignored.
-    file : the CSV; names in its header may be of either case, and the header may start with "#".
+    """Read X and Y [m] from the columns X_m, Y_m or x, y of a table; other columns are ignored.
+    file : in any format of logs; a row is a way-point, and the time is not looked at.
     """
-    rows = _rows(file)
-    header = [cell.strip().lstrip("#").strip() for cell in rows[0][1]]
-    require_few(PathError, str(file), len(header), "columns", "columns")
-    points = [(line, cells) for line, cells in rows[1:] if not cells[0].lstrip().startswith("#")]
-    if not points:
-        raise PathError(f"{file}: there is a header but no way-point")
-    columns = []
-    for axis, names in (("X", _X_NAMES), ("Y", _Y_NAMES)):
-        column = _find(file, axis, names, header)
-        columns.append(_numbers(file, header[column], column, points))
-    return _Waypoints(*columns)
-
-
-def _rows(file: Path) -> list[tuple[int, list[str]]]:
-    """Return the cells of every line that has some, with its number."""
-    if not file.exists():
-        raise PathError(f"{file}: there is no such file")
     try:
-        text = read_text(file, PathError, encoding="utf-8-sig")
-    except OSError as error:
-        raise PathError(f"{file}: cannot be read ({error.strerror})") from None
-    reader = csv.reader(io.StringIO(text, newline=""))
-    rows, most = [], limits().path
-    try:
-        for cells in reader:
-            if any(map(str.strip, cells)):
-                rows.append((reader.line_num, cells))
-            if len(rows) > most:
-                require_few(PathError, str(file), len(rows), "path", "rows")
-    except csv.Error as error:
-        raise PathError(f"{file}: line {reader.line_num} is not CSV ({error})") from None
-    if not rows:
-        raise PathError(f"{file}: is empty")
-    return rows
+        log = open_log(file, rate=1.0)
+        names = [one.name for one in log.listed()]
+        columns = log.read([_column(file, axis, names) for axis in ("x", "y")])
+    except RecordingError as error:
+        raise PathError(str(error)) from None
+    for one in columns:
+        require_few(PathError, str(file), one.values.size, "path", "rows")
+        if (bad := np.flatnonzero(~np.isfinite(one.values))).size:
+            place = f"{one.place} {one.rows[bad[0]]}"
+            raise PathError(f"{file}: {one.name} must be a finite number, {place} has none")
+    return _Waypoints(*(one.values for one in columns))
 
 
-def _find(file: Path, axis: str, names: tuple[str, ...], header: list[str]) -> int:
-    found = [k for k, name in enumerate(header) if name.lower() in names]
-    if len(found) == 1:
-        return found[0]
-    listing = ", ".join(header)[:120]
-    if found:
-        raise PathError(f"{file}: column {axis} must be there once, found {listing!r}")
-    if len(header) == 1 and (";" in listing or "\t" in listing):
-        raise PathError(f"{file}: cells must be separated by commas, found {listing!r}")
-    lower = {name.lower() for name in header}
-    hint = ""
-    if lower & _ON_THE_GLOBE:
-        hint = "; convert latitude and longitude to meters in a plane"
-    elif unit := [name for name in header if name.lower().startswith(f"{axis.lower()}_")]:
-        hint = f"; {unit[0]} is not in meters, convert and rename it"
-    elif all(_is_number(name) for name in header):
-        hint = "; the first line must name the columns"
-    raise PathError(
-        f"{file}: column {axis}_m (or {axis.lower()}) is missing, found {listing!r}{hint}"
-    )
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except ValueError:
-        return False
-    return "_" not in cell  # which Python takes for a mark between digits
-
-
-def _numbers(file: Path, name: str, column: int, points: list[tuple[int, list[str]]]) -> Array:
-    values = []
-    for line, cells in points:
-        cell = cells[column].strip() if column < len(cells) else ""
-        if not (_is_number(cell) and np.isfinite(float(cell))):
-            raise PathError(
-                f"{file}: {name} must be a finite number, line {line} has {shown(cell)}"
-            )
-        values.append(float(cell))
-    return np.array(values)
+def _column(file: Path, axis: str, names: list[str]) -> str:
+    """Return the one column of an axis."""
+    found = [name for name in names if name.lower() in (f"{axis}_m", axis, f"{axis} [m]")]
+    if len(found) != 1:
+        listing = ", ".join(names)[:120]
+        raise PathError(
+            f"{file}: one column must be {axis.upper()}_m or {axis}, in meters, found {listing!r}"
+        )
+    return found[0]

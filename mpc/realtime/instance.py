@@ -223,10 +223,6 @@ class Instance:
         self.start[:] = x0
         self._library.mpc_guess(*self._step[:2], *self.solve_arguments[3:])
 
-    def late(self, steering: float) -> None:
-        """Say that the last command came too late.   steering : what was steered instead [rad]."""
-        self._library.mpc_late(self._step[0], self._real(steering))
-
     def reset(self, steering: float) -> Status:
         """Begin anew, with the faults kept.   steering : angle of the wheels [rad]."""
         return Status(self._library.mpc_reset(*self._step[:2], self._real(steering)))

@@ -26,7 +26,6 @@ class Tracker:
     period : between two steps [s], at most the stage's length.
     delay : from a measurement until its command acts on the wheels [s], lags included.
     guards : what is possible, and the fall-back; None takes the default.
-    budget : time of a step [s] beyond which it is late: then the plan before it steers.
     tolerance : of the solver, in parts: mean product of gap and multiplier against the largest
         multiplier, where gaps count limits as 1; None takes 1e-8, in float 1e-5.
     linearizations : a step; 1 in real time, some 10 to convergence.
@@ -45,7 +44,6 @@ class Tracker:
         period: float = 0.01,
         delay: float = 0.0,
         guards: Guards | None = None,
-        budget: float | None = None,
         tolerance: float | None = None,
         max_iterations: int = 40,
         linearizations: int = 1,
@@ -73,7 +71,7 @@ class Tracker:
         self.tire, self.problem, self.period, self.delay = tire, problem, period, delay
         require_within(ValueError, 0.0, 1.0, caution=caution)
         self.caution = caution
-        self._budget, self._clock = budget, clock
+        self._clock = clock
         self.instance = Instance(tire.structure, problem.horizon, single=single)
         self._preview: Instance | None = None  # what would be planned with another tire
         params = self.instance.params
@@ -190,19 +188,6 @@ class Tracker:
         instance, ports = self.instance, self.instance.input
         ports["e_y"], ports["e_psi"], ports["v_y"], ports["r"] = measurement[:4]
         ports["kappa"], ports["v_x"] = measurement[4:6]
-        instead = self._planned_steering() if self._budget is not None else 0.0
         start = self._clock()
         status = instance.step()
-        elapsed = self._clock() - start
-        steering = float(instance.steering)
-        if self._budget is not None and elapsed > self._budget:
-            instance.late(instead)
-            status, steering = int(Status.LATE), instead
-        return instance.command(steering, status, elapsed)
-
-    def _planned_steering(self) -> float:
-        """Return the steering that the plan says for the next step [rad]."""
-        state, limit = self.instance.state, self.problem.limits.steering
-        share, (u, u_next) = self.period / self.problem.dt, state["u"][:2]
-        planned = float(state["commands"][0] + self.period * (u + share * (u_next - u)))
-        return min(max(planned, -limit), limit)
+        return instance.command(float(instance.steering), status, self._clock() - start)

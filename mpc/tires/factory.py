@@ -6,17 +6,16 @@ from typing import Any
 import numpy as np
 
 from identifier.axle.model import AxleModel
-from identifier.baselines.curves import CurveModel
+from identifier.baselines.linear import LinearModel
 from identifier.estimate.model import FittedModel
-from identifier.own_network import OnnxModel
 from identifier.paper.network import NetworkModel
 from identifier.tire_model import TireModel
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import Vehicle
 from mpc.tires.axles import axle_tire, fit_tire
-from mpc.tires.curves import LaggedAxles, MagicAxles, linear_tire
+from mpc.tires.curves import linear_tire
 from mpc.tires.ladder import mounted_tire
-from mpc.tires.network import network_tire, onnx_tire
+from mpc.tires.network import network_tire
 from mpc.tires.tire import PredictionTire
 
 
@@ -31,7 +30,10 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
         return source if vehicle is None else source._replace(vehicle=vehicle)
     if isinstance(source, Vehicle):
         return linear_tire(source if vehicle is None else vehicle, np.array(source.bicycle[4:]))
-    if isinstance(source, TireModel) and source.kind in MODELS:
+    if isinstance(source, TireModel):
+        if source.kind not in MODELS:
+            name = type(source).__name__
+            raise ValueError(f"the tracker takes no {name}: identify with fit, axle or integral")
         return prediction_tire(MODELS[source.kind](source), vehicle)
     for kind, of_tire in TIRES.items():
         if isinstance(source, kind):
@@ -41,32 +43,13 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
     raise TypeError(f"no prediction tire can be made of {type(source).__name__}")
 
 
-def _curve_tire(model: CurveModel) -> PredictionTire:
-    plain = _plain_curve(model)
-    if not (model.lagged or model.offset.any()):
-        return plain
-    weights = np.concatenate([plain.weights, model.relaxation_length, model.offset])
-    structure = LaggedAxles(curve=plain.structure, lagged=model.lagged)
-    return PredictionTire(structure, weights, model.vehicle)
-
-
-def _plain_curve(model: CurveModel) -> PredictionTire:
-    q = model.parameters
-    if model.curve == "linear":
-        return linear_tire(model.vehicle, q[:, 0])
-    if model.curve == "magic_formula":
-        return PredictionTire(MagicAxles(), q.ravel(), model.vehicle)
-    wheels = [DugoffTire(C_alpha=C / 2, C_kappa=C / 2, friction=friction) for C, friction in q]
-    return mounted_tire(model.vehicle, *wheels)
-
-
 def _linear(vehicle: Vehicle, tire: LinearTire) -> PredictionTire:
     return linear_tire(vehicle, np.full(2, 2.0 * tire.C_alpha))
 
 
 MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {
     NetworkModel.kind: network_tire, AxleModel.kind: axle_tire, FittedModel.kind: fit_tire,
-    CurveModel.kind: _curve_tire, OnnxModel.kind: onnx_tire,
+    LinearModel.kind: lambda model: linear_tire(model.vehicle),
 }  # fmt: skip
 TIRES: Mapping[type, Callable[[Vehicle, Any], PredictionTire]] = {
     LinearTire: _linear,

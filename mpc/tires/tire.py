@@ -171,12 +171,12 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
     return ValidSlip(slip, np.maximum(np.maximum(there, CHOSEN.least_rise * slopes[:, 0]), 0.0))
 
 
-def curves_at(tire: PredictionTire, slip: Array) -> Array:
-    """Return the axle forces at slips, straight ahead, (2, k) [N].
-    slip : of both axles [rad], (k,).
+def curves_at(tire: PredictionTire, slip: Array, v_x: float = CHOSEN.speed) -> Array:
+    """Return the axle forces at slips, of a car that slides sideways without yawing, (2, k) [N].
+    slip : of both axles [rad], (k,).   v_x : speed [m/s].
     """
     x = ca.SX.sym("slip")
-    at = Point(0.0, 0.0, 0.0, CHOSEN.speed, Car(*tire.car), ca.SX(tire.weights))
+    at = Point(-v_x * ca.tan(x), 0.0, 0.0, v_x, Car(*tire.car), ca.SX(tire.weights))
     force = ca.densify(ca.vertcat(*tire.structure.force((x, x), at)))
     return np.array(ca.Function("curves", [x], [force])(slip[None]))
 

@@ -69,6 +69,7 @@ def cost_of(tire, x, u, kappa, v_x):
     return total
 
 
+@pytest.mark.sweep("linear-*", "lagging curve-angle*")
 @pytest.mark.parametrize("case", CASES)
 def test_iterated_to_the_end_the_tracker_finds_what_ipopt_finds(tire, tracker, case):
     kappa, v_x = road(*CASES[case][1:])

@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+import pytest
+
 from tests.sources import nodes_of, tree_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -13,7 +15,6 @@ Name = tuple[str, str]  # module, name in it
 
 # Formulas that a benchmark checks against another road; no number of a user comes from them.
 CHECKED = {
-    ("identifier.compare.work", "spread"),  # beside the processes of `compare` and of a cluster
     ("tireid.commands.demo_parts", "drive_story"),  # `demo` calls it by its module
     ("models.recordings.reader", "runs"),  # of the library, for a user's own loop over them
 }
@@ -90,6 +91,7 @@ def only_in_benchmarks(root: Path) -> set[Name]:
     }
 
 
+@pytest.mark.heavy
 def test_benchmarks_call_what_the_product_calls():
     assert only_in_benchmarks(ROOT) <= CHECKED
 

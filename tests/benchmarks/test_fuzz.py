@@ -117,6 +117,12 @@ def test_nothing_is_found_behind_a_door_that_is_sound(session):
     assert kinds(session) == []
 
 
+@pytest.mark.heavy
+def test_doors_open_to_right_files(tmp_path):
+    assert Session.begin(tmp_path, [door for door in DOORS if "axle" in door.name]).seeds
+
+
+@pytest.mark.sweep("nulls", "overwrites", "key_error")
 @pytest.mark.parametrize("fault", PLANTED, ids=lambda fault: fault.__name__)
 def test_what_is_planted_behind_a_door_is_found(session, monkeypatch, fault):
     monkeypatch.setattr(tireid.commands.check, "run", fault)
@@ -136,6 +142,7 @@ def test_a_car_may_be_called_nan(session, monkeypatch):
     assert kinds(session) == []
 
 
+@pytest.mark.heavy
 def test_a_command_that_tells_how_far_it_came_does_not_hang(session, monkeypatch):
     def works(options):
         while True:
@@ -159,6 +166,7 @@ def test_an_axle_that_does_not_push_is_found(session, monkeypatch):
     assert kinds(session) == []
 
 
+@pytest.mark.heavy
 def test_a_door_without_a_check_is_found_by_mutations(session, monkeypatch):
     """A reader that takes what the file says, as it would be without its schema."""
     import tomllib
@@ -195,6 +203,7 @@ def test_a_case_is_the_same_whenever_it_is_drawn(session, tmp_path):
     assert len(set(laid[0][1])) > 15  # and it is another one each time
 
 
+@pytest.mark.sweep("parquet")
 @pytest.mark.parametrize("ending", MUTATORS)
 def test_a_mutator_takes_whatever_an_earlier_one_made(ending):
     for number in range(300):

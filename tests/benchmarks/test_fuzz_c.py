@@ -25,6 +25,7 @@ def package_of():
     return package
 
 
+@pytest.mark.heavy
 @needs_fuzzer
 @pytest.mark.parametrize("name", NAMES)
 def test_nothing_is_found(name, package_of, tmp_path):
@@ -36,6 +37,7 @@ def test_nothing_is_found(name, package_of, tmp_path):
     assert sum(outcome.statuses[2:]) > steps / 50  # and there are refusals
 
 
+@pytest.mark.heavy
 @needs_fuzzer
 @pytest.mark.parametrize(
     ("name", "file", "pattern", "replacement", "complaint"),

@@ -179,6 +179,7 @@ def test_c_that_reads_the_same_is_no_fault():
     assert changes_tokens(b"x = 1;", b"x = 2;")
 
 
+@pytest.mark.heavy
 def test_drawing_is_deterministic_and_covers_every_package_and_its_c():
     faults = draw(ROOT, seed=7, count=60)
     again = draw(ROOT, seed=7, count=60)
@@ -243,6 +244,7 @@ def fault_at(root: Path, old: str, new: str) -> Fault:
     return written_fault({"name": "toy", "file": "models/toy.py", "old": old, "new": new}, root)
 
 
+@pytest.mark.heavy
 def test_a_fault_is_caught_where_a_test_looks_and_survives_where_none_does(toy):
     root, shop, traced = toy
     caught, asked = plant(shop, traced, fault_at(root, "width * height", "width + height"), 0)
@@ -254,6 +256,7 @@ def test_a_fault_is_caught_where_a_test_looks_and_survives_where_none_does(toy):
     assert (root / "models" / "toy.py").read_text() == TOY, "the checkout was not touched"
 
 
+@pytest.mark.heavy
 def test_a_fault_that_never_ends_is_caught_by_time(toy, monkeypatch):
     root, shop, traced = toy
     monkeypatch.setattr("benchmarks.mutation.workshop.START", 3.0)

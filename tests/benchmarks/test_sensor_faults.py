@@ -30,6 +30,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.sweep("biased", "refused")
 @pytest.mark.parametrize("name", FAULTS)
 def test_the_compiled_run_is_that_of_a_car_sample_by_sample(drive, name):
     """Beside a car samples that are no numbers are refused, and the forces go on, bit for bit."""
@@ -86,10 +87,14 @@ def test_forces_that_stay_wrong_and_faults_that_nobody_notices_miss_their_target
     def missed(one, alarm=0.0):
         targets = Targets("sensor_faults")
         sensor_faults.report({kind: [one] * 4 for kind in CLASSES}, alarm, targets)
-        return [key for key, (_, met) in targets.limits.items() if not met]
+        return targets.missed
 
     good = Result(fault, 1.0, 50.0, 0.1)
     assert missed(good) == []
-    assert missed(good._replace(error=6.0)) == ["right"]
-    assert missed(good._replace(noticed=math.inf)) == ["soon"]
-    assert missed(good, alarm=0.02) == ["doubt"]
+    for label, wrong, alarm in (
+        ("forces right", good._replace(error=6.0), 0.0),
+        ("harmful faults", good._replace(noticed=math.inf), 0.0),
+        ("time in doubt", good, 0.02),
+    ):
+        (said,) = missed(wrong, alarm)
+        assert said.startswith(label)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from codegen import clean_c, find_compiler, load_library
-from codegen.clean_c import Statements, _in_order, literal, recognized
+from codegen.clean_c import Statements, literal, recognized
 from codegen.graph import UnknownOperationError, graph_of
 
 PREAMBLE = """#include <math.h>
@@ -117,12 +117,13 @@ def test_an_operation_without_plain_c_is_refused():
 
 
 def many(n):
-    """More results than a few, each a long sum of what the others read, too."""
+    """Many results, each a long sum of what the others read, too."""
     x = ca.SX.sym("x", 6)
     sums = [sum(ca.sin(float(i + k)) * x[k] * x[(i + k) % 6] for k in range(6)) for i in range(n)]
     return ca.Function("f", [x], [ca.vertcat(*(one / (1 + ca.sumsqr(x)) for one in sums))])
 
 
+@pytest.mark.sweep("20")
 @needs_compiler
 @pytest.mark.parametrize("n", [20, 200])
 def test_many_results_are_those_of_casadi_and_so_is_their_sum(n, rng):
@@ -148,34 +149,3 @@ def test_of_many_results_those_that_need_least_are_written_first():
     shallow = [x[2] * float(i + 2) for i in range(200)]
     text = statements(ca.Function("f", [x], [ca.vertcat(deep, *shallow)])).block()
     assert text.index("out[200] = ") < text.index("out[0] = ")
-
-
-def waiting(needs, order):
-    """The largest number of units that are still to be read."""
-    unread = {unit: sum(unit in needed for needed in needs.values()) for unit in needs}
-    alive, most = set(), 0
-    for unit in order:
-        for one in needs[unit]:
-            unread[one] -= 1
-        alive = {one for one in (*alive, unit) if unread[one]}
-        most = max(most, len(alive))
-    return most
-
-
-def test_each_unit_is_written_once_and_after_what_it_needs(rng):
-    for _ in range(50):
-        needs = {k: [int(i) for i in np.flatnonzero(rng.random(k) < 0.1)] for k in range(60)}
-        read = {one for needed in needs.values() for one in needed}
-        order = _in_order(needs, [k for k in needs if k not in read])
-        assert sorted(order) == list(needs)
-        at = {unit: place for place, unit in enumerate(order)}
-        assert all(at[one] < at[unit] for unit, needed in needs.items() for one in needed)
-
-
-def test_partial_sums_are_read_as_they_come_and_do_not_wait():
-    needs, n = {"s0": []}, 30
-    for k in range(1, n):
-        needs |= {f"s{k}": [f"s{k - 1}"], f"r{k}": [f"s{k - 1}"]}
-    results = [f"r{k}" for k in reversed(range(1, n))] + [f"e{n}"]
-    needs[f"e{n}"] = [f"s{n - 1}"]
-    assert waiting(needs, _in_order(needs, results)) < 4

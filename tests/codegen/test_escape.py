@@ -51,11 +51,6 @@ def test_nothing_that_does_not_print_comes_through(function):
             assert "\n" not in got
 
 
-def test_bell_and_escape_are_shown():
-    assert escape.terminal("a\x1b[31mb\x07\nc") == "a\\x1b[31mb\\x07\nc"
-    assert escape.visible("a\nb") == "a\\nb"
-
-
 @pytest.fixture(scope="module")
 def gcc():
     compiler = find_compiler()

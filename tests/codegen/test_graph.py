@@ -8,9 +8,6 @@ from codegen import clean_c as recognize
 from codegen.clean_c import EXPANDED, recognized
 from codegen.elementary import atan, exp, sin, tanh
 from codegen.graph import (
-    Graph,
-    Node,
-    UnknownOperationError,
     assumed,
     decision,
     function_of,
@@ -79,26 +76,6 @@ def test_functions_that_differ_in_their_constants_alone_become_one():
     other, of_other = lifted(spring(1500.0, 40.0))
     assert one.serialize() == other.serialize() and sorted(of_one) == [-2000.0, 3.0, 30.0]
     assert other(0.1, 2.0, of_other) == spring(1500.0, 40.0)(0.1, 2.0)
-
-
-def test_a_function_without_constants_is_told_none():
-    x = ca.SX.sym("x", 0, 1), ca.SX.sym("y")
-    told, constants = lifted(ca.Function("f", x, [x[1] * x[1]], ["x", "y"], ["z"]))
-    assert constants.size == 0 and told([], 3.0, constants) == 9.0
-
-
-def test_equal_expressions_are_one_node():
-    x = ca.SX.sym("x")
-    function = ca.Function("f", [x], [ca.sin(x) * 2, ca.sin(x) * 3])
-    assert operations(graph_of(function)).count("sin") == 1
-
-
-def test_operations_that_a_result_takes_are_counted_once():
-    x = ca.SX.sym("x", 2)
-    shared = x[0] * x[1]
-    graph = graph_of(ca.Function("f", [x], [x[0], shared, (shared + 1) * (shared - x[1])]))
-    needed = graph.needed()
-    assert [needed[place] for (place,) in graph.outputs] == [0, 1, 4]
 
 
 def test_our_own_functions_are_found_again_and_those_of_libraries_replaced(rng):
@@ -245,26 +222,6 @@ def test_tuned_parts_are_the_whole(rng):
             np.testing.assert_array_equal(np.array(a), np.array(b))
 
 
-def test_a_function_that_decides_nothing_stays_whole():
-    x = ca.SX.sym("x")
-    parts = tuned(ca.Function("f", [x], [tanh(3 * x)], ["x"], ["y"]), sampled=("x",))
-    assert parts.where_false is None
-    assert float(parts.condition(0.3)) == 1.0
-
-
-def test_casadi_simplifies_again_afterwards():
-    tuned(learning_step(), sampled=("v",))
-    assert ca.GlobalOptions.getSimplificationOnTheFly()
-
-
-def test_an_operation_without_plain_c_is_refused():
-    graph = Graph()
-    graph.outputs = [[graph.add(Node("erf", (graph.constant(1.0),)))]]
-    x = ca.SX.sym("x")
-    with pytest.raises(UnknownOperationError, match="f: there is no plain C for erf"):
-        function_of(graph, ca.Function("f", [x], [x]))
-
-
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_choice_in_two_halves_is_one_choice_whichever_comes_first(turned, rng):
     c, a, b = (ca.SX.sym(name) for name in "cab")
@@ -278,17 +235,6 @@ def test_a_choice_in_two_halves_is_one_choice_whichever_comes_first(turned, rng)
         first, second = rng.normal(size=2)
         chosen = float(function_of(graph, function)(sign, first, second))
         assert chosen == (first if sign > 0.0 else second)
-
-
-def test_halves_of_different_choices_stay_two(rng):
-    c, d, a, b = (ca.SX.sym(name) for name in "cdab")
-    both = ca.if_else(c > 0, a, 0) + ca.if_else(ca.logic_not(d > 0), b, 0)
-    function = ca.Function("halves", [c, d, a, b], [both])
-    graph = recognized(graph_of(function))
-    assert "select" not in operations(graph)
-    for c_, d_ in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
-        expected = 2.0 * (c_ > 0) + 3.0 * (d_ <= 0)
-        assert float(function_of(graph, function)(c_, d_, 2.0, 3.0)) == expected
 
 
 @pytest.mark.parametrize(

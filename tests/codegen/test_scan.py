@@ -34,6 +34,7 @@ def test_scan_repeats_the_loop_by_hand(scan, values, n, every):
         np.testing.assert_array_equal(values[port], value)
 
 
+@pytest.mark.sweep("compiled-1-ports[02]", "compiled-3-ports[13]")
 @pytest.mark.parametrize("ports", [(), ("s",), ("corner",), ("M", "y")])
 @pytest.mark.parametrize("every", [1, 3])
 def test_what_is_recorded_alone_has_the_bits_that_it_has_among_all(scan, values, ports, every):
@@ -69,19 +70,6 @@ def test_ports_that_there_are_not_are_refused(scan, values):
         Scan(leaky_step(), carry=("u",), over=())
 
 
-def test_a_single_sample_may_come_flat(scan, values):
-    flat = scan(1, values | {"u": values["u"][0]})
-    np.testing.assert_allclose(flat["y"], [values["M"] @ np.exp(values["u"][0])], rtol=1e-13)
-
-
-def test_a_library_is_built_once(cache, values, caplog):
-    with caplog.at_level("INFO", logger="tireid"):
-        for _ in range(2):
-            Scan(leaky_step(), carry=("M", "s"), over=("u",))(8, values)
-    assert sum("compiling leaky" in message for message in caplog.messages) == 1
-    assert len(list(cache.glob("leaky-*.so"))) == 1
-
-
 def no_compiler(*_):
     raise CompilationError("gcc refused\nthe code")
 
@@ -103,17 +91,6 @@ def test_a_build_that_fails_is_one_warning_and_the_same_numbers(
     assert len(caplog.messages) == 1
     assert "virtual machine" in caplog.messages[0]
     assert "\n" not in caplog.messages[0]
-
-
-def test_a_compiler_that_cannot_compile_is_no_error(monkeypatch, cache, values, caplog):
-    monkeypatch.setenv("CC", "false")
-    codegen.find_compiler.cache_clear()
-    try:
-        with caplog.at_level("WARNING", logger="tireid"):
-            Scan(leaky_step(), carry=("M", "s"), over=("u",))(8, values)
-    finally:
-        codegen.find_compiler.cache_clear()
-    assert "false refused the generated code of leaky" in caplog.messages[0]
 
 
 def test_a_matrix_for_each_sample_is_laid_out_by_columns_in_one_row(cache, rng):
@@ -178,8 +155,3 @@ def test_the_values_at_the_start_stay_the_callers(scan, values):
     for port, value in kept.items():
         np.testing.assert_array_equal(start[port], value)
         np.testing.assert_array_equal(state[port], value)  # a copy, not a view
-
-
-def test_a_wrong_shape_is_refused_at_the_start(scan):
-    with pytest.raises(ValueError, match=r"s must have shape \(2, 1\)"):
-        Stepper(scan, {"M": np.zeros((2, 3)), "s": np.zeros(3), "c": np.array(0.1)})

@@ -76,6 +76,11 @@ def missed(model, recording, counted=slice(None)):
     return np.sqrt(np.mean(error**2, axis=0) / np.mean(force[counted] ** 2, axis=0))
 
 
+def outside_known(model, recording):
+    """Where the slip of a drive leaves the range that a model was identified for, (n, 2)."""
+    return model.setup(recording.dt).output(recording, "slip_size") > model.known_slip
+
+
 def bicycle(car, t, v_x, delta, push, lag=None, fine=5):
     """Return v_y, r (n,) and the forces across (n, 2) of a bicycle, by midpoint steps.
 

@@ -53,7 +53,8 @@ def tiled(recording, times):
     )
 
 
-@pytest.mark.parametrize("method", ["axle", "integral", "magic_formula_ekf"])
+@pytest.mark.sweep("axle", "integral")
+@pytest.mark.parametrize("method", ["axle", "integral", "lagged_ekf"])
 def test_a_run_in_blocks_has_the_bits_of_one_in_a_piece(whole, method, request):
     design = make_method(method, CAR)
     piece = identify(whole, CAR, design)
@@ -66,8 +67,9 @@ def test_a_run_in_blocks_has_the_bits_of_one_in_a_piece(whole, method, request):
     for kind in ("state", "outputs"):
         for port, values in getattr(piece, kind).items():
             np.testing.assert_array_equal(values, getattr(blocks, kind)[port], err_msg=port)
-    for one, other in zip(piece.tracks, blocks.tracks, strict=True):
-        np.testing.assert_array_equal(one.values, other.values)
+    for k, track in enumerate(piece.tracks_over(next(piece.blocks()))):
+        parts = [blocks.tracks_over(block)[k].values for block in blocks.blocks()]
+        np.testing.assert_array_equal(track.values, np.concatenate(parts))
 
 
 def test_a_freeze_within_a_block_or_at_its_ends_is_that_of_one_piece(whole, request):
@@ -86,6 +88,7 @@ def test_a_freeze_within_a_block_or_at_its_ends_is_that_of_one_piece(whole, requ
     np.testing.assert_array_equal(model.predict(whole), piece.freeze(7.0).predict(whole))
 
 
+@pytest.mark.sweep("integral")
 @pytest.mark.parametrize("method", ["axle", "integral"])
 def test_the_parts_of_a_run_over_two_logs_are_those_of_one_in_a_piece(whole, method, request):
     logs = [whole.between(0.0, 6.5), whole.between(8.0, 11.0), whole.between(11.5, 15.0)]
@@ -238,6 +241,7 @@ def test_a_short_recording_is_its_own_portion(whole):
     assert portion.portion(whole).recording is whole
 
 
+@pytest.mark.sweep("0.0")
 @pytest.mark.parametrize("lever", [0.0, 2.0])
 def test_the_verdict_on_a_long_drive_is_of_a_portion_and_finds_a_sensor_that_is_off(
     long_drive, short_portions, rng, lever
@@ -277,12 +281,14 @@ def lengths(long_drive, short_portions, monkeypatch):
     return long_drive, tiled(long_drive, 4)
 
 
+@pytest.mark.heavy
 def test_memory_does_not_grow_with_the_recording(lengths):
     """By less than one number a sample: what is carried into each block is kept."""
     short, long = map(peak_of, lengths)
     assert long - short < 8 * (len(lengths[1]) - len(lengths[0]))
 
 
+@pytest.mark.heavy
 def test_memory_that_grows_would_be_noticed(lengths, monkeypatch):
     short = peak_of(lengths[0])
     monkeypatch.setattr(arrays, "IN_MEMORY", 1e12)

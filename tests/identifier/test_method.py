@@ -91,7 +91,7 @@ def test_the_force_unit_of_a_method_stands_in_the_units_of_its_ports():
 
 
 def test_a_step_with_an_output_or_state_that_nobody_describes_is_not_exported(monkeypatch):
-    method = make_method("magic_formula_ekf", CAR)
+    method = make_method("lagged_ekf", CAR)
     ports = tuple(port for port in method.ports if port.name != "estimate")
     monkeypatch.setattr(type(method), "ports", ports)
     with pytest.raises(KeyError, match="estimate"):
@@ -115,11 +115,10 @@ def changed(record, place, value):
 
 @pytest.mark.parametrize("name", METHODS)
 def test_a_number_that_no_method_has_is_refused_by_its_name(name):
-    method, endless = make_method(name, CAR), ("W_max", "V_max")  # where there is no ball
+    method = make_method(name, CAR)
     for place, value in product(numbers_of(method), (np.nan, np.inf, -1e9)):
-        if value < np.inf or np.isnan(value) or place[-1] not in endless:
-            with pytest.raises(ValueError, match=place[-1]):
-                changed(method, place, value)
+        with pytest.raises(ValueError, match=place[-1]):
+            changed(method, place, value)
 
 
 @pytest.mark.parametrize("name", METHODS)

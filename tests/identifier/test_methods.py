@@ -83,4 +83,4 @@ def test_without_another_distribution_the_methods_are_those_of_tireid():
     named = {point.name for point in metadata.entry_points(group=methods.GROUP)}
     assert set(ti.methods()) == {*methods.METHODS, *named}
     assert ti.methods()[: len(methods.METHODS)] == tuple(methods.METHODS)
-    assert named in (set(), set(methods._RIVALS)), "installed are the rivals, or nothing"
+    assert named in (set(), set(methods.RIVALS)), "installed are the rivals, or nothing"

@@ -11,7 +11,7 @@ from identifier.method import CannotFreezeError
 from identifier.methods import DEFAULT, METHODS, make_method
 from identifier.run import DivergedError, OnlineIdentifier, identify
 from tests.identifier.conftest import felt
-from tests.rivals import NAMES, rival
+from tests.rivals import rival
 
 
 def driven(identifier, recording):
@@ -20,7 +20,7 @@ def driven(identifier, recording):
     return np.array([identifier.update(*sample) for sample in samples])
 
 
-ONLINE = [*(name for name in METHODS if name != DEFAULT), *map(rival, NAMES)]
+ONLINE = [*(name for name in METHODS if name != DEFAULT), rival("joint_ekf")]
 
 
 @pytest.mark.parametrize("name", ONLINE)
@@ -62,7 +62,7 @@ def test_preparing_leaves_no_trace(car, drive):
 
 def test_a_law_that_diverges_is_noticed_and_freezes_to_nothing(car, drive):
     design = make_method("integral", car)
-    gains = replace(design.gains, eta_W=1e9, rho_W=0.0, W_max=np.inf)
+    gains = replace(design.gains, eta_W=1e9, rho_W=0.0)
     online = OnlineIdentifier(replace(design, gains=gains), car, 0.01)
     assert not online.diverged
     driven(online, drive(n=300))

@@ -118,8 +118,8 @@ def test_the_paper_s_measure_does_not_see_the_future_nor_the_truth(history):
 
 
 def test_a_law_that_does_not_learn_reproduces_its_past_exactly(history, car):
-    gains = replace(history.design.gains, eta_W=1e-15, eta_V=1e-15, rho_W=1e-15, rho_V=1e-15)
-    still = identify(history.recording, car, replace(history.design, gains=gains))
+    gains = replace(history.method.gains, eta_W=1e-15, eta_V=1e-15, rho_W=1e-15, rho_V=1e-15)
+    still = identify(history.recording, car, replace(history.method, gains=gains))
     sides = reproduce(still, 4.0).reproduction
     assert sides.past_against_online.both < 1e-9
     assert sides.past_against_truth.both > 1.0  # and yet it knows nothing
@@ -149,7 +149,7 @@ def test_a_drive_without_a_sample_that_counts_is_refused(history):
     with pytest.raises(ValueError, match=r"drive: v_x never reaches 1 m/s, .* is 0.5 m/s"):
         counted_samples(slow, 1.0)
     with pytest.raises(ValueError, match=r"never reaches 1 m/s from 99 s on"):
-        online_error(replace(history, design=replace(history.design, min_speed=1.0)), since=99.0)
+        online_error(replace(history, method=replace(history.method, min_speed=1.0)), since=99.0)
 
 
 def test_freeze_times_of_any_clock_have_keys_of_their_own():

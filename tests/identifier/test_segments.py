@@ -10,7 +10,7 @@ from identifier.axle.gate import GateState
 from identifier.methods import METHODS, make_method
 from identifier.refused import GATE
 from identifier.run import identify
-from identifier.verdict.motion import Windows, motion_error
+from identifier.verdict.motion import brisk_windows, motion_error
 from models.recordings import Recording, RecordingError, Repair, joined
 from models.recordings.evidence import windows
 
@@ -77,6 +77,7 @@ def glued(cut: Recording) -> Recording:
     return replace(cut, t=cut.dt * np.arange(len(cut)), breaks=())
 
 
+@pytest.mark.sweep("axle", "inertial", "instantaneous", "linear*")
 @pytest.mark.parametrize("name", sorted({*METHODS} - {"fit"}))  # which learns from both segments
 def test_what_is_learnt_stays_over_a_gap_and_the_rest_begins_anew(name, log, cut) -> None:
     method = make_method(name, CAR)
@@ -96,6 +97,7 @@ def test_what_is_learnt_stays_over_a_gap_and_the_rest_begins_anew(name, log, cut
         assert not np.array_equal(lost.axle_force[k + 1 :], run.axle_force[k + 1 :])
 
 
+@pytest.mark.sweep("axle", "inertial", "instantaneous")
 @pytest.mark.parametrize("name", sorted(METHODS))
 def test_a_gate_is_off_at_each_break(name, log, cut) -> None:
     whole, run = (identify(one, CAR, make_method(name, CAR)) for one in (log, cut))
@@ -122,10 +124,10 @@ def test_after_a_gap_a_frozen_model_starts_as_at_the_beginning(log, cut) -> None
 
 def test_no_window_reaches_over_a_gap(cut) -> None:
     k, dt = cut.breaks[0], cut.dt
-    found = Windows.of(cut, 1.0)
+    found = brisk_windows(cut, 1.0)
     over = (found.starts < k) & (found.starts + found.n >= k)
     assert not over.any() and len(found) > 20
-    assert len(Windows.of(glued(cut), 1.0)) > len(found)
+    assert len(brisk_windows(glued(cut), 1.0)) > len(found)
     assert windows(cut).r.size < windows(glued(cut)).r.size
     exact = replace(cut, v_y=np.where(np.arange(len(cut)) < k, 0.0, 5.0), r=np.zeros(len(cut)))
     counted = np.ones(len(cut), dtype=bool)

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -81,29 +80,6 @@ def test_what_is_written_reads_back_bit_for_bit(
     made.to_toml(path)
     again = LogMap.from_toml(path)
     assert again == made and again.toml() == made.toml()
-
-
-@pytest.mark.parametrize("other", ["there", "there/below", "."])
-def test_a_map_that_is_written_to_another_folder_finds_its_database(tmp_path, monkeypatch, other):
-    (tmp_path / "there" / "below").mkdir(parents=True)
-    (tmp_path / "there" / "car.dbc").write_text("")
-    (tmp_path / "there" / "log.toml").write_text('[file]\ndbc = "car.dbc"\n')
-    monkeypatch.chdir(tmp_path)
-    for told in (LogMap.from_toml("there/log.toml"), LogMap(dbc="there/car.dbc")):
-        told.to_toml(tmp_path / other / "again.toml")
-        monkeypatch.chdir("/")
-        again = LogMap.from_toml(tmp_path / other / "again.toml")
-        assert Path(again.dbc).samefile(tmp_path / "there" / "car.dbc")
-        monkeypatch.chdir(tmp_path)
-    named = (tmp_path / other / "again.toml").read_text()
-    below = {"there": 'dbc = "car.dbc"', ".": 'dbc = "there/car.dbc"'}
-    assert below.get(other, str(tmp_path / "there" / "car.dbc")) in named
-
-
-def test_an_empty_map_is_an_empty_file(tmp_path):
-    LogMap().to_toml(tmp_path / "log.toml")
-    assert (tmp_path / "log.toml").read_text() == ""
-    assert LogMap.from_toml(tmp_path / "log.toml") == LogMap()
 
 
 @pytest.mark.parametrize(

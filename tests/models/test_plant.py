@@ -12,13 +12,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from models.friction import Friction, FrictionChange, FrictionError, place_change
+from models.friction import Friction, FrictionChange, place_change
 from models.maneuvers import RandomSteer, Slalom, StepSteer
-from models.plant import Driver, Plant, PlantError, tire_of
-from models.plant.dynamics import _relax, _tire_force, wheel_loads
+from models.plant import Plant, tire_of
+from models.plant.dynamics import _relax, _tire_force
 from models.sensors import Sensor, Sensors
 from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula, TirError
-from models.vehicle import GRAVITY, Vehicle, VehicleError, sedan
+from models.vehicle import GRAVITY, Vehicle, sedan
 
 CAR = sedan()
 CHASSIS = CAR.require_chassis()
@@ -166,19 +166,6 @@ def test_steady_turning_is_that_of_the_linear_bicycle():
     assert run.a_y[-1] == pytest.approx(speed * r, rel=0.01)
 
 
-def test_speed_at_the_limit_is_paid_by_the_drive():
-    """Steady state, power in = power lost in slip: F_x v_x summed is what side force takes away."""
-    step = StepSteer(amplitude=0.06, onset=0.1, rate_limit=0.5, duration=25.0)
-    run = PLANT.simulate(step, speed=20.0)
-    assert np.ptp(run.v_x[-200:]) < 1e-3
-    along, aside = body_forces(run)
-    end = -1
-    power = along.sum(axis=1)[end] * run.v_x[end] + aside.sum(axis=1)[end] * run.v_y[end]
-    power += yaw_moment(run, CAR)[end] * run.r[end]
-    assert abs(power) < 1e-3 * run.F_x[end].sum() * run.v_x[end]
-    assert run.F_x[end].sum() > 200.0
-
-
 def test_downforce_adds_to_the_loads_of_its_axle_by_the_square_of_speed():
     racer = replace(CAR, downforce_area_front=1.5, downforce_area_rear=2.5)
     run = Plant(racer).simulate(replace(HARD, amplitude=0.05), speed=lambda t: 40.0 - t)
@@ -217,33 +204,6 @@ def test_load_transfer_in_a_steady_turn_is_the_formula_on_paper():
     moment = 0.5 * (run.F_z[-1] * [-track, track, -track, track]).sum()
     by_hand = m * a_y * CHASSIS.cg_height + m * GRAVITY * h * run.roll[-1]
     assert moment == pytest.approx(by_hand, rel=1e-3)
-
-
-def test_braking_loads_the_front_axle():
-    loads = np.array(wheel_loads(CAR, 0.0, 0.0, ca.DM([0.0, 0.0]), -3.0)).ravel()
-    shift = CAR.mass * 3.0 * CHASSIS.cg_height / CAR.wheelbase
-    assert loads[:2].sum() == pytest.approx(CAR.axle_loads[0] + shift, rel=1e-14)
-    assert loads.sum() == pytest.approx(CAR.weight, rel=1e-14)
-
-
-def test_straight_driving_stays_straight():
-    straight = StepSteer(amplitude=0.0, onset=0.0, rate_limit=1.0, duration=5.0)
-    run = PLANT.simulate(straight, speed=20.0)
-    for signal in (run.v_y, run.r, run.roll, run.Y, run.a_y):
-        assert np.all(signal == 0.0)
-    assert np.abs(run.v_x - 20.0).max() < 1e-3
-    assert run.X[-1] == pytest.approx(100.0, abs=1e-2)
-
-
-def test_mirrored_steering_is_mirrored_driving_to_the_last_digits():
-    left = PLANT.simulate(replace(HARD, duration=4.0), speed=20.0)
-    right = PLANT.simulate(replace(HARD, duration=4.0, amplitude=-HARD.amplitude), speed=20.0)
-    for key in ("v_y", "r", "roll", "Y", "a_y", "axle_force"):
-        one, other = getattr(left, key), getattr(right, key)
-        assert np.abs(one + other).max() <= 1e-9 * np.abs(one).max()
-    swapped = [1, 0, 3, 2]
-    assert np.abs(left.F_z - right.F_z[:, swapped]).max() <= 1e-9 * CAR.weight
-    assert np.abs(left.F_y + right.F_y[:, swapped]).max() <= 1e-9 * CAR.weight
 
 
 def test_the_integration_is_of_fourth_order():
@@ -291,15 +251,6 @@ def test_the_axles_share_driving_and_braking_as_the_chassis_says():
     np.testing.assert_allclose(front[braked] / total[braked], 0.7, atol=0.01)
 
 
-def test_friction_changes_at_its_time_and_not_before():
-    turn = StepSteer(amplitude=0.08, onset=0.2, rate_limit=1.0, duration=4.0)
-    drop = Friction(changes=(FrictionChange(scale=0.5, at_time=2.0),))
-    dry = PLANT.simulate(turn, speed=20.0)
-    wet = PLANT.simulate(turn, speed=20.0, friction=drop)
-    np.testing.assert_array_equal(wet.r[:201], dry.r[:201])
-    assert wet.axle_force[202, 0] < 0.6 * dry.axle_force[202, 0]
-
-
 def test_each_wheel_meets_a_change_at_its_place():
     turn = StepSteer(amplitude=0.08, onset=0.2, rate_limit=1.0, duration=2.5)
     there = Friction(changes=(FrictionChange(scale=0.5, at_place=25.0),))
@@ -313,12 +264,6 @@ def test_each_wheel_meets_a_change_at_its_place():
             for i in (k, k + 1)
         ]
         assert place[0] < 25.0 <= place[1]
-
-
-def test_a_wide_change_is_smooth_and_meets_its_ends():
-    change = Friction(changes=(FrictionChange(scale=0.5, at_time=1.0, width=2.0),))
-    scale = change.over_time(np.array([0.0, 1.0, 1.5, 2.0, 3.0, 9.0]))
-    np.testing.assert_allclose(scale, [1.0, 1.0, 1.0 - 0.5 * 0.15625, 0.75, 0.5, 0.5])
 
 
 def test_a_wide_change_over_the_place_is_the_one_cubic_that_starts_and_ends_flat():
@@ -345,38 +290,8 @@ def test_a_wide_change_over_the_place_is_the_one_cubic_that_starts_and_ends_flat
     assert steepest == pytest.approx(1.5 * 0.4 / 4.0, rel=1e-3)  # of a straight ramp: 0.4/4
 
 
-def test_a_wheel_on_a_wide_change_has_the_grip_of_its_place():
-    """A car that slides sideways without steering: side force over that of a dry road."""
-    ramp = Friction(changes=(FrictionChange(scale=0.5, at_place=20.0, width=40.0),))
-    spun = StepSteer(amplitude=0.5, onset=0.1, rate_limit=5.0, duration=3.0)
-    wet = PLANT.simulate(spun, speed=20.0, friction=ramp, sample_time=0.01)
-    inside = (wet.X - 3.0 > 20.0) & (wet.X + 3.0 < 60.0)
-    share = (wet.X + CAR.l_f * np.cos(wet.psi) - 20.0) / 40.0
-    grip = 1.0 - 0.5 * share**2 * (3.0 - 2.0 * share)
-    load = wet.F_z[:, :2].sum(axis=1)
-    used = np.abs(wet.F_y[:, :2].sum(axis=1)) / load
-    ratio = (used / grip)[inside]
-    assert inside.sum() > 50
-    assert ratio.std() < 0.05 * ratio.mean()
-
-
 def half(**where):
     return FrictionChange(scale=0.5, **where)
-
-
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
-        (lambda: Friction(scale=math.nan), "scale"),
-        (half, "exactly one"),
-        (lambda: Friction(changes=(half(at_time=1.0), half(at_place=9.0))), "all over time"),
-        (lambda: Friction(changes=(half(at_time=1.0, width=2.0), half(at_time=2.0))), "is over"),
-        (lambda: Friction(changes=tuple(half(at_place=k) for k in range(5))), "at most 4"),
-    ],
-)
-def test_a_wrong_friction_is_refused(make, says):
-    with pytest.raises(FrictionError, match=says):
-        make()
 
 
 def test_the_driver_holds_and_reaches_a_speed():
@@ -407,57 +322,6 @@ def test_a_log_of_a_run_carries_the_truth_and_goes_through_sensors(rng):
     assert np.std(noisy.v_y - run.v_y) == pytest.approx(0.05, rel=0.15)
     with pytest.raises(ValueError, match="rng"):
         run.recording(Sensors())
-
-
-def test_what_does_not_fit_is_refused():
-    step = StepSteer(amplitude=0.01, onset=0.1, rate_limit=0.5, duration=1.0)
-    for given, says in (
-        ({"sample_time": 0.0105}, "multiple"),
-        ({"dt": -0.01, "sample_time": -0.01}, "multiple"),
-        ({"dt": -0.002, "sample_time": -0.01}, "multiple"),
-        ({"speed": 0.0}, "positive at the start"),
-        ({"speed": math.nan}, "finite"),
-        ({"bank": math.nan}, "bank must be finite"),
-    ):
-        with pytest.raises(ValueError, match=says):
-            PLANT.simulate(step, **{"speed": 20.0, **given})
-    with pytest.raises(VehicleError, match="chassis"):
-        Plant(replace(CAR, chassis=None))
-    with pytest.raises(VehicleError, match="tire"):
-        Plant(replace(CAR, chassis=replace(CHASSIS, tire=None)))
-    with pytest.raises(ValueError, match="gain"):
-        Driver(gain=math.nan)
-
-
-def test_a_step_too_long_for_the_lags_is_an_error_and_not_a_number():
-    step = StepSteer(amplitude=0.1, onset=0.1, rate_limit=0.5, duration=60.0)
-    with pytest.raises(PlantError, match="not finite"):
-        PLANT.simulate(step, speed=20.0, dt=0.1, sample_time=0.1)
-
-
-def conical_tire():
-    """The sedan's left tire with ply steer, conicity and a longitudinal shift."""
-    assert isinstance(PLANT.tire, MagicFormula)
-    shifts = {"PHY1": 0.004, "PVY1": 0.03, "PHX1": 0.002, "RBY3": 0.02}
-    return replace(PLANT.tire, coefficients=replace(PLANT.tire.coefficients, **shifts))
-
-
-def test_tires_with_conicity_push_against_each_other_and_the_car_stays_straight():
-    straight = StepSteer(amplitude=0.0, onset=0.0, rate_limit=1.0, duration=2.0)
-    run = Plant(CAR, conical_tire()).simulate(straight, speed=20.0)
-    assert np.abs(run.F_y[:, 0]).min() > 100.0
-    np.testing.assert_allclose(run.F_y[:, 0], -run.F_y[:, 1], rtol=1e-12)
-    assert np.abs(run.Y).max() < 1e-9
-    # A free wheel does not drive by its shift.
-    assert np.abs(run.F_x).max() < 2.0
-
-
-def test_it_does_not_matter_of_which_side_the_tire_was_measured():
-    step = StepSteer(amplitude=0.03, onset=0.1, rate_limit=0.5, duration=2.0)
-    tire = conical_tire()
-    as_is = Plant(CAR, tire).simulate(step, speed=20.0)
-    mirrored = Plant(CAR, tire.mirrored()).simulate(step, speed=20.0)
-    np.testing.assert_allclose(mirrored.r, as_is.r, rtol=1e-9, atol=1e-12)
 
 
 @pytest.mark.parametrize(

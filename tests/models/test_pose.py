@@ -9,10 +9,9 @@ from models.logs.clock import Raw
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.logs.names import propose
-from models.logs.signals import Signal
 from models.recordings import LogMap, read_recording
 from models.recordings.map import given_signals
-from models.recordings.pose import _lateness, _motion_of, _smoothed, with_pose
+from models.recordings.pose import _lateness, _motion_of, _smoothed
 
 T = 0.01 * np.arange(3000)
 V_X = 2.0 + 0.5 * np.sin(0.5 * T)
@@ -190,18 +189,6 @@ def test_a_pose_that_nobody_told_and_that_is_none_is_left_aside_with_a_note(tmp_
         read_recording(tmp_path / "log.csv", log_map=told)
 
 
-def test_of_two_trackers_none_is_taken_and_of_odometry_and_a_tracker_this(tmp_path):
-    def named(*prefixes):
-        columns = {k: v for k, v in COLUMNS.items() if k[0] not in "xy"}
-        for one in prefixes:
-            columns |= {f"{one}_x [m]": X, f"{one}_y [m]": Y, f"{one}_yaw [rad]": PSI}
-        log = open_log(table(tmp_path / "log.csv", columns))
-        return propose(log, log.headings())
-
-    assert named("odom", "mocap").signals()["x"].channel == ("mocap_x [m]",)
-    assert "x" not in named("mocap", "slam").signals()
-
-
 @pytest.mark.parametrize("kind", ["PoseStamped", "Odometry", "TFMessage"])
 def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
     pytest.importorskip("rosbags")
@@ -257,14 +244,3 @@ def test_a_pose_that_stands_is_refused(place):
     still = np.full(T.size, place)
     with pytest.raises(RecordingError, match="the pose must move"):
         _motion_of("log", posed(x=still, y=still))
-
-
-def test_notes_of_a_pose_name_what_is_taken_from_it(tmp_path):
-    """A yaw rate of the box stays where the pose comes seldom, and is the pose's else."""
-    for every, words in ((1, "vx, vy and r are taken"), (20, "vx and vy are taken")):
-        some = slice(None, None, every)
-        parts = {**posed(X[some], Y[some], PSI[some], T[some]), "r": [raw(np.gradient(PSI, T))]}
-        given = {name: Signal(channel=(name,)) for name in parts}
-        parts = {k: one if isinstance(one, list) else [one] for k, one in parts.items()}
-        _, _, said = with_pose("log", given, parts)
-        assert said[0].startswith(words), said

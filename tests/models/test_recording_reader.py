@@ -1,16 +1,11 @@
 """Files: what is read, how it is resampled, and what is refused with which line."""
 
 import gzip
-import time
 from pathlib import Path
 
 import numpy as np
-import pyarrow
-import pyarrow.parquet
 import pytest
 
-from models.logs.door import open_log
-from models.logs.text import TextTable
 from models.recordings import (
     LogMap,
     Recording,
@@ -77,45 +72,6 @@ def test_runs_are_listed_chosen_and_named(tmp_path):
     assert "holds one run without a name, so no run 'a'; leave it out" in refusal(plain, "a")
 
 
-@pytest.mark.parametrize("with_runs", [False, True])
-def test_a_text_of_standard_names_is_gone_through_no_more_often_than_needed(
-    tmp_path, monkeypatch, with_runs
-):
-    """Once for its columns, and once before for the names of its runs."""
-    passes = []
-    real = TextTable.cells
-
-    def counted(self, kinds, run=None):
-        passes.append(kinds)
-        return real(self, kinds, run)
-
-    monkeypatch.setattr(TextTable, "cells", counted)
-    ending = ",a" if with_runs else ""
-    header = HEADER + (",run" if with_runs else "")
-    path = write(tmp_path / "log.csv", header, [line + ending for line in rows()])
-    read_recording(path, check=False)
-    assert len(passes) == 1 + with_runs
-    log = open_log(path)
-    passes.clear()
-    assert log.listed() == log.listed()
-    assert len(passes) == 1
-
-
-def test_parquet_gives_the_same_as_csv(tmp_path):
-    t = 0.01 * np.arange(60)
-    columns = {"t": t, "vx": t + 20, "vy": 0 * t, "r": 0 * t, "delta_f": 0 * t, "run": ["a"] * 60}
-    path = tmp_path / "log.parquet"
-    pyarrow.parquet.write_table(pyarrow.table(columns | {"other": ["x"] * 60}), path)
-    got = read_recording(path)
-    assert got.name == "log:a"
-    assert np.array_equal(got.v_x, t + 20)
-    assert runs(path) == ["a"]
-    pyarrow.parquet.write_table(pyarrow.table(columns | {"vx": ["fast"] * 60}), path)
-    assert "vx must be numeric" in refusal(path)
-    pyarrow.parquet.write_table(pyarrow.table(columns | {"r": [None] + [0.0] * 59}), path)
-    assert "r must be finite, 1 of 60" in refusal(path)
-
-
 @pytest.mark.parametrize(
     ("name", "content", "rule"),
     [
@@ -158,11 +114,6 @@ def test_what_is_packed_is_told_by_its_bytes_not_by_its_name(tmp_path):
 )
 def test_a_missing_or_doubled_column_is_named_with_what_was_meant(tmp_path, header, rule):
     assert rule in refusal(write(tmp_path / "a.csv", header, rows()))
-
-
-def test_one_axle_force_alone_is_refused(tmp_path):
-    path = write(tmp_path / "a.csv", HEADER + ",Fyf", [line + ",0" for line in rows()])
-    assert "Fyf needs its partner" in refusal(path)
 
 
 @pytest.mark.parametrize(
@@ -227,14 +178,6 @@ def test_resampling_keeps_a_maneuver_without_lag(tmp_path, source):
     assert abs(error @ np.cos(2 * np.pi * got.t)) / got.t.size < 1e-4  # in phase
 
 
-def test_resampling_does_not_fold_noise_above_the_new_rate_into_the_maneuver(tmp_path):
-    """At 100 Hz a tone of 102 Hz would look like 2 Hz; the mean over a step removes it."""
-    t = 0.001 * np.arange(2001)
-    lines = [f"{a:.6f},20,{np.sin(2 * np.pi * 102 * a):.9f},0,0" for a in t]
-    got = read_recording(write(tmp_path / "a.csv", HEADER, lines), check=False)
-    assert np.abs(got.v_y[1:-1]).max() < 0.03
-
-
 def test_uneven_time_stamps_are_brought_to_the_grid(tmp_path, rng):
     t = np.cumsum(rng.uniform(0.005, 0.015, 500))
     lines = [f"{a:.9f},{20 + 3 * a:.9f},0,0,0" for a in t]
@@ -256,45 +199,6 @@ def test_a_log_argument_is_split_at_the_right_colon(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("log.csv:a").touch()
     assert split_log_argument("log.csv:a") == (Path("log.csv:a"), None)
-
-
-def test_a_hundred_thousand_rows_read_in_seconds(tmp_path):
-    path = write(tmp_path / "a.csv.gz", HEADER, rows(100_000))
-    began = time.perf_counter()
-    read_recording(path)
-    assert time.perf_counter() - began < 5.0  # 0.5 s when the machine is idle
-
-
-def test_columns_of_another_name_are_read_when_named(tmp_path):
-    log = tmp_path / "log.csv"
-    rows = [f"{0.01 * k:.2f},10,0,0.01,0.002" for k in range(100)]
-    log.write_text("\n".join(["time,vx,vy,yaw_rate,delta_f", *rows]))
-    recording = read_recording(log, columns={"t": "time", "r": "yaw_rate"})
-    np.testing.assert_allclose(recording.r, 0.01)
-    with pytest.raises(RecordingError, match="no column 'yawrate' to read as r"):
-        read_recording(log, columns={"t": "time", "r": "yawrate"})
-    with pytest.raises(RecordingError, match="'rate' is no column of ours"):
-        read_recording(log, columns={"rate": "yaw_rate"})
-
-
-def test_ax_is_read_forward_in_either_axes_and_left_aside_where_it_cannot_be(tmp_path):
-    lines = [f"{k * 0.01:.6f},20,0.5,0,0,0.1,{0.01 * k:.2f}" for k in range(60)]
-    header = HEADER + ",ay,ax"
-    good = write(tmp_path / "good.csv", header, lines)
-    expected = 0.01 * np.arange(60)
-    np.testing.assert_allclose(read_recording(good, check=False).a_x, expected)
-    sae = read_recording(good, check=False, log_map=LogMap(axes="SAE"))
-    np.testing.assert_allclose(sae.a_x, expected)
-    np.testing.assert_allclose(sae.a_y, -0.1)
-    lines[30] = lines[30].rpartition(",")[0] + ","
-    holed = write(tmp_path / "holed.csv", header, lines)
-    got = read_recording(holed, check=False)
-    assert got.a_x is None and got.a_y is not None
-    assert sum(note.startswith("ax is left aside: ") for note in got.notes) == 1
-    with pytest.raises(RecordingError, match="ax must be finite"):
-        read_recording(holed, check=False, columns={"ax": "ax"})
-    twice = write(tmp_path / "twice.csv", header + ",ax", [line + ",0" for line in lines])
-    assert read_recording(twice, check=False).a_x is None
 
 
 def test_inverse_forces_stand_in_where_none_were_measured(tmp_path):
@@ -337,15 +241,6 @@ def test_a_map_with_a_repair_is_judged_by_what_the_repair_leaves(mirrored):
     recording = read_recording(mirrored, log_map=RIGHT)
     assert recording.a_y is not None
     np.testing.assert_array_equal(recording.a_y, -20.0 * recording.r)  # as it was logged
-
-
-def test_a_data_frame_with_a_repair_is_judged_by_what_the_repair_leaves(mirrored):
-    log = read_recording(mirrored, check=False)
-    names = {"t": "t", "vx": "v_x", "vy": "v_y", "r": "r", "delta_f": "delta_f", "ay": "a_y"}
-    data = {column: getattr(log, name) for column, name in names.items()}
-    with pytest.raises(RecordingError, match="ay "):
-        read_recording(data, log_map=STILL_WRONG)
-    assert len(read_recording(data, log_map=RIGHT)) == len(log)
 
 
 def test_at_a_coarse_interval_a_segment_of_too_few_samples_is_left_out(tmp_path):

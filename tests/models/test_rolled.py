@@ -12,7 +12,7 @@ DT, MOST, LIMIT = 0.01, 12.0, 13.0
 
 
 def by_hand(state, row, rates, dt, most, limit, free):
-    """The speed at the next sample, wheel by wheel in Python: of [v, a, held, known]."""
+    """The speed at the next sample, wheel by wheel in Python: of [v, a, untrusted, known]."""
     v, a, since, known = state
     ahead = v + a * dt
     near, alike = (
@@ -64,6 +64,7 @@ def drive(rng, k, n=3000):
     return rows, (rows - before) / (5.0 * DT)
 
 
+@pytest.mark.sweep("0-2", "2-4", "3-5", "5-2")
 @pytest.mark.parametrize("k", [1, 2, 4, 5])
 @pytest.mark.parametrize("seed", range(6))
 def test_every_sample_has_the_bits_of_plain_python(k, seed):
@@ -78,11 +79,11 @@ def test_every_sample_has_the_bits_of_plain_python(k, seed):
             "rule": np.array([DT, MOST, LIMIT]), "free": free.astype(float),
         },
     )  # fmt: skip
-    held = 0
+    untrusted = 0
     for n, (row, rate) in enumerate(zip(rows.tolist(), rates.tolist(), strict=True)):
         state = by_hand(state, row, rate, DT, MOST, LIMIT, free.tolist())
-        held += state[2] > 0.0
+        untrusted += state[2] > 0.0
         assert tuple(record["trust_all"][n + 1]) == state, n
-    assert (record["held"] > 0.0).sum() == held
+    assert (record["untrusted"] > 0.0).sum() == untrusted
     if seed == 0 and k in (1, 2):
-        assert 0 < held < len(rows), "both branches are taken"
+        assert 0 < untrusted < len(rows), "both branches are taken"

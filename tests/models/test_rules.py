@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from models.rules import require_kind, require_positive, require_within
+from models.rules import require_positive, require_within
 
 
 @pytest.mark.parametrize(
@@ -28,9 +28,3 @@ def test_what_is_no_number_is_refused_by_its_name(value, shown):
 def test_every_kind_of_number_is_one(value):
     require_positive(ValueError, mass=value)
     require_within(ValueError, 0.0, 1.0, mass=value)
-
-
-def test_an_argument_of_another_kind_is_refused_with_the_remedy():
-    require_kind(str, "as of input", name="a")
-    with pytest.raises(TypeError, match=r"^name must be a str, as of input; it is 3$"):
-        require_kind(str, "as of input", name=3)

@@ -7,19 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from codegen.escape import shown
 from models.schema import (
     VARIABLE,
     InputLimits,
     LimitError,
     Table,
     limits,
-    limits_text,
     pieces,
     read_bytes,
     read_json,
     read_toml,
-    require_few,
     require_name,
 )
 
@@ -83,16 +80,6 @@ def test_a_gzip_bomb_stops_at_the_limit(tmp_path, monkeypatch):
     path.write_bytes(gzip.compress(b"a" * 1_000_000) + gzip.compress(b"b" * 1_900_000))
     whole = b"".join(pieces(path, RefusedError, limit="megabytes"))
     assert whole == b"a" * 1_000_000 + b"b" * 1_900_000
-
-
-def test_what_swells_as_no_log_does_is_refused_below_the_limit(tmp_path, monkeypatch):
-    monkeypatch.setattr("models.schema._SWOLLEN_FROM", 3_000_000)
-    path = tmp_path / "b.gz"
-    path.write_bytes(gzip.compress(bytes(30_000_000)))
-    with pytest.raises(RefusedError, match=r"they swell to \d+ times their size, above 200"):
-        list(pieces(path, RefusedError, limit="megabytes"))
-    path.write_bytes(gzip.compress(np.arange(1_000_000).tobytes(), compresslevel=1))
-    assert sum(map(len, pieces(path, RefusedError, limit="megabytes"))) == 8_000_000
 
 
 DOCUMENTS = [
@@ -201,29 +188,11 @@ def test_arrays_keep_their_shape():
         assert read.shape == shape
 
 
-def test_values_in_messages_are_short_and_tame():
-    assert shown("\x1b[2J" * 1000).startswith("'\\x1b[2J")
-    for value in ("a" * 10**6, 10**5000, [0] * 10**5, {"a": 1}, b"\x07" * 999, 1e308, None):
-        assert len(shown(value)) < 70
-        assert shown(value).isprintable()
-
-
 @pytest.mark.parametrize("name", [3, None, "a" * 201, "half \ud800"])
 def test_what_cannot_be_a_name_is_refused(name):
     with pytest.raises(RefusedError):
         require_name(RefusedError, "name", name)
     require_name(RefusedError, "name", "Käfer \x1b[0m 車")  # shown escaped wherever it goes
-
-
-def test_a_count_that_is_no_number_is_too_many():
-    with pytest.raises(RefusedError, match="here are nan"):
-        require_few(RefusedError, "--laps", float("nan"), "runs", "laps")
-
-
-def test_the_limits_that_hold_are_told(monkeypatch):
-    assert "samples=1e+08" in limits_text()
-    monkeypatch.setenv(VARIABLE, "samples=7")
-    assert "samples=7 " in limits_text()
 
 
 def test_a_toml_file_may_begin_with_a_byte_order_mark(tmp_path):

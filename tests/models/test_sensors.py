@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from models.recordings import Recording
-from models.sensors import Sensor, SensorError, Sensors, white_noise
+from models.recordings.samples import white_noise
+from models.sensors import Sensor, SensorError, Sensors
 
 N = 20001
 T = 0.01 * np.arange(N)
@@ -27,12 +28,6 @@ def exact(rear=0.0):
     )
 
 
-def test_perfect_sensors_change_nothing(rng):
-    recording, measured = exact(), Sensors().apply(exact(), rng)
-    for key in ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y", "axle_force"):
-        np.testing.assert_array_equal(getattr(measured, key), getattr(recording, key))
-
-
 def test_noise_and_bias_have_their_size_and_the_truth_stays_exact(rng):
     sensors = Sensors(
         v_y=Sensor(noise=0.05, bias=0.2), r=Sensor(noise=0.004), delta=Sensor(bias=-0.01)
@@ -46,11 +41,6 @@ def test_noise_and_bias_have_their_size_and_the_truth_stays_exact(rng):
     np.testing.assert_allclose(measured.delta_f, recording.delta_f - 0.01, rtol=1e-14)
     np.testing.assert_array_equal(measured.v_x, recording.v_x)
     np.testing.assert_array_equal(measured.axle_force, recording.axle_force)
-
-
-def test_noise_is_white(rng):
-    error = Sensor(noise=1.0).measure(T, np.zeros(N), rng)
-    assert np.corrcoef(error[1:], error[:-1])[0, 1] == pytest.approx(0.0, abs=0.04)
 
 
 def test_a_delayed_signal_is_the_signal_some_time_ago(rng):

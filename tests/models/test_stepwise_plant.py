@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from models.friction import Friction, FrictionChange
-from models.plant import Plant, PlantError, StepwisePlant
+from models.plant import Plant, StepwisePlant
 from models.vehicle import sedan
 
 PERIOD = 0.01
@@ -76,30 +76,3 @@ def test_a_step_changes_nothing_but_gives_the_next_state():
     assert np.array_equal(state.x, before)
     assert np.array_equal(first.x, second.x)
     assert first.steps == 10
-
-
-def test_a_car_that_starts_turned_drives_the_same_curve_turned():
-    stepwise = StepwisePlant(Plant(sedan()))
-    straight, turned = stepwise.start(15.0), stepwise.start(15.0, X=3.0, Y=-2.0, psi=0.7)
-    for _ in range(100):
-        straight = stepwise.step(straight, np.array([0.04, 0.0]), 15.0)
-        turned = stepwise.step(turned, np.array([0.04, 0.0]), 15.0)
-    c, s = np.cos(0.7), np.sin(0.7)
-    expected = np.array([3.0, -2.0]) + np.array([[c, -s], [s, c]]) @ straight.x[5:7]
-    assert turned.x[5:7] == pytest.approx(expected, abs=1e-9)
-    assert turned.x[7] == pytest.approx(straight.x[7] + 0.7, abs=1e-12)
-
-
-def test_what_cannot_be_stepped_is_refused():
-    plant = Plant(sedan())
-    with pytest.raises(ValueError, match="multiple of dt"):
-        StepwisePlant(plant, period=0.0105)
-    stepwise = StepwisePlant(plant)
-    with pytest.raises(ValueError, match="v_x must be positive"):
-        stepwise.start(0.0)
-    state = stepwise.start(10.0)
-    with pytest.raises(ValueError, match="must be finite"):
-        stepwise.step(state, np.array([np.nan, 0.0]), 10.0)
-    broken = state._replace(x=np.full(18, np.nan))
-    with pytest.raises(PlantError, match=r"not finite from t = 0.010 s"):
-        stepwise.step(broken, np.zeros(2), 10.0)

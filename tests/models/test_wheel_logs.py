@@ -67,20 +67,6 @@ def test_turns_and_speeds_give_the_same_recording_whatever_their_unit(run, wheel
     np.testing.assert_allclose(want, run.v_x, atol=0.5)
 
 
-def test_our_names_without_a_unit_are_in_si(run, wheels):
-    got = read_recording(columns(run, wheels), log_map=LogMap(wheels=replace(TRACK, radius=())))
-    np.testing.assert_allclose(got.v_x, run.v_x, atol=0.5)
-
-
-def test_the_notes_say_of_what_the_speed_is_made_and_what_was_left_out(run, wheels):
-    (note,) = (one for one in read_recording(columns(run, wheels)).notes if "vx is computed" in one)
-    assert "wheel_fl, wheel_fr, wheel_rl, wheel_rr" in note
-    share = float(note.split(" % of the samples")[0].split()[-1])
-    assert 8.0 < share < 13.0  # 2 of 20 s
-    calm = shown(run, gentle_slip(run))
-    assert any("at 0 % of" in one for one in read_recording(columns(run, calm)).notes)
-
-
 def test_wheels_are_told_by_words_and_by_a_map_that_is_written_and_read(run, wheels, tmp_path):
     data = {"t": run.t, "yaw": run.r, "steer": run.delta_f, "lat": run.a_y}
     data |= {f"corner{k}": one / RADIUS for k, one in enumerate(wheels.values())}
@@ -103,22 +89,6 @@ def test_wheels_are_told_by_words_and_by_a_map_that_is_written_and_read(run, whe
     again = read_recording(path, log_map=tmp_path / "log.toml")
     assert np.abs(again.v_x - read.v_x).max() < 0.5
     assert not np.array_equal(again.v_x, read.v_x)  # the driven wheels stand back
-
-
-def test_a_speed_that_is_logged_is_used_and_tells_the_radius(run, wheels):
-    turns = {name: one / RADIUS for name, one in wheels.items()}
-    data = columns(run, turns, vx=run.v_x)
-    told = {name: f"{name} [rad/s]" for name in CORNERS}
-    got = read_recording(data, columns=told)
-    np.testing.assert_array_equal(got.v_x, run.v_x)
-    (note,) = (one for one in got.notes if "wheels roll by vx" in one)
-    radii = [float(word) for word in note.replace(",", "").split() if word.startswith("0.3")]
-    assert len(radii) == 4
-    np.testing.assert_allclose(radii, RADIUS, rtol=0.005)
-    factors = read_recording(
-        columns(run, wheels, 0.97, vx=run.v_x), columns={name: f"{name} [m/s]" for name in CORNERS}
-    )
-    assert any("wheel_rl 1.031 times its speed" in one for one in factors.notes)
 
 
 def test_wheels_that_nobody_told_leave_a_log_with_a_speed_as_it_is(run, wheels):

@@ -11,7 +11,7 @@ from models.plant import Plant
 from models.recordings.rolled import rolled
 from models.recordings.wheels import Wheels, _identified_scale
 from models.vehicle import sedan
-from tests.models.wheel_speeds import CORNERS, anti_lock, gentle_slip, rolling, shown, spin
+from tests.models.wheel_speeds import CORNERS, anti_lock, gentle_slip, shown, spin
 
 CAR = sedan()
 KNOWN = Wheels().completed(CAR)
@@ -61,18 +61,7 @@ def test_a_rear_wheel_without_slip_tells_the_speed_of_the_center_of_gravity_exac
     for name in CORNERS[2:]:
         only = told(run, {name: speeds[name]})
         np.testing.assert_allclose(only.v_x, run.v_x, atol=1e-9)
-        assert only.gated == only.held == 0
-
-
-def test_front_wheels_miss_it_by_side_slip_alone(run):
-    """The front wheels roll with v_y + l_f r, of which the slip angle of the rear is not known."""
-    speeds = shown(run, np.zeros((run.t.size, 4)))
-    front = told(run, {name: speeds[name] for name in CORNERS[:2]}).v_x - run.v_x
-    rear_slip = run.delta_r - np.arctan2(run.v_y - CAR.l_r * run.r, run.v_x)
-    missed = np.abs(np.sin(run.delta_f) * np.tan(rear_slip) * run.v_x)
-    assert np.abs(front).max() < 1.05 * missed.max() + 1e-6
-    uncorrected = rolling(run)[:, 0] - run.v_x
-    assert rms(front) < 0.2 * rms(uncorrected)
+        assert only.gated == only.untrusted == 0
 
 
 def test_without_the_track_an_axle_tells_it_by_its_mean(run):
@@ -107,21 +96,9 @@ def test_slip_costs_a_fraction_of_what_it_costs_the_mean(run, driven, columns, e
 def test_wheels_that_all_agree_are_all_trusted_but_driven_ones_stand_back(run):
     ours, mean, result = against_mean(run, gentle_slip(run))
     assert ours < 1.05 * mean
-    assert result.gated < 0.01 * run.t.size and result.held == 0
+    assert result.gated < 0.01 * run.t.size and result.untrusted == 0
     free, _, _ = against_mean(run, gentle_slip(run), replace(KNOWN, driven="front"))
     assert free < 0.9 * ours  # the sedan drives by its front wheels, and brakes by them more
-
-
-def test_a_lone_encoder_is_bounded_by_what_a_car_can_do(run):
-    slips = gentle_slip(run)
-    mean = np.mean([*shown(run, slips, np.random.default_rng(1)).values()], axis=0)
-    mean[1000:1003] = 80.0  # a spike
-    mean[2000:2004] = 0.0  # and a hole
-    wheels = replace(KNOWN, driven="all")
-    result = told(run, {"wheel": mean}, wheels)
-    assert rms(result.v_x - run.v_x) < 0.15
-    assert np.abs(np.diff(result.v_x)).max() < 0.5
-    assert result.held >= 7
 
 
 def stop_and_go(rng, n=6000):
@@ -145,7 +122,7 @@ def test_without_slip_wheels_are_trusted_whatever_the_car_does(size):
         speeds = {name: shows * (v + 0.02 * size * rng.standard_normal(v.size)) for name in CORNERS}
         result = rolled(speeds, still, still, still, Wheels(track=(1.5,)), 0.01)
         assert np.abs(result.v_x - v).max() < 0.7 * size + 0.1
-        assert result.held < 0.01 * v.size
+        assert result.untrusted < 0.01 * v.size
 
 
 def test_no_sample_looks_at_a_later_one(run):
@@ -169,47 +146,6 @@ def test_a_long_log_is_worked_through_in_blocks_that_leave_no_trace(run, monkeyp
     assert again[1:] == whole[1:]
 
 
-def random_slips(run, seed, most):
-    """Slip of one to `most` wheels at a time, six times: it sets in fast or slowly, either way."""
-    rng = np.random.default_rng(seed)
-    slips = gentle_slip(run)
-    for _ in range(6):
-        columns = rng.choice(4, size=rng.integers(1, most + 1), replace=False)
-        begin, size = rng.uniform(2.0, 24.0), rng.choice([-1.0, 1.0]) * rng.uniform(0.05, 0.6)
-        event = spin(run.t, begin, rng.uniform(0.2, 3.0), size, rise=rng.uniform(0.05, 1.0))
-        slips[:, columns] += event[:, None]
-    return np.maximum(slips, -1.0)
-
-
-def test_of_random_events_that_leave_a_wheel_rolling_few_are_noticed_in_the_speed(run):
-    errors = []
-    for seed in range(16):
-        ours, mean, result = against_mean(run, random_slips(run, seed, 3), seed=seed)
-        errors.append(ours / mean)
-        assert np.abs(result.v_x - run.v_x)[run.t > 36.0].max() < 0.5  # it comes back
-    assert np.median(errors) < 0.1
-    assert max(errors) < 1.0
-
-
-@pytest.mark.parametrize(
-    ("given", "rule"),
-    [
-        ({"radius": (0.001,)}, "wheels: radius must lie between 0.01 and 2, it is 0.001"),
-        ({"radius": (0.3, float("nan"))}, "wheels: radius must lie between"),
-        ({"radius": (0.3, 0.3, 0.3)}, "one per axle or one per wheel, not 3 numbers"),
-        ({"track": (-1.5,)}, "wheels: track must lie between"),
-        ({"track": (1.5, 1.5, 1.5)}, "wheels: track must be one number or one per axle"),
-        ({"wheelbase": 0.0}, "wheels: wheelbase must lie between"),
-        ({"acceleration": float("inf")}, "wheels: acceleration must lie between"),
-        ({"driven": "left"}, "wheels: driven must be one of front, rear, all, none, not 'left'"),
-    ],
-)
-def test_what_no_wheels_have_is_refused_in_one_line(given, rule):
-    with pytest.raises(RecordingError) as caught:
-        Wheels(**given)
-    assert rule in str(caught.value) and "\n" not in str(caught.value)
-
-
 def test_each_wheel_has_its_radius():
     assert Wheels().radius_of("wheel_fl") is None
     assert Wheels(radius=(0.3,)).radius_of("wheel_rr") == 0.3
@@ -230,11 +166,3 @@ def test_straight_driving_tells_the_radius_and_slip_does_not(run):
     value, seconds = _identified_scale(run.t, gnss, run.r, speeds["wheel_rl"] / 0.317)
     assert value == pytest.approx(0.317, rel=2e-3)
     assert 2.0 < seconds < 30.0
-
-
-def test_where_nothing_is_straight_or_nothing_agrees_no_radius_is_told(run):
-    speeds = shown(run, gentle_slip(run))
-    assert _identified_scale(run.t, run.v_x, run.r + 0.3, speeds["wheel_rl"]) is None
-    unlike = 20.0 + 5.0 * np.random.default_rng(0).standard_normal(run.t.size)
-    assert _identified_scale(run.t, run.v_x, run.r, unlike) is None
-    assert _identified_scale(run.t, run.v_x, run.r, np.zeros(run.t.size)) is None

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 from codegen.graph import OPERATIONS
-from identifier.baselines.curves import CurveModel
 from identifier.paper.network import Network, NetworkModel, Weights
 from models.vehicle import sedan
 from mpc.prediction import build_dynamics, build_end, build_rk4, build_stage, state_size
@@ -40,24 +39,10 @@ def ladder():
     return PredictionTire(LadderAxles(units=4), weights, CAR)
 
 
-MAGIC = np.array([[11.0, 1.4, 7600.0], [12.0, 1.35, 6000.0]])
 TIRES = {
     "linear": prediction_tire(CAR),
     "network": prediction_tire(network()),
     "ladder": ladder(),
-    "magic": prediction_tire(
-        CurveModel(vehicle=CAR, curve="magic_formula", parameters=MAGIC, min_speed=1.0)
-    ),
-    "lagged magic": prediction_tire(
-        CurveModel(
-            vehicle=CAR,
-            curve="magic_formula",
-            parameters=MAGIC,
-            min_speed=1.0,
-            relaxation_length=np.array([0.5, 0.8]),
-            offset=np.array([0.01, 0.1]),
-        )
-    ),
     "oracle": oracle_tire(CAR),
 }
 
@@ -100,6 +85,7 @@ def worst(tire, reference, count=60):
     )
 
 
+@pytest.mark.sweep("lagged magic", "ladder", "network", "oracle")
 @pytest.mark.parametrize("kind", TIRES)
 def test_the_stage_is_the_derivative_of_plain_runge_kutta(kind):
     assert worst(TIRES[kind], differentiated(TIRES[kind].structure)) < 1e-10

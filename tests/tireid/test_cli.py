@@ -101,11 +101,6 @@ def test_an_interruption_is_said_and_leaves_nothing(monkeypatch, capsys, tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("error", [OSError(36, "File name too long", "x" * 5000), "y" * 5000])
-def test_what_is_said_of_an_error_is_never_longer_than_a_thousand_characters(error):
-    assert len(one_line(error)) < 950
-
-
 def test_an_output_folder_whose_links_go_in_a_circle_is_one_line(tmp_path, capsys):
     (tmp_path / "out").symlink_to("out")
     for more in ([], ["--force"]):

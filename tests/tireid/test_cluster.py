@@ -2,8 +2,10 @@
 
 import os
 import socket
+import subprocess
 import sys
 import time
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -11,28 +13,55 @@ from pathlib import Path
 import pytest
 
 import tireid.cluster
-from benchmarks.local_cluster import free_port, start
+from models.recordings import LogMap
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.cluster import ClusterError, cluster
+from tireid.fleet.learn import LearnLog, find_logs, learn_fleet, on_a_cluster, read_car
+from tireid.fleet.store import Store
 
 pytest.importorskip("distributed", reason="needs Dask")
 pytestmark = pytest.mark.filterwarnings("default")  # Dask's own
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@contextmanager
+def running(folder, *workers):
+    """The address of a scheduler, and the processes of its workers, as a user starts them."""
+    port = free_port()
+    address = f"tcp://127.0.0.1:{port}"
+
+    def start(kind, *words):
+        return subprocess.Popen(
+            [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *words],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    processes = [start("scheduler", "--host", "127.0.0.1", "--port", str(port))]
+    processes += [start("worker", address, *words) for words in workers]
+    try:
+        yield address, processes[1:]
+    finally:
+        for process in reversed(processes):
+            process.terminate()
+            process.wait(timeout=20)
 
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
-    """The address of a scheduler with two workers, processes as a user starts them."""
-    folder, port = tmp_path_factory.mktemp("cluster"), free_port()
-    address = f"tcp://127.0.0.1:{port}"
-    running = [
-        start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], folder),
-        start("worker", [address, "--nthreads", "1", "--nworkers", "2"], folder),
-    ]
-    yield address
-    for process in reversed(running):
-        process.terminate()
-        process.wait(timeout=20)
+    """The address of a scheduler with two workers."""
+    folder = tmp_path_factory.mktemp("cluster")
+    with running(folder, ["--nthreads", "1", "--nworkers", "2"]) as (address, _):
+        yield address
 
 
 def where(pause, item):
@@ -40,9 +69,10 @@ def where(pause, item):
     return os.getpid(), item
 
 
+@pytest.mark.heavy
 def test_both_workers_work_and_no_result_is_lost(address):
     with cluster(address) as elsewhere:
-        found = list(elsewhere(partial(where, 0.05), range(20)))
+        found = list(elsewhere(partial(where, 0.05), range(20), lost=print))
     assert sorted(item for _, item in found) == list(range(20))
     processes = {process for process, _ in found}
     assert len(processes) == 2
@@ -53,11 +83,13 @@ def fail(item):
     raise ValueError(f"item {item} cannot be done")
 
 
+@pytest.mark.heavy
 def test_an_error_of_a_worker_arrives_here(address):
     with cluster(address) as elsewhere, pytest.raises(ValueError, match="item 1 cannot be done"):
-        list(elsewhere(fail, [1]))
+        list(elsewhere(fail, [1], lost=print))
 
 
+@pytest.mark.heavy
 def test_a_worker_of_another_version_is_refused(address, monkeypatch):
     monkeypatch.setattr(tireid.cluster, "source_digest", another_version)
     with pytest.raises(ClusterError, match="has another version of tireid"), cluster(address):
@@ -68,37 +100,49 @@ def another_version():
     return f"that of process {os.getpid()}"
 
 
+@pytest.mark.heavy
 def test_a_scheduler_without_workers_is_told_of(monkeypatch, tmp_path):
     monkeypatch.setattr(tireid.cluster, "PATIENCE", 2.0)
-    port = free_port()
-    lonely = f"tcp://127.0.0.1:{port}"
-    process = start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], tmp_path)
-    try:
-        wait_until_open(port)
+    with running(tmp_path) as (lonely, _):
+        wait_until_open(int(lonely.rpartition(":")[2]))
         with pytest.raises(ClusterError, match="the scheduler has no workers"), cluster(lonely):
             pass
-    finally:
-        process.terminate()
-        process.wait(timeout=20)
 
 
 def test_a_worker_of_threads_is_told_how_to_start_as_processes(tmp_path, capsys):
-    port = free_port()
-    address = f"tcp://127.0.0.1:{port}"
-    running = [
-        start("scheduler", ["--host", "127.0.0.1", "--port", str(port)], tmp_path),
-        start("worker", [address, "--nthreads", "3", "--no-nanny"], tmp_path),
-    ]
-    try:
-        with cluster(address) as elsewhere:
-            assert list(elsewhere(abs, [-1])) == [1]
-    finally:
-        for process in reversed(running):
-            process.terminate()
-            process.wait(timeout=20)
+    with (
+        running(tmp_path, ["--nthreads", "3", "--no-nanny"]) as (address, _),
+        cluster(address) as elsewhere,
+    ):
+        assert list(elsewhere(abs, [-1], lost=print)) == [1]
     (line,) = [one for one in capsys.readouterr().err.splitlines() if "threads" in one]
     assert "has 3 threads, of which one works" in line
     assert line.endswith(f"dask worker {address} --nworkers -1 --nthreads 1")
+
+
+def test_a_worker_that_is_killed_loses_nothing_and_the_bytes_are_the_same(logs, tmp_path):
+    pytest.importorskip("pyarrow", reason="needs pyarrow and fsspec")
+    for k in range(8):
+        text = (logs / "quick.csv").read_bytes() + b"\n" * k
+        (tmp_path / f"{k}.csv").write_bytes(text)
+    replace(sedan(), chassis=None).to_toml(tmp_path / "car.toml")
+    tasks, _ = find_logs([str(tmp_path / "*.csv")], str(tmp_path / "car.toml"))
+    car = tmp_path / "car.toml"
+    work = LearnLog({car: read_car(car, LogMap())}, LogMap())
+    here, there = Store(str(tmp_path / "here")), Store(str(tmp_path / "there"))
+    learn_fleet(tasks, work, here, map, lambda _: None)
+    options, killed = ["--nthreads", "1", "--no-nanny"], []
+    with running(tmp_path, options, options) as (address, workers), cluster(address) as elsewhere:
+
+        def kill_one(ready):
+            if ready > 0 and not killed:
+                killed.append(ready)
+                workers[0].kill()
+
+        learn_fleet(tasks, work, there, on_a_cluster(elsewhere), kill_one)
+    assert killed and killed[0] < len(tasks)
+    files = [sorted((tmp_path / out).rglob("*.parquet")) for out in ("here", "there")]
+    assert [one.read_bytes() for one in files[0]] == [one.read_bytes() for one in files[1]]
 
 
 def test_logs_of_relative_paths_are_learnt_by_workers_in_another_folder(
@@ -109,7 +153,7 @@ def test_logs_of_relative_paths_are_learnt_by_workers_in_another_folder(
         (tmp_path / f"{name}.csv").write_bytes((logs / f"{name}.csv").read_bytes())
     replace(sedan(), chassis=None).to_toml(tmp_path / "car.toml")
     monkeypatch.chdir(tmp_path)
-    words = ["fleet", "learn", "*.csv", "--vehicle", "car.toml", "--judge", "none"]
+    words = ["fleet", "learn", "*.csv", "--vehicle", "car.toml"]
     for out, more in (("here", ["--jobs", "1"]), ("there", ["--scheduler", address])):
         assert main([*words, "--out", out, *more]) == 0
         printed = capsys.readouterr()

@@ -86,6 +86,8 @@ def test_a_signal_estimator_has_no_frozen_error(numbers, result):
     assert "a signal, no model" in (result / "tables.txt").read_text()
 
 
+@needs_rivals
+@pytest.mark.heavy
 @pytest.mark.usefixtures("undrawn")
 def test_the_table_says_which_baselines_know_lag_and_offsets(words, tmp_path, capsys):
     out, names = tmp_path / "out", ("linear", "textbook_ekf", "magic_formula_ekf")
@@ -231,6 +233,7 @@ def test_without_a_log_the_plant_drives(tmp_path, laid_out):
     assert set(data["recordings"]) == {"slalom_20", "step_steer", "lane_change", "slalom_25"}
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("undrawn")
 def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(
     logs, tmp_path, capsys, undrawn
@@ -251,21 +254,24 @@ def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(
 
 
 def test_the_registry_has_every_name_that_is_promised():
-    promised = "linear magic_formula_ekf textbook_ekf lagged_ekf integral instantaneous "
+    promised = "linear lagged_ekf integral instantaneous "
     promised += "instantaneous_scaled pi_lead fit axle inertial"
     assert set(METHODS) == set(promised.split())
 
 
 def test_a_rival_that_is_not_installed_is_told_where_it_is(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("identifier.methods.installed", lambda group: {})
-    told = "method washout is not installed: pip install ./benchmarks/rivals"
-    words = ["--method", "washout", "--out", tmp_path / "out"]
+    told = "method joint_ekf is not installed: pip install ./benchmarks/rivals"
+    words = ["--method", "joint_ekf", "--out", tmp_path / "out"]
     assert told in refusal(capsys, ["compare", *words])
     with pytest.raises(SystemExit):
         main(["identify", "log.csv", "--vehicle", "car.toml", *map(str, words)])
     assert told in capsys.readouterr().err
     with pytest.raises(ValueError, match=told):
-        make_method("washout", sedan())
+        make_method("joint_ekf", sedan())
+    assert main(["compare", "log.csv", "--out", str(tmp_path / "out")]) == 2
+    left_out = "without magic_formula_ekf, textbook_ekf, linear_kf, joint_ekf, which are not inst"
+    assert left_out in capsys.readouterr().err
     assert (ROOT / "benchmarks/rivals/pyproject.toml").is_file()
 
 

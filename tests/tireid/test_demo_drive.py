@@ -8,13 +8,13 @@ import pytest
 
 from codegen import find_compiler
 from models.vehicle import sedan
-from tireid.animation import film as frames
-from tireid.animation.known import known_over_time
+from mpc.tires.tire import curves_at
 from tireid.commands import demo_parts as demo_drive
 from tireid.commands.demo_parts import NOT_DRIVEN, drive_section, drive_story, drive_text
 from tireid.commands.demo_story import run_story
 from tireid.driving import results as drive_results
 from tireid.driving.results import Drives
+from tireid.figures import film as frames
 from tireid.report import Picture
 
 
@@ -26,9 +26,10 @@ def story():
 @pytest.fixture
 def quick(monkeypatch, undrawn):
     """Short films and empty pictures: both have tests of their own."""
-    monkeypatch.setattr(frames, "CHOSEN", frames.CHOSEN._replace(most=4))
+    monkeypatch.setattr(frames, "MOST", 4)
 
 
+@pytest.mark.heavy
 def test_learnt_tires_steer_as_the_true_ones_and_learning_stays_on_the_road(story, tmp_path, quick):
     if find_compiler() is None:
         pytest.skip("needs a C compiler")
@@ -59,9 +60,10 @@ def test_learnt_tires_steer_as_the_true_ones_and_learning_stays_on_the_road(stor
     assert len(films) == 1
     assert all((tmp_path / folder / "drive.webp").is_file() for folder in driven)
     run = driven["drive_slippery"].drives.runs[0]
-    known = known_over_time(run.known, run.model, 12.7)
-    slid = np.argmin(np.abs(known.alpha - 0.07))
-    before, after = (known.steering[np.argmin(np.abs(known.t - t)), slid, 0] for t in (8.0, 15.0))
+    known = [min(run.known, key=lambda one: abs(one.t - t)) for t in (8.0, 15.0)]
+    before, after = (
+        curves_at(run.model._replace(weights=one.steering), np.array([0.07]))[0, 0] for one in known
+    )
     assert 0.0 < after < 0.75 * before, "the friction dropped to half at 8.7 s"
     assert all(run.known == () for one in driven.values() for run in one.drives.runs[1:])
 

@@ -34,6 +34,7 @@ def whole(story, quick, tmp_path_factory):
     return ship(story, folder), folder
 
 
+@pytest.mark.heavy
 def test_it_compiles_passes_and_computes_what_python_computes(whole):
     shipped, folder = whole
     double, single = shipped.checks
@@ -57,6 +58,7 @@ def test_without_a_compiler_the_report_says_so(story, tmp_path, monkeypatch):
     assert exporting.self_test(tmp_path / "package", "tireid", single=False) is None
 
 
+@pytest.mark.heavy
 def test_a_spoiled_package_fails_its_self_test(whole, tmp_path):
     folder = shutil.copytree(whole[1], tmp_path / "package")
     vectors = folder / "tests" / "tireid_vectors.h"

@@ -15,15 +15,14 @@ from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
 from mpc.loop.sensing import CarSensors, cornering_limit
 from mpc.tires import oracle_tire, prediction_tire
+from mpc.tires.tire import curves_at
 from tests.pages import faults_of, outline
 from tests.tireid.conftest import refusal
-from tireid.animation import film
-from tireid.animation.chosen import CHOSEN as ANIMATION_CHOSEN
 from tireid.cli import main
 from tireid.driving import learn as drive_learn
 from tireid.driving import runs as drive_runs
 from tireid.driving.chosen import CHOSEN as DRIVING_CHOSEN
-from tireid.driving.results import steady_curve
+from tireid.figures import film
 from tireid.learning import identify
 
 SIDE = 3.0 * (1.0 - np.cos(np.linspace(0.0, 2.0 * np.pi, 9)))
@@ -47,7 +46,7 @@ def result(bend, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(drive_learn, "CHOSEN", drive_learn.CHOSEN._replace(duration=15.0))
         patch.setattr(drive_learn, "CHOSEN", drive_learn.CHOSEN._replace(grows=10.0))
-        patch.setattr(film, "CHOSEN", film.CHOSEN._replace(most=20))
+        patch.setattr(film, "MOST", 20)
         assert main(words) == 0
     return out
 
@@ -106,7 +105,7 @@ def test_everything_is_written(result):
     assert (result / "drive.webp").read_bytes()[8:12] == b"WEBP"
     with Image.open(result / "drive.webp") as shown:
         assert 10 <= shown.n_frames <= 20
-        longest = ANIMATION_CHOSEN.most / shown.n_frames * (result / "drive.webp").stat().st_size
+        longest = 120 / shown.n_frames * (result / "drive.webp").stat().st_size
     assert longest < 2e6
     assert load_model(result / "weights.json").vehicle.name == "sedan"
 
@@ -125,6 +124,7 @@ def test_stored_weights_steer_alike_and_the_hash_tells_what_went_in(
     assert not (tmp_path / "same" / "drive.webp").exists()
 
 
+@pytest.mark.heavy
 def test_learning_and_oracle_are_told_of_a_friction_that_drops(
     result, bend, tmp_path, capsys, undrawn
 ):
@@ -158,6 +158,7 @@ def test_a_car_that_leaves_its_path_is_told_with_exit_code_1(bend, tmp_path, cap
     assert summary_of(tmp_path / "out")["completed"] is False
 
 
+@pytest.mark.heavy
 def test_the_drive_to_learn_on_slides_but_neither_spins_nor_tips():
     car = DoubleTrackCar(sedan(), friction=Friction())
     grip = cornering_limit(car.vehicle, car.tire)
@@ -168,10 +169,10 @@ def test_the_drive_to_learn_on_slides_but_neither_spins_nor_tips():
     slip = np.abs(recording.alpha(car.vehicle.l_f, car.vehicle.l_r)).max(axis=0)
     assert (slip > np.radians(3.5)).all()
     assert np.abs(recording.a_y).max() > 0.9 * grip
-    learnt = steady_curve("", prediction_tire(identify(recording, sedan()).freeze()), 20.0)
-    true = steady_curve("", oracle_tire(car.vehicle, car.tire), 20.0)
-    within = np.abs(true.alpha) < np.radians(4.0)
-    np.testing.assert_allclose(learnt.force[within], true.force[within], atol=300.0)
+    within = np.radians(np.linspace(-4.0, 4.0, 65))
+    learnt = curves_at(prediction_tire(identify(recording, sedan()).freeze()), within)
+    true = curves_at(oracle_tire(car.vehicle, car.tire), within)
+    np.testing.assert_allclose(learnt, true, atol=300.0)
 
 
 def test_a_car_that_would_spin_ends_the_drive_to_learn_on_before():
@@ -200,7 +201,6 @@ def test_a_car_that_would_spin_ends_the_drive_to_learn_on_before():
         (["--seed", "-1"], "--seed must not be negative"),
         (["--weights", "nowhere.json"], "nowhere.json"),
         (["--weights", "a.json", "--paper"], "give only one of --weights, --paper"),
-        (["--network-iso"], "go with --network"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
     ],
 )
@@ -221,6 +221,7 @@ def test_without_a_compiler_it_says_so_before_it_learns(bend, tmp_path, capsys, 
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.heavy
 def test_tires_of_another_car_lead_somewhere(bend, tmp_path, capsys, undrawn):
     """The name of a car is no difference, its mass is."""
     car, log = sedan(), ti.sample_recording()

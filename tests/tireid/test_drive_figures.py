@@ -1,23 +1,21 @@
 """Pictures of a drive: units on every axis, nothing cut off, one scale for maps, a moving film."""
 
-import re
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 from PIL import Image, ImageSequence
 
 from models.faults import SensorFault
 from models.vehicle import sedan
 from mpc.loop.record import Drive, Plan
 from mpc.path import Path
-from tireid.animation import film as frames
-from tireid.animation import write_film
-from tireid.animation.chosen import CHOSEN as ANIMATION_CHOSEN
-from tireid.animation.ground import Camera
-from tireid.animation.known import KnownCurves
-from tireid.animation.scene import Scene
+from mpc.tires import prediction_tire
+from mpc.tires.tire import curves_at
+from tireid.driving.known import Known
+from tireid.figures import film
 from tireid.figures.drive import (
     car_shape,
     drive_errors_figure,
@@ -25,7 +23,7 @@ from tireid.figures.drive import (
     drive_solve_figure,
     drive_steering_figure,
 )
-from tireid.figures.tires import TireCurve, drive_tires_figure
+from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
 
 CAR = sedan()
 SPEED, PERIOD = 16.0, 0.02
@@ -90,6 +88,7 @@ def made_up(path: Path, off: float) -> Drive:
 ON_LANE = {"frozen": made_up(LANE, 0.1), "linear": made_up(LANE, 1.9)}
 ON_COURSE = {"frozen": made_up(COURSE, 0.1), "linear": made_up(COURSE, -0.8)}
 ALPHA = np.linspace(-0.3, 0.3, 31)
+SLIP = axle_slip(ON_LANE["frozen"])
 CURVES = [
     TireCurve(label=label, alpha=ALPHA, force=np.column_stack([1e5 * ALPHA, 8e4 * ALPHA]))
     for label in ("frozen", "linear", "oracle")
@@ -125,19 +124,11 @@ def test_maps_have_one_scale_and_show_the_whole_path(drives):
     figure = drive_path_figure(drives)
     figure.canvas.draw()
     assert all(axes.get_aspect() == 1.0 for axes in figure.axes)
-    rows = [axes for axes in figure.axes if "scale" not in axes.get_title()]
+    rows = [axes for axes in figure.axes if not axes.get_title()]
     path = drives["frozen"].path
     shown = path.cones[:, 0] if len(path.cones) else path.X
     assert min(axes.get_xlim()[0] for axes in rows) < shown.min()
     assert max(axes.get_xlim()[1] for axes in rows) > shown.max()
-
-
-def test_the_limit_and_the_end_of_the_path_are_drawn_where_they_matter():
-    labels = [text.get_text() for text in FIGURES["errors"]().legends[0].get_texts()]
-    assert labels == ["off the path", "frozen", "linear", "friction 0.5"]
-    gentle = {"frozen": ON_LANE["frozen"]}
-    texts = drive_errors_figure(gentle, off_path=2.0).legends[0].get_texts()
-    assert [text.get_text() for text in texts] == ["frozen"]
 
 
 def test_a_car_turned_left_has_its_nose_up_and_its_wheels_turned_further():
@@ -154,105 +145,94 @@ def test_a_car_turned_left_has_its_nose_up_and_its_wheels_turned_further():
 def test_the_camera_sees_what_is_ahead_to_the_right_and_left_above():
     for path, s in ((LANE, 30.0), (COURSE, 200.0)):
         X, Y, psi = (float(value) for value in path.pose(s))
-        view = Camera(path).at(s)
-        here = view.see(np.array([X, Y]))
-        ahead = view.see(np.array([X + np.cos(psi), Y + np.sin(psi)])) - here
-        left = view.see(np.array([X - np.sin(psi), Y + np.cos(psi)])) - here
+        drive = made_up(path, 0.0)
+        view = film.camera(drive, int(np.searchsorted(drive.s, s)))
+        here = view.transform((X, Y))
+        ahead = view.transform((X + np.cos(psi), Y + np.sin(psi))) - here
+        left = view.transform((X - np.sin(psi), Y + np.cos(psi))) - here
         assert ahead[0] > 0.9 and left[1] > 0.9
-        assert abs(here[0]) < 1e-6
+        assert abs(here[0]) < 0.5
 
 
-@pytest.mark.parametrize(
-    ("drives", "kind", "frame_bytes"),
-    [(ON_LANE, "webp", 2e4), (ON_COURSE, "webp", 2e4), (ON_LANE, "gif", 5e4)],
-    ids=["lane", "course", "gif"],
-)
-def test_the_film_is_crisp_and_small_and_moves(drives, kind, frame_bytes, tmp_path, monkeypatch):
-    monkeypatch.setattr(frames, "CHOSEN", frames.CHOSEN._replace(most=6))
+@pytest.mark.parametrize(("drives", "kind"), [(ON_LANE, "webp"), (ON_COURSE, "gif")])
+def test_the_film_is_small_and_moves_and_holds_its_end(drives, kind, tmp_path, monkeypatch):
+    monkeypatch.setattr(film, "MOST", 4)
     file = tmp_path / f"drive.{kind}"
-    write_film(file, drives, CURVES, title="made up")
-    with Image.open(file) as film:
-        pictures = [np.array(frame.convert("RGB")) for frame in ImageSequence.Iterator(film)]
-        assert film.info["loop"] == 0
-        assert film.size == (960, 600)
-    assert file.stat().st_size < frame_bytes * len(pictures)
-    assert (
-        len(pictures) >= frames.CHOSEN.most
-    )  # what stays at the end may be one picture that is held
-    for before, after in pairwise(pictures[: frames.CHOSEN.most]):
+    film.write_film(file, film.Film("made up", drives, CURVES))
+    with Image.open(file) as shown:
+        frames = [
+            (np.array(frame.convert("RGB")), frame.info["duration"])
+            for frame in ImageSequence.Iterator(shown)
+        ]
+        assert shown.info["loop"] == 0 and shown.size == (960, 600)
+    assert file.stat().st_size < 5e4 * 4
+    for (before, _), (after, _) in pairwise(frames[:4]):
         assert (before != after).any()
+    assert sum(duration for _, duration in frames[3:]) >= 100 * film.HOLD
 
 
-def test_the_last_picture_is_held(tmp_path, monkeypatch):
-    monkeypatch.setattr(frames, "CHOSEN", frames.CHOSEN._replace(most=2))
-    file = tmp_path / "drive.gif"
-    write_film(file, ON_LANE, CURVES, title="made up")
-    with Image.open(file) as film:
-        last = [frame.info["duration"] for frame in ImageSequence.Iterator(film)][-1]
-    assert last >= 1000.0 / ANIMATION_CHOSEN.rate * ANIMATION_CHOSEN.hold
+def picture(t, *parts):
+    """The panels of the axles in a picture of a film."""
+    figure = Figure()
+    film.draw(figure, film.Film("made up", *parts), t)
+    return figure.axes[1:3]
 
 
+TIRE = prediction_tire(CAR)
 GROWN = np.linspace(0.2, 1.0, 11)
-KNOWN = KnownCurves(
-    t=np.linspace(0.0, 5.0, 11),
-    alpha=ALPHA,
-    steering=np.array([g * CURVES[0].force for g in np.floor(2.0 * GROWN) / 2.0]),
-    learnt=np.array([g * CURVES[0].force for g in GROWN]),
-    slip=np.radians(1.0) * np.column_stack([GROWN, 2.0 * GROWN]),
-)
+KNOWN = [
+    Known(0.5 * k, 0.5 * g * TIRE.weights, g * TIRE.weights, np.radians([g, 2.0 * g]) / 10.0)
+    for k, g in enumerate(GROWN)
+]
 
 
 @pytest.mark.parametrize("t", [0.0, 2.3, 4.7])
 def test_the_film_shows_the_curves_as_they_were_known_then(t):
-    scene = Scene(ON_LANE, CURVES, drops=(), pace=1.0, title="made up", known=KNOWN)
-    scene.show(t)
-    k = int(t / 0.5)
-    panels = [axes for axes in scene.figure.axes if "axle" in axes.get_title("left")]
-    assert len(panels) == 2
-    for axle, axes in enumerate(panels):
+    known = KNOWN[int(t / 0.5)]
+    for axle, axes in enumerate(picture(t, ON_LANE, CURVES, (), KNOWN, TIRE)):
         drawn = curves(axes)
-        for label, force in (
-            ("identified so far", KNOWN.learnt),
-            ("steered by, now", KNOWN.steering),
+        for label, weights in (
+            ("identified so far", known.learnt),
+            ("used by the tracker", known.steering),
         ):
-            inside = np.abs(ALPHA) < 0.02  # beyond, a curve leaves the panel
-            np.testing.assert_allclose(
-                1e3 * drawn[label][inside, 1], force[k][inside, axle], atol=1e-6
-            )
-        edges = sorted(patch.get_x() + patch.get_width() for patch in axes.patches)
-        assert edges[0] == pytest.approx(-np.degrees(KNOWN.slip[k, axle]))
-        assert edges[1] == pytest.approx(axes.get_xlim()[1])
+            slip, force = drawn[label].T
+            expected = curves_at(TIRE._replace(weights=weights), np.radians(slip))[axle]
+            np.testing.assert_allclose(1e3 * force, expected, atol=1e-6)
+        boxes = [
+            patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches
+        ]
+        edges = sorted(end for box in boxes for end in (box.x0, box.x1))
+        known_to = np.degrees(known.slip[axle])
+        reach = axes.get_xlim()[1]
+        assert edges == pytest.approx([-reach, -known_to, known_to, reach], abs=1e-6)
+
+
+def test_the_film_shows_force_over_slip_up_to_now_of_each_axle():
+    drive = ON_LANE["frozen"]
+    for axle, axes in enumerate(picture(3.0, ON_LANE, CURVES)):
+        (x,), (y,) = axes.lines[-1].get_data()
+        k = int(np.searchsorted(drive.t, 3.0))
+        assert (1e3 * y, np.radians(x)) == pytest.approx((drive.axle_force[k, axle], SLIP[k, axle]))
 
 
 def test_the_true_curve_of_a_film_is_that_of_the_road_that_the_car_is_on():
     later = replace(CURVES[2], label="oracle at the end", force=0.5 * CURVES[2].force)
-    scene = Scene(ON_LANE, [*CURVES, later], drops=[(60.0, 0.5)], pace=1.0, title="made up")
-    for t, halved in ((1.0, False), (5.0, True)):
-        scene.show(t)
-        seen = {
-            line.get_label(): line.get_visible()
-            for line in scene.figure.axes[1].lines
-            if str(line.get_label()).startswith("oracle")
-        }
-        assert seen == {"oracle": not halved, "oracle at the end": halved}
+    hindsight = replace(CURVES[0], label="frozen at the end", force=9.0 * CURVES[0].force)
+    for t, share in ((1.0, 1.0), (5.0, 0.5)):
+        axes = picture(t, ON_LANE, [*CURVES, later, hindsight], [(60.0, 0.5)])[0]
+        stiffest = [np.ptp(line.get_ydata()) for line in axes.lines]
+        np.testing.assert_allclose(
+            curves(axes)["true tire"][:, 1], share * CURVES[2].force[:, 0] / 1e3
+        )
+        assert max(stiffest) <= np.ptp(CURVES[0].force[:, 0]) / 1e3, "what was known at the end"
 
 
 def test_the_panels_of_a_film_show_the_true_curve_as_far_as_the_car_slips():
-    grippy = replace(CURVES[2], label="oracle", force=3.0 * CURVES[2].force)
-    free, tall = (
-        Scene(ON_LANE, tires, drops=(), pace=1.0, title="made up").figure.axes[1]
-        for tires in (CURVES[:1], [*CURVES[:1], grippy])
-    )
+    grippy = replace(CURVES[2], force=3.0 * CURVES[2].force)
+    free, tall = (picture(0.0, ON_LANE, some)[0] for some in (CURVES[:1], [CURVES[0], grippy]))
     inside = np.abs(np.rad2deg(grippy.alpha)) <= tall.get_xlim()[1]
-    assert 1e-3 * np.abs(grippy.force[inside, 0]).max() > free.get_ylim()[1]  # else it says nothing
-    assert 1e-3 * np.abs(grippy.force[inside]).max() < tall.get_ylim()[1]
-
-
-def test_what_was_known_only_at_the_end_is_not_in_a_film():
-    hindsight = replace(CURVES[0], label="frozen at the end")
-    scene = Scene(ON_LANE, [*CURVES, hindsight], drops=(), pace=1.0, title="made up")
-    labels = [line.get_label() for axes in scene.figure.axes for line in axes.lines]
-    assert "frozen" in labels and "frozen at the end" not in labels
+    largest = 1e-3 * np.abs(grippy.force[inside]).max()
+    assert free.get_ylim()[1] < largest < tall.get_ylim()[1]
 
 
 FAULT = SensorFault(channel="v_y", kind="biased", start=2.0, duration=1.5, size=0.3)
@@ -293,33 +273,9 @@ def test_below_the_tires_stands_what_each_curve_misses_of_the_true_one_of_its_ro
             np.testing.assert_allclose(1e3 * line[:, 1], expected[part, axle], atol=1e-9)
 
 
-def test_an_mp4_without_ffmpeg_is_refused_with_what_to_do(tmp_path, monkeypatch):
-    monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(ValueError, match=r"needs ffmpeg.*or ask for a GIF"):
-        frames.require_ffmpeg()
-
-
 def curves(axes):
     """Drawn data by label."""
     return {line.get_label(): np.column_stack(line.get_data()) for line in axes.get_lines()}
-
-
-def test_a_map_of_a_course_shows_deviations_to_their_side_and_larger_by_what_it_says():
-    X, Y = 120.0 * np.cos(AROUND), 110.0 * np.sin(AROUND)
-    course = Path.from_waypoints(X, Y, closed=True, name="round")
-    drives = {"frozen": made_up(course, 0.1), "linear": made_up(course, -0.8)}
-    whole, part = drive_path_figure(drives).axes[:2]
-    title = whole.get_title() + whole.get_title(loc="left")
-    times = float(re.search(r"drawn (\S+) times", title).group(1))
-    assert times > 1.0
-    for label, drive in drives.items():
-        drawn = curves(whole)[label]
-        center = np.column_stack(course.pose(drive.s)[:2])
-        out = np.hypot(*drawn.T) - np.hypot(*center.T)
-        assert np.sign(out).mean() == -np.sign(drive.e_y).mean(), "left is inside, turning left"
-        away = np.hypot(*(drawn - center).T)
-        np.testing.assert_allclose(away, times * np.abs(drive.e_y), rtol=1e-6)
-        np.testing.assert_allclose(curves(part)[label], np.column_stack([drive.X, drive.Y]))
 
 
 def test_errors_are_drawn_over_arc_length_in_the_units_of_their_axes():

@@ -32,6 +32,7 @@ def columns(file):
     return np.genfromtxt(file, delimiter=",", names=True)
 
 
+@pytest.mark.heavy
 def test_the_car_drives_as_well_as_with_v_y(result, bend, tmp_path, undrawn):  # noqa: F811
     words = ["drive", "--path", str(bend), "--weights", str(result / "weights.json")]
     assert main([*words, "--film", "none", "--out", str(tmp_path / "full")]) == 0
@@ -65,6 +66,7 @@ def test_the_report_shows_the_side_slip_that_was_told(result):
     assert "Lateral velocity, which no sensor measured" in text
 
 
+@pytest.mark.heavy
 def test_what_has_all_sensors_says_nothing_of_it(bend, result, tmp_path, capsys, undrawn):  # noqa: F811
     """And names them or not: the same bits."""
     words = ["drive", "--path", str(bend), "--weights", str(result / "weights.json")]
@@ -102,6 +104,7 @@ def test_a_fault_is_of_a_sensor_that_is_there():
     assert parse_fault("v_y:stuck:1:2", "full").channel == "v_y"
 
 
+@pytest.mark.heavy
 def test_the_public_function_takes_the_same_road(result):
     car, path = sedan(), ti.paths.iso_3888_2()
     tire = load_model(result / "weights.json")

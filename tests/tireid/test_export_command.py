@@ -67,6 +67,7 @@ def test_single_precision_is_the_default_of_the_build(tmp_path):
     assert json.loads((tmp_path / "a" / "tireid.json").read_text())["precision"] == "float"
 
 
+@pytest.mark.heavy
 def test_a_y_is_an_input_where_it_is_asked_for(tmp_path, capsys):
     for words, inputs in (([], "v_x, v_y, r, delta_f, delta_r"), (["--with-a-y"], "delta_r, a_y")):
         assert main(["export", "--out", str(tmp_path / f"a{len(words)}"), *words]) == 0
@@ -77,6 +78,7 @@ def test_a_y_is_an_input_where_it_is_asked_for(tmp_path, capsys):
     assert "bank" in [one["name"] for one in manifest["carried"]]
 
 
+@pytest.mark.heavy
 def test_what_was_learnt_without_a_lateral_velocity_goes_on_without_it(
     tmp_path, logs, capsys, monkeypatch
 ):
@@ -136,8 +138,8 @@ def test_the_frozen_network_lies_beside_the_c(tmp_path):
         (["--method", "linear"], "formula without state"),
         (["--paper", "--method", "axle"], "give only one of --method, --paper"),
         (["--weights", "missing.json"], "missing.json"),
-        rival(["--method", "washout", "--onnx"], "--onnx"),
-        (["--method", "magic_formula_ekf", "--with-a-y"], "has no use for a_y"),
+        rival(["--method", "linear_kf", "--onnx"], "--onnx"),
+        (["--method", "integral", "--with-a-y"], "has no use for a_y"),
     ],
 )
 def test_bad_words_are_one_line_and_leave_nothing(words, complaint, tmp_path, capsys):

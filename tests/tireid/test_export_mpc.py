@@ -55,6 +55,7 @@ def test_both_packages_and_what_joins_them_are_complete(tmp_path, capsys):
     assert CompiledPackage.from_folder(out / "identifier").name == "car"
 
 
+@pytest.mark.heavy
 def test_a_car_named_as_the_example_builds_and_drives(tmp_path):
     if shutil.which("cmake") is None:
         pytest.skip("needs cmake")
@@ -69,6 +70,7 @@ def test_a_car_named_as_the_example_builds_and_drives(tmp_path):
     assert json.loads((out / "mpc" / "car_mpc.json").read_text())["precision"] == "float"
 
 
+@pytest.mark.heavy
 def test_the_tracker_begins_with_learnt_weights_and_another_car(tmp_path, logs):
     model = identify(read_recording(logs / "slalom.csv"), CAR, make_method("axle", CAR)).freeze(7.0)
     model.save(tmp_path / "weights.json")
@@ -82,7 +84,8 @@ def test_the_tracker_begins_with_learnt_weights_and_another_car(tmp_path, logs):
     assert manifest["params"]["car"] == list(CAR.bicycle[:4])
 
 
-@pytest.mark.parametrize("law", [rival("washout"), "magic_formula_ekf"])
+@pytest.mark.sweep("lagged_ekf")
+@pytest.mark.parametrize("law", [rival("linear_kf"), "lagged_ekf"])
 def test_a_method_without_a_tire_for_c_is_refused_in_one_line(law, tmp_path, capsys):
     out = tmp_path / "package"
     assert main(["export", "--out", str(out), "--mpc", "--method", law]) == 2

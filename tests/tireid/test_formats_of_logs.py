@@ -38,6 +38,7 @@ def summary(driven, logs, tmp_path_factory):
     return summary_of("CSV", tmp_path_factory.mktemp("csv"), driven, logs)
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("unmade")
 @pytest.mark.parametrize("format", OTHERS)
 def test_a_drive_gives_the_same_bytes_of_a_summary_from_every_format(
@@ -46,6 +47,7 @@ def test_a_drive_gives_the_same_bytes_of_a_summary_from_every_format(
     assert summary_of(format, tmp_path, driven, logs) == summary
 
 
+@pytest.mark.sweep("ROS 2 bag", "CAN BLF", "CSV", "MATLAB 7.3", "MDF4", "Parquet")
 @pytest.mark.parametrize("format", FORMATS)
 def test_channels_writes_a_map_that_reads_the_same_recording_from_every_format(
     format, driven, tmp_path
@@ -61,6 +63,7 @@ def test_channels_writes_a_map_that_reads_the_same_recording_from_every_format(
         assert np.array_equal(getattr(recording, name), values), name
 
 
+@pytest.mark.heavy
 @pytest.mark.usefixtures("unmade")
 def test_another_drive_gives_another_summary(driven, summary, logs, tmp_path):
     t, columns = driven

@@ -3,13 +3,11 @@
 import json
 import re
 import subprocess
-import zipfile
 from dataclasses import replace
 from shutil import which
 
 import pytest
 
-from codegen import find_compiler
 from identifier.export import processor as figures
 from identifier.methods import make_method
 from models.vehicle import sedan
@@ -78,6 +76,7 @@ def test_a_name_is_a_comment_in_what_other_tools_read(name, tmp_path):
         assert [line.startswith("$") for line in lines] == [k < 9 for k in range(len(lines))]
 
 
+@pytest.mark.sweep("an order to cmake")
 @pytest.mark.skipif(which("cmake") is None, reason="needs cmake")
 @pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
 def test_a_package_is_built_and_nothing_else_is_run(name, tmp_path, monkeypatch):
@@ -91,40 +90,6 @@ def test_a_package_is_built_and_nothing_else_is_run(name, tmp_path, monkeypatch)
         if file.suffix in (".c", ".h", ".md", ".txt"):
             text = file.read_text(encoding="utf-8")
             assert text.replace("\n", "").isprintable(), file
-
-
-@pytest.mark.skipif(which("cmake") is None, reason="needs cmake")
-def test_identifier_and_tracker_are_built_and_nothing_else_is_run(tmp_path, monkeypatch):
-    if find_compiler() is None:
-        pytest.skip("needs a C compiler")
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("tireid.exporting.measure_mpc", lambda _: [])
-    out = tmp_path / "out"
-    car = car_called(CONSTRUCTOR + ORDER + "@title@", tmp_path)
-    assert main(["export", "--out", str(out), "--mpc", "--paper", "--vehicle", str(car)]) == 0
-    for part in (out, out / "mpc", out / "identifier"):
-        words = ["cmake", "-S", str(part), "-B", str(tmp_path / f"build-{part.name}")]
-        answer = subprocess.run(words, capture_output=True, text=True, check=False)
-        assert answer.returncode == 0, answer.stderr
-    built(out / "mpc")
-    assert not list(tmp_path.rglob("ran"))
-
-
-def test_an_fmu_is_loaded_and_nothing_in_it_is_run(tmp_path, monkeypatch):
-    fmpy = pytest.importorskip("fmpy")
-    if find_compiler() is None:
-        pytest.skip("needs a C compiler")
-    monkeypatch.chdir(tmp_path)
-    out = tmp_path / "out"
-    car = car_called(CONSTRUCTOR, tmp_path)
-    assert main(["export", "--out", str(out), "--fmu", "--vehicle", str(car)]) == 0
-    for version in (2, 3):
-        fmu = out / f"tireid_fmi{version}.fmu"
-        assert fmpy.simulate_fmu(str(fmu), stop_time=0.1) is not None
-        with zipfile.ZipFile(fmu) as archive:
-            texts = [archive.read(n).decode() for n in archive.namelist() if n.endswith(".h")]
-        assert any("constructor" in text for text in texts)  # in a comment, as words
-    assert not list(tmp_path.rglob("ran"))
 
 
 def test_no_name_and_no_word_commands_the_terminal(tmp_path, capsys, monkeypatch):

@@ -1,7 +1,6 @@
 """Files and drawings of long recordings: nothing that reaches far is lost, and no byte changes."""
 
 import io
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,7 @@ from tireid.figures import thinned
 from tireid.figures.forces import inputs_figure
 from tireid.figures.thinned import cloud, drawn_times, shown, shown_of_run
 from tireid.learning import identify
-from tireid.output import require_curves, write_csv, write_long_csv, write_table
+from tireid.output import write_csv, write_long_csv
 from tireid.reports.common import _recording_digest
 
 N = 500_000
@@ -28,7 +27,8 @@ def signal(rng):
 
 def test_all_samples_of_a_short_recording_are_drawn(rng):
     t = 0.01 * np.arange(1000)
-    np.testing.assert_array_equal(shown(t, (1.0, 2.0)), (t >= 1.0) & (t <= 2.0))
+    within = np.flatnonzero((t >= 1.0) & (t <= 2.0))
+    np.testing.assert_array_equal(shown(t, (1.0, 2.0)), within)
 
 
 def test_no_peak_is_lost_and_few_points_are_drawn(signal, rng):
@@ -74,7 +74,7 @@ def test_no_line_is_drawn_over_a_gap(signal):
     )
 
 
-def test_a_cloud_shows_what_is_outermost_and_every_place_that_is_hit(rng):
+def test_a_cloud_shows_what_is_outermost(rng):
     slip = 0.1 * rng.standard_normal((N, 2))
     force = np.tanh(10.0 * slip) + 0.01 * rng.standard_normal((N, 2))
     moving = np.arange(N) > 1000
@@ -85,17 +85,6 @@ def test_a_cloud_shows_what_is_outermost_and_every_place_that_is_hit(rng):
     for values in (slip, force):
         np.testing.assert_array_equal(values[part].max(axis=0), values[moving].max(axis=0))
         np.testing.assert_array_equal(values[part].min(axis=0), values[moving].min(axis=0))
-
-    def places(samples, least):
-        cells = [
-            np.floor(values[samples, 0] / np.ptp(values[moving, 0]) * 60)
-            for values in (slip, force)
-        ]
-        found, counts = np.unique(np.column_stack(cells), axis=0, return_counts=True)
-        return set(map(tuple, found[counts >= least]))
-
-    assert len(places(moving, 30)) > 100
-    assert len(places(part, 1) & places(moving, 30)) > 0.97 * len(places(moving, 30))
 
 
 @pytest.fixture(scope="module")
@@ -153,24 +142,3 @@ def test_the_hash_of_a_long_recording_tells_one_bit(drive, monkeypatch):
     r[2999] = np.nextafter(r[2999], 1.0)
     assert _recording_digest(drive) == _recording_digest(replace(drive))
     assert _recording_digest(drive) != _recording_digest(replace(drive, r=r))
-
-
-def test_a_parquet_table_in_parts_holds_every_digit_of_every_column(tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet")
-    rng = np.random.default_rng(1)
-    columns = {"t_s": 0.01 * np.arange(1000), "Fyf_N": rng.standard_normal((1000, 2))[:, 1]}
-    columns["Fyr_N"] = np.where(rng.random(1000) < 0.1, np.nan, columns["Fyf_N"] * 1e-300)
-    cuts = [slice(0, 1), slice(1, 400), slice(400, 1000)]
-    path = tmp_path / "forces.parquet"
-    write_table(path, ({k: v[cut] for k, v in columns.items()} for cut in cuts))
-    table = parquet.read_table(path)
-    assert table.column_names == list(columns)
-    for name, values in columns.items():
-        np.testing.assert_array_equal(np.array(table.column(name).to_pylist()), values)
-
-
-def test_without_pyarrow_parquet_is_refused_before_anything_is_learnt(monkeypatch):
-    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    require_curves("csv")
-    with pytest.raises(ValueError, match="--curves parquet needs pyarrow: pip install pyarrow"):
-        require_curves("parquet")

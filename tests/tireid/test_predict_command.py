@@ -45,7 +45,7 @@ def predicted(out, *words, status=0):
     return json.loads((out / "summary.json").read_text(encoding="utf-8")), columns
 
 
-def test_it_says_what_the_interface_says(model, logs, tmp_path, capsys):
+def test_it_says_what_the_interface_says(model, logs, tmp_path, capsys, undrawn):
     summary, columns = predicted(tmp_path / "out", model, logs / "quick.csv")
     tire, log = ti.TireModel.load(model), read_recording(logs / "quick.csv")
     force = tire.predict(log)
@@ -79,7 +79,7 @@ def test_it_leaves_a_report_with_figures(model, logs, tmp_path, capsys):
         assert page.index("Axle force over slip angle") < page.index("No warnings.")
 
 
-def test_a_refused_answer_looks_refused(model, logs, tmp_path):
+def test_a_refused_answer_looks_refused(model, logs, tmp_path, undrawn):
     data = json.loads(model.read_text(encoding="utf-8"))
     path = tmp_path / "weak.json"
     weak = {**weaker(data, 0.5), "valid": False}
@@ -92,7 +92,9 @@ def test_a_refused_answer_looks_refused(model, logs, tmp_path):
     assert '<div class="good">' not in page
 
 
-def test_without_truth_it_says_what_of_the_motion_is_explained(model, logs, tmp_path, capsys):
+def test_without_truth_it_says_what_of_the_motion_is_explained(
+    model, logs, tmp_path, capsys, undrawn
+):
     log = replace(read_recording(logs / "quick.csv"), axle_force=None)
     write_recording(log, tmp_path / "blind.csv")
     summary, columns = predicted(tmp_path / "out", model, tmp_path / "blind.csv")
@@ -105,7 +107,7 @@ def test_without_truth_it_says_what_of_the_motion_is_explained(model, logs, tmp_
     assert f"explained are {share:.1f} % of the lateral" in said
 
 
-def test_a_model_of_half_the_force_explains_less(model, logs, tmp_path):
+def test_a_model_of_half_the_force_explains_less(model, logs, tmp_path, undrawn):
     """(1/2)² of the mean square stays: three quarters are explained, by the lateral balance."""
     data = json.loads(model.read_text(encoding="utf-8"))
     weak = weaker(data, 0.5)
@@ -120,7 +122,7 @@ def test_a_model_of_half_the_force_explains_less(model, logs, tmp_path):
     assert half["motion"]["explained_lateral"] == pytest.approx(0.75, abs=0.05)
 
 
-def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys):
+def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys, undrawn):
     log = read_recording(logs / "slalom.csv")
     tire = ti.identify(log, ti.sedan()).freeze(t=1.6)  # the slalom has just begun
     tire.save(tmp_path / "young.json")
@@ -131,7 +133,7 @@ def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys):
     assert f"which {100.0 * beyond:.0f} /" in capsys.readouterr().out
 
 
-def test_it_says_how_often_the_band_held(logs, tmp_path, capsys):
+def test_it_says_how_often_the_band_held(logs, tmp_path, capsys, undrawn):
     run = ti.identify(read_recording(logs / "slalom.csv"), ti.sedan())
     tire = run.tire
     tire.save(tmp_path / "model.json")
@@ -153,7 +155,7 @@ def test_it_says_how_often_the_band_held(logs, tmp_path, capsys):
     assert max(weak["windows_within_band"]) < 0.6
 
 
-def test_an_axle_model_is_mounted_on_the_car_that_drove(model, logs, tmp_path, capsys):
+def test_an_axle_model_is_mounted_on_the_car_that_drove(model, logs, tmp_path, capsys, undrawn):
     """A car with more load in the back: forces scale by the loads of the axles."""
     car = ti.sedan()
     laden = replace(car, mass=1.2 * car.mass, name="laden")
@@ -170,6 +172,7 @@ def test_an_axle_model_is_mounted_on_the_car_that_drove(model, logs, tmp_path, c
     assert "scaled by the axle loads" not in capsys.readouterr().err
 
 
+@pytest.mark.sweep("words1*", "words2*")
 @pytest.mark.parametrize(
     ("words", "told"),
     [
@@ -197,14 +200,14 @@ def test_what_cannot_be_asked_is_one_line_and_leaves_nothing(
     assert not out.exists()
 
 
-def test_a_folder_is_replaced_only_when_told(model, logs, tmp_path, capsys):
+def test_a_folder_is_replaced_only_when_told(model, logs, tmp_path, capsys, undrawn):
     out = tmp_path / "out"
     line = ["predict", str(model), str(logs / "quick.csv"), "--out", str(out)]
     assert [main(line), main(line), main([*line, "--force"])] == [0, 2, 0]
     assert "add --force" in capsys.readouterr().err
 
 
-def test_another_road_is_told_with_its_friction(model, tmp_path, capsys):
+def test_another_road_is_told_with_its_friction(model, tmp_path, capsys, undrawn):
     steering = RandomSteer(
         amplitude=0.05, frequency=0.6, seed=5, onset=1.0, rate_limit=0.8, duration=24.0
     )
@@ -220,7 +223,7 @@ def test_another_road_is_told_with_its_friction(model, tmp_path, capsys):
     assert "of the friction of the identification drive" in capsys.readouterr().out
 
 
-def test_a_band_that_nobody_calibrated_tells_no_road(logs, tmp_path, capsys):
+def test_a_band_that_nobody_calibrated_tells_no_road(logs, tmp_path, capsys, undrawn):
     unchecked = tmp_path / "unchecked.json"
     log = read_recording(logs / "slalom.csv")
     ti.identify(log, ti.sedan(), make_method("axle", ti.sedan())).freeze().save(unchecked)
@@ -229,7 +232,7 @@ def test_a_band_that_nobody_calibrated_tells_no_road(logs, tmp_path, capsys):
     assert "friction: not observable, the band is of the identifier" in capsys.readouterr().out
 
 
-def test_a_road_that_is_the_same_is_said_to_be(model, logs, tmp_path, capsys):
+def test_a_road_that_is_the_same_is_said_to_be(model, logs, tmp_path, capsys, undrawn):
     summary, _ = predicted(tmp_path / "out", model, logs / "quick.csv")
     assert summary["friction"] == {"unchanged": True, "roads": []}
     assert "friction: that of the identification drive" in capsys.readouterr().out

@@ -10,17 +10,13 @@ from matplotlib.figure import Figure
 from tests.pages import faults_of, outline
 from tireid.figures.style import figure_png, figure_svg
 from tireid.report import (
-    _FINE,
-    _STYLE,
     Headline,
     Marked,
     Paragraph,
     Picture,
     Report,
     Section,
-    Subheading,
     Table,
-    printed,
     report_html,
     write_report,
 )
@@ -86,14 +82,6 @@ def test_report_says_everything_it_was_given_and_nothing_as_markup() -> None:
     assert "script" not in tags and "angle" not in tags
 
 
-def test_contents_lead_to_every_section() -> None:
-    tags = outline(page_of("T", SECTIONS)).tags
-    links = [str(attributes["href"])[1:] for tag, attributes in tags if tag == "a"]
-    headings = [attributes["id"] for tag, attributes in tags if tag == "h2"]
-    assert links[: len(SECTIONS)] == headings
-    assert len(headings) == len(SECTIONS)
-
-
 def test_columns_of_numbers_are_aligned_right_and_gaps_are_dashes() -> None:
     table = Table(caption="c", header=["a", "b"], rows=[["x", -1.5], ["y", float("nan")]])
     page = page_of("T", [Section(heading="h", blocks=[table])])
@@ -141,12 +129,6 @@ def test_what_something_is_worth_is_seen() -> None:
     assert faults_of(page) == []
 
 
-def test_no_figure_is_wider_than_a_small_screen() -> None:
-    small = _STYLE[_STYLE.index("@media screen") : _STYLE.index("@media print")]
-    assert "img" not in small
-    assert "figure img { display: block; width: 100%; height: auto; }" in _STYLE
-
-
 def test_report_replaces_the_old_one_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "report.html"
     write_report(path, Report(title="First", sections=SECTIONS))
@@ -161,16 +143,6 @@ def test_report_replaces_the_old_one_whole(tmp_path: Path, monkeypatch: pytest.M
         write_report(path, Report(title="Second", sections=SECTIONS))
     assert path.read_text(encoding="utf-8") == first
     assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
-
-
-def test_a_table_without_rows_still_names_all_its_columns() -> None:
-    table = Table(caption="c", header=["a", "b", "c"], rows=[])
-    html = page_of("t", [Section(heading="s", blocks=[table])])
-    assert re.findall(r'<th scope="col"[^>]*>(\w)</th>', html) == ["a", "b", "c"]
-
-
-def test_every_anchor_resolves_and_every_picture_has_words() -> None:
-    assert faults_of(page_of("T", SECTIONS)) == []
 
 
 @pytest.mark.parametrize(
@@ -188,53 +160,12 @@ def test_a_fault_of_a_page_would_be_seen(old: str, new: str, fault: str) -> None
     assert fault in faults_of(page.replace(old, new))
 
 
-def test_a_figure_is_enlarged_and_put_back_by_its_own_anchors() -> None:
-    tags = outline(page_of("T", SECTIONS)).tags
-    links = [attributes["href"] for tag, attributes in tags if tag == "a"]
-    assert links[2:] == ["#figure-1", "#place-1", "#figure-2", "#place-2"]
-    assert [a["id"] for tag, a in tags if tag == "figure" and "id" in a] == ["figure-1", "figure-2"]
-
-
-def test_headline_numbers_and_warnings_come_before_everything_else() -> None:
-    numbers = [Headline("2.4 %", "missed <frozen>")]
-    report = Report(title="T", sections=SECTIONS, numbers=numbers, warnings=["a & b"])
-    text = outline(report_html(report)).text
-    places = [text.index(one) for one in ("2.4 %", "a & b", "What & why")]
-    assert places == sorted(places)
-    assert "missed <frozen>" in text and _FINE not in text
-    calm = Report(title="T", sections=SECTIONS, warnings=[])
-    assert _FINE in outline(report_html(calm)).text
-    assert _FINE not in page_of("T", SECTIONS), "where nobody looked, nobody says that all is well"
-
-
-def test_a_folded_section_shows_its_heading_only() -> None:
-    inside = [Subheading(text="Within"), Paragraph(text="hidden")]
-    sections = [Section(heading="Study", blocks=inside, folded=True)]
-    tags = [tag for tag, _ in outline(page_of("T", sections)).tags]
-    first = tags.index("details")
-    assert tags[first : first + 5] == ["details", "summary", "h2", "h3", "p"]
-    assert "section" not in tags
-
-
 def test_commands_are_written_letter_by_letter_and_our_letters_with_their_index() -> None:
     rows = [["command", "tireid drive --fault v_y:biased:3:inf:0.5"]]
     table = Table(caption="of v_y", header=["a", "b"], rows=rows, verbatim=True)
     page = page_of("T", [Section(heading="h", blocks=[table])])
     assert "--fault v_y:biased:3:inf:0.5</td>" in page
     assert "of <i>v</i><sub>y</sub>" in page
-
-
-@pytest.mark.parametrize(
-    ("ascii_text", "expected"),
-    [
-        ("eta1 at eta/lambda [1/s^4]", "η1 at η/λ [1/s⁴]"),
-        ("|xi - xi_hat| in `kN s^-2`", "|ξ - ξ̂| in kN s⁻²"),
-        ("11 -> 2", "11 → 2"),
-        ("theta of beta, exist", "θ of beta, exist"),
-    ],
-)
-def test_text_of_ours_is_printed_as_in_a_book(ascii_text: str, expected: str) -> None:
-    assert printed(ascii_text) == expected
 
 
 def test_a_film_and_a_drawing_are_embedded_as_what_they_are() -> None:

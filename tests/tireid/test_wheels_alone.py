@@ -3,7 +3,6 @@
 import csv
 import json
 import tomllib
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.recordings import LogMap, read_recording
 from models.recordings.wheels import Wheels
-from tests.models.wheel_speeds import CORNERS, anti_lock, gentle_slip, shown, spin
+from tests.models.wheel_speeds import anti_lock, gentle_slip, shown, spin
 from tireid.cli import main
 
 CAR = ti.sedan()
@@ -143,29 +142,3 @@ def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
     assert "vx is computed from wheel_fl, wheel_fr, wheel_rl, wheel_rr" in captured.err
     assert "a log has no lateral velocity: fit learns" in captured.err
     assert json.loads((out / "summary.json").read_text())
-
-
-def test_identify_says_what_a_speed_tells_of_wheels_and_uses_the_speed(run, wheels, tmp_path):
-    path = tmp_path / "log.csv"
-    write(path, {**imu(run), **wheels, "vx": run.v_x})
-    told = {name: f"{name} [m/s]" for name in CORNERS}
-    recording = ti.read_recording(path, columns=told)
-    np.testing.assert_array_equal(recording.v_x, run.v_x)
-    assert any("wheels roll by vx" in note for note in recording.notes)
-    data = {**imu(run), **wheels, "vx": run.v_x}
-    data["wheel_rr"] = np.where((run.t > 3.0) & (run.t < 5.0), np.nan, data["wheel_rr"])
-    write(path, data)
-    recording = ti.read_recording(path, columns=told)
-    assert any("the wheels are not used" in note for note in recording.notes)
-    assert recording.t.size == run.t.size
-
-
-def test_one_encoder_is_enough_where_it_does_not_slip(run):
-    slips = shown(run, gentle_slip(run), np.random.default_rng(0))
-    encoder = np.mean([*slips.values()], axis=0)
-    known = replace(Wheels().completed(CAR), radius=(0.316,))
-    one = read_recording({**imu(run), "wheel": encoder / 0.316}, log_map=LogMap(wheels=known))
-    slip, force = errors(run, one)
-    slip_of_exact, force_of_exact = errors(run, read_recording({**imu(run), "vx": run.v_x}))
-    assert slip < 1.3 * slip_of_exact + 0.02
-    assert force < 1.2 * force_of_exact + 0.01

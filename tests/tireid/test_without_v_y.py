@@ -13,7 +13,6 @@ from identifier.estimate.method import FitMethod
 from models.maneuvers import RandomSteer, SampledSteer
 from models.plant import Plant
 from models.recordings import RecordingError, read_recording, write_recording
-from models.recordings.record import joined
 from tireid.cli import main
 
 CAR = ti.sedan()
@@ -122,11 +121,6 @@ def test_a_y_is_held_against_the_change_of_v_y_too(swept, factor, right):
         assert (missed(run.freeze(), swept) < 0.08).all()
 
 
-def test_a_car_with_three_times_the_inertia_is_not_valid(exact):
-    heavy = replace(CAR, yaw_inertia=3.0 * CAR.yaw_inertia)
-    assert not ti.identify(as_logged(exact), heavy, check=False).verdict.valid
-
-
 def test_a_model_says_the_forces_of_a_drive_without_v_y(history):
     other = driven(8)
     prediction = ti.replay(replace(as_logged(other), axle_force=other.axle_force), history.freeze())
@@ -140,14 +134,6 @@ def test_the_motion_is_judged_by_the_accelerometer_where_no_v_y_was_measured(his
     prediction = ti.replay(wrong, history.freeze())
     assert not prediction.verdict.valid
     assert prediction.motion.explained[0] < 0.0
-
-
-def test_several_logs_of_which_one_has_no_v_y_are_a_drive_without(exact):
-    both = joined([exact, as_logged(exact)])
-    assert both.v_y is None
-    assert "vy is left out, drive3 has none" in both.notes
-    parts = ti.identify(both, CAR).history.parts([exact, as_logged(exact)])
-    assert [one.recording.estimated for one in parts] == [(), ("v_y",)]
 
 
 def test_without_v_y_there_are_no_slip_angles(exact):

@@ -24,7 +24,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "init": "a commented vehicle file to fill in",
         "channels": "channels of a log, with unit, rate and probable signal; writes a log.toml",
         "doctor": "faults of a log or of its car's file, and a log.toml that repairs them",
-        "plan": "the most informative steering within an area",
+        "plan": "maneuvers ranked by what they tell of the tires",
         "identify": "tire curves from a log, with error bars and a verdict",
         "predict": "axle forces of another drive by stored tire curves, and their error",
         "compare": "all methods on the same logs, side by side",

@@ -6,14 +6,11 @@ import numpy as np
 
 from identifier.driving import Driving
 from identifier.methods import LIVE
-from identifier.paper.design import PaperIdentifier
-from identifier.paper.network import Weights
 from identifier.setup import force_unit_name
 from identifier.stability import Certificate, Property
 from models.vehicle import Vehicle
 from tireid.output import text_table
 
-_ROUNDING = 1e-9  # of weights that lie on their projection, in parts of its radius
 HEADER = ("property", "value", "limit", "margin", "")
 
 
@@ -93,27 +90,6 @@ def verdict_line(certificate: Certificate) -> str:
         f"certificate: {certificate.verdict}{reason}; sampled gain margin {number(gain.margin)}, "
         f"phase margin {phase.value:.0f} deg, damping {certificate['damping'].value:.2f}"
     )
-
-
-def resumed_line(certificate: Certificate, design: PaperIdentifier, first: Weights) -> str:
-    """Return what the certificate says of resumed weights: nothing where it covers them.
-
-    Its bounds hold from first weights that keep them.
-    """
-    known = {entry.name: entry.value for entry in certificate.properties}
-    W, V = known.get("weight_bound", math.inf), known.get("V_bound", math.inf)
-    layers = (
-        ("|W|", first.W, min(W, design.gains.W_max), unit_text("U", design.force_unit)),
-        ("|V|", first.V, V, ""),
-    )
-    beyond = [
-        f"{name} is {number(size)} {unit}".rstrip() + f", proven up to {number(bound)}"
-        for name, values, bound, unit in layers
-        if not (size := float(np.linalg.norm(values))) <= bound * (1.0 + _ROUNDING)
-    ]
-    if not beyond:
-        return ""
-    return f"the certificate does not cover these resumed weights: {'; '.join(beyond)}"
 
 
 def unit_text(unit: str, force_unit: float) -> str:

@@ -21,12 +21,13 @@ from models.recordings.assembly import wheel_scales, wheel_units
 from models.recordings.map import CUT
 from models.recordings.wheels import scale_text, wheel_factor, with_scales
 from tireid.commands import COMMANDS, DONE, FAILS
-from tireid.commands.chosen import CHOSEN
 from tireid.commands.options import add_force, add_log_map, given_map, require_toml
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
 
 _CUT_BY_MAP = "rejected without --cut-holes or a map with that key, as of --write"
+_MOST_NUMBERS = 5e7  # that are read for ranges; of a larger log only those of likely channels
+_LONGEST_NAME = 48  # letters of a channel in the table
 _NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 
 
@@ -39,7 +40,6 @@ def add_parser(commands: Any) -> None:
         "reads such logs (--log FILE). Exit code 1 where something is missing or not sure.",
     )
     parser.add_argument("log", metavar="LOG", help="a log; LOG:RUN names one of its runs")
-    parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
     add_log_map(parser)
     parser.add_argument("--write", type=Path, metavar="FILE", help="write the map, .toml")
     add_force(parser)
@@ -54,7 +54,8 @@ def run(options: argparse.Namespace) -> int:
         require_toml(options.write)
         require_free(options.write, force=options.force)
     log = log_map.opened(path)
-    chosen = _run_of(log, options.run_name or named or log_map.run)
+    wanted, runs = named or log_map.run, log.runs()
+    chosen = one_run(log.path, runs if wanted else runs[:1], wanted or None)
     listed = log.listed()
     names = [one.name for one in listed]
     proposal = propose(log, log.headings(), chosen)
@@ -88,11 +89,6 @@ def run(options: argparse.Namespace) -> int:
         write_atomically(options.write, text)
         say(f"wrote {options.write}" + (": what is missing stands behind # in it" * bool(behind)))
     return DONE if rolls and not missing else FAILS
-
-
-def _run_of(log: LogFile, name: str) -> str | None:
-    names = log.runs()
-    return one_run(log.path, names if name else names[:1], name or None)
 
 
 def _wheels(
@@ -131,7 +127,7 @@ def _seen(
     log: LogFile, listed: Sequence[Listed], signals: Mapping[str, Signal], run: str | None
 ) -> dict[str, Channel]:
     names = [one.name for one in listed]
-    if sum(one.samples for one in listed) > CHOSEN.most_numbers:
+    if sum(one.samples for one in listed) > _MOST_NUMBERS:
         likely = {channel for signal in signals.values() for channel in signal.channel}
         names = [name for name in names if name in likely]
     return dict(zip(names, log.read(names, run), strict=True)) if names else {}
@@ -154,7 +150,7 @@ def _channels_text(
             samples = int(np.count_nonzero(~np.isnan(channel.values)))
             low, high = (f"{end:.4g}" for end in (finite.min(), finite.max())) if finite.size else (
                 "empty", "")  # fmt: skip
-        name = visible(one.name if len(one.name) <= CHOSEN.longest_name else f"{one.name[:44]}...")
+        name = visible(one.name if len(one.name) <= _LONGEST_NAME else f"{one.name[:44]}...")
         rate = "?" if math.isnan(one.rate) else f"{one.rate:.4g}"
         meant = _meaning(one, signals, proposal, known)
         rows.append([name, visible(one.unit), rate, str(samples), low, high, meant])

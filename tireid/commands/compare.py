@@ -7,13 +7,10 @@ from typing import Any
 import numpy as np
 
 from identifier.compare.study import cannot_learn, run_comparison
-from identifier.methods import DEFAULT, methods, require_method
-from identifier.own_network import FrozenMethod
-from identifier.paper.design import PaperIdentifier
+from identifier.methods import DEFAULT, INSTALL, RIVALS, methods, require_method
 from identifier.run import History
 from identifier.verdict import Verdict, judge
-from models.recordings import Recording, RecordingError
-from models.vehicle import Vehicle
+from models.recordings import RecordingError
 from tireid.commands import COMMANDS, DONE
 from tireid.commands import compare_results as results
 from tireid.commands import options as shared
@@ -39,9 +36,6 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("logs", nargs="*", metavar="LOG[:RUN]", help="recordings")
     shared.add_vehicle(parser)
     parser.add_argument(
-        "--simulate", action="store_true", help="drives of the simulated car as well as the logs"
-    )
-    parser.add_argument(
         "--method",
         nargs="+",
         action="extend",
@@ -50,7 +44,6 @@ def add_parser(commands: Any) -> None:
     )
     shared.add_seed(parser, "sensor noise, and the weights of networks")
     shared.add_log_reading(parser)
-    shared.add_network_arguments(parser, "compare with this network, which learns nothing")
     shared.add_accept(parser)
     shared.add_output(parser, "compare")
     parser.set_defaults(run=run)
@@ -61,18 +54,23 @@ def run(options: argparse.Namespace) -> int:
     seed, names = shared.seed_of(options), list(dict.fromkeys(options.method or methods()))
     for name in names:
         require_method(name)
+    absent = [name for name in RIVALS if name not in methods()]
+    if absent and not options.method:
+        say(f"without {', '.join(absent)}, which are not installed: {INSTALL}")
     if options.logs and options.vehicle is None:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
     watch = Stopwatch()
     vehicle = shared.read_vehicle(options)
-    network = shared.network_model(options, vehicle, PaperIdentifier.for_vehicle(vehicle).min_speed)
-    others = {} if network is None else {options.network.name: FrozenMethod(model=network)}
     parts = {"methods": 9.0, "step times, tables and figures": 1.0}
     with (
         output_folder(options.out, force=options.force) as folder,
         Progress("compare", parts, long=True) as work,
     ):
-        recordings = _recordings(options, vehicle, seed)
+        log_map, check = shared.given_map(options), not options.no_check
+        recordings = [shared.read_log(log, vehicle, log_map, check=check) for log in options.logs]
+        if not recordings:
+            say(f"driving the plant of {vehicle.name} with noisy sensors")
+            recordings = [*plant_recordings(vehicle, np.random.default_rng(seed))]
         for recording in recordings:
             recording.needed("v_y")  # of the slip at which every method is asked
         blind = [recording.name for recording in recordings if recording.axle_force is None]
@@ -84,7 +82,6 @@ def run(options: argparse.Namespace) -> int:
         names = [name for name in names if name not in left_out]
         if not names:
             raise RecordingError("no method is left to compare: " + next(iter(left_out.values())))
-        steps = len(names) + len(others)
         verdicts: dict[str, Verdict] = {}
 
         def seen(name: str, run: History) -> None:
@@ -96,8 +93,7 @@ def run(options: argparse.Namespace) -> int:
             vehicle,
             recordings,
             seed=seed,
-            progress=partial(work.step, steps),
-            others=others,
+            progress=partial(work.step, len(names)),
             left_out=left_out,
             seen=seen,
         )
@@ -111,14 +107,3 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join(tables))
     say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
     return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)
-
-
-def _recordings(options: argparse.Namespace, vehicle: Vehicle, seed: int) -> list[Recording]:
-    log_map = shared.given_map(options)
-    recordings = [
-        shared.read_log(log, vehicle, log_map, check=not options.no_check) for log in options.logs
-    ]
-    if options.simulate or not options.logs:
-        say(f"driving the plant of {vehicle.name} with noisy sensors")
-        recordings += plant_recordings(vehicle, np.random.default_rng(seed))
-    return recordings

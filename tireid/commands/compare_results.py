@@ -27,7 +27,7 @@ from identifier.methods import make_method, methods
 from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.verdict import Verdict
 from tireid import __version__
-from tireid.figures.compare import matrix_figure, methods_figure
+from tireid.figures.compare import methods_figure
 from tireid.figures.side_slip import side_slip_figure
 from tireid.figures.style import save_figures
 from tireid.output import text_table, write_json
@@ -107,11 +107,6 @@ def pair_tables(comparison: Comparison) -> str:
     return "\n".join(blocks)
 
 
-def _newton_text(value: float) -> str:
-    """Return a force [N] with three digits, more where it is above 1000 N."""
-    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
-
-
 def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:
     """Return a mean of errors as percent of the rms force and in newtons, front / rear."""
     if not pairs:
@@ -124,7 +119,8 @@ def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:
         [(e.front / sizes[name].front, e.rear / sizes[name].rear) for name, e in pairs], axis=0
     )
     front, rear = (
-        f"{100.0 * p:.1f} ({_newton_text(n)})" for p, n in zip(parts, newtons, strict=True)
+        f"{100.0 * p:.1f} ({n:{'.0f' if n >= 100.0 else '.3g'}})"  # three digits, or more
+        for p, n in zip(parts, newtons, strict=True)
     )
     return f"{front} / {rear}"
 
@@ -155,8 +151,6 @@ def write_comparison(
             writer.writerow(f"{cell:.9g}" if isinstance(cell, float) else cell for cell in row)
     say("drawing figures")
     figures = {"methods": methods_figure(comparison)}
-    if any(trial.frozen for trial in comparison.trials.values()):
-        figures["matrix"] = matrix_figure(comparison)
     if any(trial.side_slip for trial in comparison.trials.values()):
         notes = {name: trial.side_slip for name, trial in comparison.trials.items()}
         figures["side_slip"] = side_slip_figure(comparison.course.recordings, notes)
@@ -241,7 +235,6 @@ def write_compare_report(
     course, rows, said = comparison.course, summary_rows(comparison), remarks(comparison)
     captions = {
         "methods": "Errors of every method.",
-        "matrix": "Identified on one recording, validated on another.",
         "side_slip": "Side slip estimated by methods without a lateral velocity.",
     }
     blocks: list[Block] = [

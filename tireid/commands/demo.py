@@ -15,8 +15,7 @@ from tireid import report as page
 from tireid.commands import COMMANDS, certificate_table, demo_parts
 from tireid.commands import options as shared
 from tireid.commands.check import draw_check
-from tireid.commands.chosen import CHOSEN
-from tireid.commands.demo_story import STORY, Story, run_story
+from tireid.commands.demo_story import FREEZE, SPEED, STORY, Story, run_story
 from tireid.commands.paper import (
     MEANING,
     MEASURES_MEAN,
@@ -78,7 +77,7 @@ def _demo_report(
             _learn(figures["identify"], model, verdict),
             _predict(story),
             demo_parts.package_section(shipped),
-            _paper_study(story, study, figures["paper"], folder / "paper_network"),
+            _paper_study(story, study, figures["paper"]),
             origin(command, story.car, [run.recording for run in runs]),
         ],
     )
@@ -91,7 +90,7 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
             page.Paragraph(
                 text="The car is a double-track model of a mid-size sedan: roll, load transfer, "
                 "tire relaxation and combined slip on Magic Formula tires, integrated at 1 ms. It "
-                f"drives a slalom at {CHOSEN.speed:g} m/s. The identifier gets what any log has, "
+                f"drives a slalom at {SPEED:g} m/s. The identifier gets what any log has, "
                 "speed, lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it "
                 "gets no force."
             ),
@@ -108,7 +107,7 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
             drawing(
                 figures["forces"],
                 "Axle forces: online above, and below replayed with the weights frozen at "
-                f"{CHOSEN.freeze:g} s.",
+                f"{FREEZE:g} s.",
                 READ["forces"],
             ),
         ],
@@ -142,105 +141,39 @@ def _predict(story: Story) -> page.Section:
     return page.Section(heading="Prediction of validation drives", blocks=blocks)
 
 
-def _paper_study(
-    story: Story, study: Study, figures: Mapping[str, Figure], learning: Path
-) -> page.Section:
-    certificate, design = story.certificate, story.design
-    gains, seeds = design.gains, len(study.errors["slalom"]["integral"])
-    said = [f"{e.title}: {e.status}; {e.advice}." for e in certificate_table.advised(certificate)]
-    said += [f"Note: {remark}." for remark in certificate_table.notes(certificate)]
+def _paper_study(story: Story, study: Study, figures: Mapping[str, Figure]) -> page.Section:
+    seeds = len(study.errors["slalom"]["integral"])
+    certified = certificate_table.verdict_line(story.certificate)
+    captions = {
+        "slalom": f"Table II of the paper beside ours, RMSE of the axle force [kN]: median and "
+        f"quartiles of {seeds} seeds.",
+        "step_steer": "Table I of the paper beside ours, RMSE of the axle force [kN].",
+    }
     blocks: list[page.Block] = [
-        page.Subheading(text="The gains of the paper's law are judged before it learns"),
         page.Paragraph(
-            text="The certificate follows from the gains, the network and how hard the car is "
-            "driven, not from a run. "
-            f"{page.printed(certificate_table.verdict_line(certificate)).capitalize()}."
-        ),
-        page.Table(
-            caption="Properties of the learning loop at the worst regressor; those without a "
-            "limit are stated, not judged.",
-            header=list(certificate_table.HEADER),
-            rows=[
-                [page.printed(cell) for cell in row]
-                for row in certificate_table.certificate_rows(certificate, design.force_unit)
-            ],
-        ),
-        *(page.Paragraph(text=page.printed(one)) for one in said),
-        page.Picture(
-            image=learning / "locus.png",
-            caption="Poles of the sampled loop at any gain, and at the gain of the design.",
-            read="All poles inside the circle: it is stable; far inside: it is damped.",
-        ),
-        page.Picture(
-            image=learning / "bounds.png",
-            caption="Proven bounds on the error norm, and the error that happened.",
-            read="The error stays below each bound; the gap is the conservatism of the proof.",
-        ),
-        page.Subheading(text="The paper's network on the same slalom"),
-        page.Paragraph(
-            text="At every sample an observer predicts the motion; its error drives the weights of "
-            f"a network of {design.network.hidden} hidden units, which corrects the linear tire. "
-            "The law is the integral law of the paper: A_d is "
-            f"{gains.A_d[0][0]:.4g} s⁻¹ times the identity, λ = {gains.forgetting:.4g} s⁻¹, η₁ = "
-            f"{gains.eta_W:.4g} s⁻⁴, η₂ = {gains.eta_V:.4g} kN⁻² s⁻⁴, ρ₁ = {gains.rho_W:.4g} and "
-            f"ρ₂ = {gains.rho_V:.4g} kN⁻¹ s⁻². What it predicts stands beside the axle "
-            "identifier above; its figures are in the folder paper_network."
+            text="The paper's network, its gains from the phase margin of their loop, beside the "
+            "axle identifier above: figures, certificate and bounds are in the folder "
+            f"paper_network. {page.printed(certified).capitalize()}."
         ),
         page.Picture(
             image=SCHEME.with_suffix(".svg"),
             caption="The identifier, as Fig. 1 of the paper; orange is what the laws differ in, "
             "and where a freeze cuts.",
         ),
-        page.Subheading(text="The frozen-weight reproducibility test: slalom"),
         page.Paragraph(
             text=f"{_REFERENCE} freezes the weights at an instant and replays the past with "
             "them: a law that follows the instant forgets earlier driving. "
             f"{page.printed(MEASURES_MEAN)}"
         ),
-        study_table(
-            "slalom",
-            study,
-            "Table II of the paper beside ours, RMSE of the axle force "
-            f"[kN]: median and quartiles of {seeds} seeds.",
-        ),
-        page.Paragraph(text=page.printed(MEANING)),
-        *_drawn(
-            figures,
-            {
-                "slalom_errors": "The table as a picture; hollow marks are the paper's values.",
-                "fig4_slalom_instantaneous": "Instantaneous law, as Fig. 4 of the paper (seed of "
-                "median error); all errors count from the onset on.",
-                "fig5_slalom_integral": "Integral law, as Fig. 5 of the paper (likewise).",
-            },
-        ),
-        page.Paragraph(text=page.printed(settings(GAINS, NETWORK).splitlines()[0])),
-        page.Subheading(text="The frozen-weight reproducibility test: step steer"),
-        page.Paragraph(
-            text="The step is held from 29 s on and goes back to half its angle at 36 s. By the "
-            "paper's measure the order of the laws is the reverse of the slalom's; against truth "
-            "it is not: what the integral law said online on the ramp was further from the truth "
-            "than what its frozen weights say of it. After 36 s, at an angle outside the "
-            "identification drive, all have a larger error than the linear tire."
-        ),
-        study_table(
-            "step_steer", study, "Table I of the paper beside ours, RMSE of the axle force [kN]."
-        ),
-        *_drawn(
-            figures,
-            {
-                "step_steer_errors": "The table as a picture; hollow marks are the paper's values. "
-                "The drives are Figs. 2 and 3 in the folder paper.",
-            },
-        ),
     ]
+    for maneuver, caption in captions.items():
+        blocks.append(study_table(maneuver, study, caption))
+        if f"{maneuver}_errors" in figures:  # a law that diverged on every seed has none
+            what = "The table as a picture; hollow marks are the paper's values."
+            blocks.append(drawing(figures[f"{maneuver}_errors"], what))
+    said = (MEANING, settings(GAINS, NETWORK).splitlines()[0])
+    blocks += [page.Paragraph(text=page.printed(one)) for one in said]
     return page.Section(heading="The paper's study", blocks=blocks, folded=True)
-
-
-def _drawn(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[page.Block]:
-    """Return the figures that there are: a law that diverged on every seed has none."""
-    return [
-        drawing(figures[name], caption) for name, caption in captions.items() if name in figures
-    ]
 
 
 _TITLE = "tireid: lateral tire forces, identified while driving"

@@ -8,16 +8,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen import find_compiler
-from codegen.processor import CROSS_COMPILER, EMULATOR, missing_tools
 from identifier.export.compiled import CompiledPackage
 from identifier.run import identify
 from mpc.path import BUILT_IN
-from tireid.animation import FORMATS
 from tireid.commands.demo_story import Story
 from tireid.driving.results import SCORES, Drives, headline, known_blocks, score_rows
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.exporting import Exported, Verdict, export, self_test
+from tireid.figures.film import FORMATS
 from tireid.report import Block, Headline, Paragraph, Picture, Section, Table
 from tireid.reports.common import READ, drawing
 
@@ -149,10 +148,10 @@ class Shipped(NamedTuple):
 def ship(story: Story, folder: Path) -> Shipped:
     """Export what the axle identifier learnt, as `tireid export` does, compile it and test it."""
     learnt, model = story.axle.runs[0], story.axle.model
-    exported = export(learnt.design, folder, start=model, vehicle=story.car)
+    exported = export(learnt.method, folder, start=model, vehicle=story.car)
     name, checks = exported.package.specialized.name, list[_Check]()
     if find_compiler() is not None:
-        expected = identify(learnt.recording, story.car, learnt.design, model).axle_force
+        expected = identify(learnt.recording, story.car, learnt.method, model).axle_force
         for precision, single in (("double", False), ("float", True)):
             verdict = self_test(folder, name, single=single)
             assert verdict is not None
@@ -176,50 +175,13 @@ def shipped_text(shipped: Shipped) -> str:
 
 
 def package_section(shipped: Shipped) -> Section:
-    package, costs = shipped.exported.package, shipped.exported.costs
-    blocks: list[Block] = [
-        Paragraph(
-            text="The axle identifier, beginning with the weights of this drive, is written as a "
-            f"C99 package to the folder {FOLDER}/ beside this report: library, example, self-test "
-            f"and README, every symbol begins with {package.specialized.name}_; hash "
-            f"{package.about['hash']}. It is what tireid export writes."
-        )
-    ]
-    checks = [
-        [
-            one.precision,
-            one.verdict.verdict,
-            one.verdict.difference,
-            f"{one.difference:.2g}",
-            f"{one.refused} of {one.samples}",
-        ]
-        for one in shipped.checks
-    ]
-    if checks:
-        caption = (
-            "The package, compiled and run on this machine: its self-test, and the slalom again "
-            "beside Python, which begins with the same model."
-        )
-        header = ["precision", "self-test", "its vectors", "from Python [N]", "refused"]
-        blocks.append(Table(caption=caption, header=header, rows=checks))
-    else:
-        blocks.append(Paragraph(text=NOT_BUILT))
-    if costs:
-        caption = f"What a step costs, {CROSS_COMPILER} -O2 in {EMULATOR}."
-        header = ["processor", "precision", "instructions", "flash [B]", "RAM [B]", "stack [B]"]
-        rows = [
-            [
-                one.processor,
-                one.precision,
-                str(one.replay.instructions),
-                str(one.flash),
-                str(one.ram),
-                str(one.replay.stack),
-            ]
-            for one in costs
-        ]
-        blocks.append(Table(caption=caption, header=header, rows=rows))
-    else:
-        missing = ", ".join(missing_tools())
-        blocks.append(Paragraph(text=f"Costs on Arm are not measured, missing: {missing}."))
+    name = shipped.exported.package.specialized.name
+    intro = (
+        "The axle identifier, beginning with the weights of this drive, is written as a C99 "
+        f"package to the folder {FOLDER}/ beside this report: library, example, self-test and "
+        f"README with its costs, every symbol begins with {name}_. It is what tireid export "
+        "writes; here it is compiled, tested and run over the slalom, beside Python."
+    )
+    lines = (intro, *shipped_text(shipped).splitlines())
+    blocks = [Paragraph(text=line) for line in lines]
     return Section(heading="The identifier as C for a controller", blocks=blocks)

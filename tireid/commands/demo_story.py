@@ -20,12 +20,13 @@ from models.plant import Plant
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import Vehicle, sedan
-from tireid.commands.chosen import CHOSEN
 from tireid.identified import Results
 from tireid.output import text_table
 
 # Drives of a plant that methods are compared on: the first to learn on, the others to predict.
 
+SPEED = 20.0  # m/s
+FREEZE = 30.0  # s, the end of the first drive
 RATE_LIMIT = np.radians(30.0)  # rad/s at the road wheels
 SENSORS = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))  # m/s and rad/s, rms
 SLALOM = Slalom(
@@ -42,9 +43,9 @@ _LANE_CHANGE = DoubleLaneChange(
 _STEP = StepSteer(amplitude=np.radians(4.0), onset=2.0, rate_limit=RATE_LIMIT, duration=8.0)
 _FASTER = replace(SLALOM, amplitude=np.radians(3.5), frequency=0.6, duration=20.0)
 STORY: Mapping[str, tuple[Maneuver, float]] = {  # and the speed [m/s]; to learn on is the first
-    "slalom": (SLALOM, CHOSEN.speed),
-    "double_lane_change": (_LANE_CHANGE, CHOSEN.speed),
-    "step_steer": (_STEP, CHOSEN.speed),
+    "slalom": (SLALOM, SPEED),
+    "double_lane_change": (_LANE_CHANGE, SPEED),
+    "step_steer": (_STEP, SPEED),
 }
 DRIVES: Mapping[str, tuple[Maneuver, float]] = {
     "slalom_20": (SLALOM, 20.0),
@@ -103,10 +104,10 @@ def run_story(progress: Callable[[], None] = lambda: None) -> Story:
         for recording in recordings:
             runs.append(identify(recording, car, method))
             progress()
-        model, verdict = runs[0].freeze(CHOSEN.freeze), judge(runs[0], CHOSEN.freeze)
+        model, verdict = runs[0].freeze(FREEZE), judge(runs[0], FREEZE)
         asked = {run.recording.name: judge_prediction(model, run.recording) for run in runs[1:]}
-        tire = calibrated(runs[0], CHOSEN.freeze, verdict)
-        return Results.learnt(law, runs, [CHOSEN.freeze], tire, verdict, asked)
+        tire = calibrated(runs[0], FREEZE, verdict)
+        return Results.learnt(law, runs, [FREEZE], tire, verdict, asked)
 
     axle, paper = learnt(LIVE, make_method(LIVE, car)), learnt(REFERENCE, design)
     return Story(car=car, design=design, axle=axle, paper=paper)

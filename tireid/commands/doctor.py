@@ -3,7 +3,7 @@
 import argparse
 from typing import Any
 
-from identifier.doctor import Diagnosis, diagnose
+from identifier.doctor import diagnose
 from models.recordings import Repair
 from models.recordings.reader import repair_text
 from tireid import __version__
@@ -28,7 +28,6 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
     shared.add_vehicle(parser, required=True)
-    parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
     shared.add_log_map(parser)
     add_repair(parser, "and write it to")
     shared.add_accept(parser)
@@ -42,9 +41,7 @@ def run(options: argparse.Namespace) -> int:
         shared.require_toml(options.repair)
         require_free(options.repair, force=options.force)
     vehicle, log_map = shared.read_vehicle(options), shared.given_map(options)
-    recording = shared.read_log(
-        options.log, vehicle, log_map, run_name=options.run_name, check=False
-    )
+    recording = shared.read_log(options.log, vehicle, log_map, check=False)
     say("the doctor looks at it")
     diagnosis = diagnose(recording, vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()
@@ -54,37 +51,22 @@ def run(options: argparse.Namespace) -> int:
         with output_folder(options.out, force=options.force) as folder:
             figure = draw_diagnosis(recording, vehicle, repaired, car)
             save_figures(folder, {"slip": figure})
-            write_json(folder / "summary.json", summary(diagnosis, repair, after))
+            left = None if after is None else after.to_dict()
+            found = {**diagnosis.to_dict(), "applied": repair.tables(), "after": left}
+            write_json(folder / "summary.json", {**found, "version": __version__})
             write_doctor_report(
                 folder, recording, vehicle, diagnosis, after, figure, command=options.words
             )
     tell(diagnosis_text(diagnosis))
     if options.repair is not None:
-        _tell_repair(options, repair, after)
+        if after is None:
+            tell(f"no sure repair: with {options.repair} the log stays as it is")
+        else:
+            tell(f"repaired: {repair_text(repair)}")
+            tell(f"after the repair, {diagnosis_text(after, unobservable=False)}")
         write_repair(options.repair, log_map, diagnosis)
         say(f"wrote {options.repair}; read the log with --log {options.repair}")
     if options.out is not None:
         say(f"wrote {options.out}/")
-    left = diagnosis if after is None else after
-    return DONE if left.healthy or options.accept else NOT_VALID
-
-
-def _tell_repair(options: argparse.Namespace, repair: Repair, after: Diagnosis | None) -> None:
-    if after is None:
-        tell(f"no sure repair: with {options.repair} the log stays as it is")
-        return
-    tell(f"repaired: {repair_text(repair)}")
-    tell(f"after the repair, {diagnosis_text(after, unobservable=False)}")
-
-
-def summary(diagnosis: Diagnosis, repair: Repair, after: Diagnosis | None) -> dict[str, Any]:
-    """Return what summary.json holds.
-
-    after : diagnosis of the repaired log, None where nothing was repaired.
-    """
-    return {
-        **diagnosis.to_dict(),
-        "applied": repair.tables(),
-        "after": None if after is None else after.to_dict(),
-        "version": __version__,
-    }
+    healthy = (after or diagnosis).healthy
+    return DONE if healthy or options.accept else NOT_VALID

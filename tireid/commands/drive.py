@@ -5,19 +5,19 @@ from typing import Any
 
 from models.faults import KINDS
 from mpc.path import BUILT_IN
-from tireid.animation import FORMATS, SHOWN, require_ffmpeg
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.drive_case import ALL, conditions_of, frozen_tires, labels_of
 from tireid.driving import runs as driving
 from tireid.driving.chosen import CHOSEN as DRIVING_CHOSEN
 from tireid.driving.results import NO_FILM, Drives, headline, write_drive_report
+from tireid.figures.film import FORMATS
 from tireid.output import output_folder
 from tireid.progress import say, tell
 
 _NOT_COMPLETED = 1
 _EPILOG = (
-    "Without --weights or --network, frozen tires are identified first: the same car drives on "
+    "Without --weights, frozen tires are identified first: the same car drives on "
     f"an open field for {DRIVING_CHOSEN.duration:g} s, steered at random and ever harder until it "
     "slides, and the tires at the end are used. linear is the tire of the vehicle file, oracle the "
     "true tire of the plant, learning begins with the frozen tires and updates them while driving. "
@@ -95,9 +95,8 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("--fault", action="append", default=[], metavar=fault, help=text)
     shared.add_seed(parser, "noise and learning")
     formats: dict[str, Any] = {"choices": (*FORMATS, NO_FILM), "default": FORMATS[0]}
-    text = f"{', '.join(FORMATS)} (by ffmpeg) or {NO_FILM} (%(default)s)"
+    text = f"{', '.join(FORMATS)} or {NO_FILM} (%(default)s)"
     parser.add_argument("--film", metavar="NAME", help=text, **formats)
-    shared.add_network_arguments(parser, "steer on this frozen network")
     shared.add_output(parser, "drive")
     parser.set_defaults(run=run)
 
@@ -107,8 +106,6 @@ def run(options: argparse.Namespace) -> int:
     labels = labels_of(options.tires)
     conditions = conditions_of(options)
     setup = conditions.setup
-    if options.film == "mp4":
-        require_ffmpeg()
     driving.require_compiler()
     with output_folder(options.out, force=options.force) as folder:
         say(headline(conditions))
@@ -119,7 +116,7 @@ def run(options: argparse.Namespace) -> int:
             learnt.save(folder / "weights.json")
         drives = Drives.driven(conditions, labels, learnt, source)
         figures = drives.write(folder, options.film)
-        film = folder / f"drive.{options.film}" if options.film in SHOWN else None
+        film = None if options.film == NO_FILM else folder / f"drive.{options.film}"
         write_drive_report(folder, drives, figures, film, options.words)
         case, _, scores = drives.text().partition("\n")
     tell(f"{case}\ntires: {source}\n{scores}")

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path as FilePath
 
@@ -17,8 +18,6 @@ from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from tireid.commands.options import (
     chosen_method,
-    network_model,
-    number_with_unit,
     read_vehicle,
     require_one,
     seed_of,
@@ -40,7 +39,11 @@ def _parse_speed(text: str) -> SpeedWish:
 
     text : 90% or 0.9 of the grip, 17m/s or 60km/h.
     """
-    value, unit = number_with_unit(text, "%", "m/s", "km/h")
+    found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(%|m/s|km/h)?\s*", text, re.ASCII)
+    try:
+        value, unit = (float(found[1]), found[2]) if found else (math.nan, None)
+    except ValueError:
+        value, unit = math.nan, None
     if not (math.isfinite(value) and value > 0.0):
         raise ValueError(f"--speed wants a share of the grip or a speed (90%, 17m/s), not {text!r}")
     if unit is None and value > _PLAIN:
@@ -117,7 +120,7 @@ def conditions_of(options: argparse.Namespace) -> runs.Conditions:
     path = _named_path(options.path)
     if options.laps != 1.0 and not path.closed:
         raise ValueError(f"--laps is for a closed path, {path.name} is not")
-    require_one(options, "weights", "network", "method", "paper", "design")
+    require_one(options, "weights", "method", "paper", "design")
     setup = make_setup(
         path,
         vehicle=None if options.vehicle is None else read_vehicle(options),
@@ -181,9 +184,6 @@ def frozen_tires(
         assert model is not None
         _require_its_car(options, model.vehicle, setup)
         return f"frozen ones from {options.weights}", model
-    network = network_model(options, setup.vehicle, 1.0)
-    if network is not None:
-        return f"frozen ones from {options.network}", network
     law, method = chosen_method(options, setup.vehicle)
     with Progress("the drive to learn on") as progress:
         recording = learning_drive(

@@ -1,33 +1,29 @@
 """`tireid identify LOG --vehicle FILE --out DIR`: learn the tires of a recording, freeze them."""
 
 import argparse
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from identifier.axle.guarantee import ForceBound
 from identifier.doctor import diagnose
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
-from identifier.paper.network import Weights
 from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import History, check_recording
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, calibrated, guaranteed, judge, judge_prediction
+from identifier.verdict import Verdict, calibrated, judge, judge_prediction
 from models.recordings import Recording, Repair, check_against_vehicle, check_physics, joined
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
-from tireid.commands.certificate_table import resumed_line, verdict_line
+from tireid.commands.certificate_table import verdict_line
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
-from tireid.figures.style import paper_design
 from tireid.identified import Results, file_name
 from tireid.learning import identify, with_v_y
-from tireid.output import output_folder, require_curves, require_free, write_json
+from tireid.output import output_folder, require_free, write_json
 from tireid.progress import Progress, say, tell
-from tireid.reports.identify import guaranteed_text, side_slip_text, write_identify_report
+from tireid.reports.identify import side_slip_text, write_identify_report
 from tireid.verdicts import verdict_text, verdicts_text
 
 _LEARNING, _JUDGING, _DRAWING = "learning", "replays and verdict", "curves and figures"
@@ -49,26 +45,17 @@ def add_parser(commands: Any) -> None:
         "logs", nargs="+", metavar="LOG", help="recording; LOG:RUN names one of its runs"
     )
     shared.add_vehicle(parser, required=True)
-    parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
     shared.add_method(parser)
     several: dict[str, Any] = {"nargs": "+", "action": "extend"}
     text = "freeze at these times [s] (the end)"
     parser.add_argument("--freeze", type=float, metavar="T", help=text, **several)
     text = "validation drives to predict, each with a verdict"
     parser.add_argument("--replay", default=[], metavar="LOG[:RUN]", help=text, **several)
-    text = (
-        "guaranteed forces, if no force differs from the best curve by more than E static axle "
-        "loads; a second number: lateness [s] (estimated)"
-    )
-    parser.add_argument("--bound", nargs="*", type=float, metavar="E", help=text)
     shared.add_log_reading(parser)
     add_repair(parser, "identify the repaired log, and write the repair to")
     shared.add_weights(parser, "begin with this model")
     shared.add_seed(parser, "the initial weights of the paper's network")
-    shared.add_network_arguments(parser, "judge this network instead")
     shared.add_accept(parser)
-    text = "format of curves over time (csv); parquet is smaller and faster, with all digits"
-    parser.add_argument("--curves", choices=("csv", "parquet"), default="csv", help=text)
     shared.add_output(parser, "identify")
     parser.set_defaults(run=run)
 
@@ -77,28 +64,15 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where what was learnt is not valid, or not of a replayed log."""
     vehicle = shared.read_vehicle(options)
     seed = None if options.seed is None else shared.seed_of(options)
-    beside = options.network is not None  # of which something learns online
-    if beside and options.freeze is not None:
-        raise ValueError("--freeze is for identified models: the network of --network is frozen")
-    if beside and options.bound is not None:
-        raise ValueError(
-            "--bound is for identified models: a network has no set of possible weights"
-        )
-    bound = _force_bound(options.bound or ())
-    law, design = shared.chosen_method(options, vehicle, seed, online=beside)
+    law, design = shared.chosen_method(options, vehicle, seed)
     start = shared.stored_model(options.weights)
-    if options.run_name is not None and len(options.logs) > 1:
-        raise ValueError("--run goes with one LOG: name runs as LOG:RUN")
-    require_curves(options.curves)
     if options.repair is not None:
         require_free(options.repair, force=options.force)
-    logs = [_read(log, options.run_name, vehicle, design, options) for log in options.logs]
-    others = [_read(log, None, vehicle, design, options) for log in options.replay]
+    logs = [_read(log, vehicle, design, options) for log in options.logs]
+    others = [_read(log, vehicle, design, options) for log in options.replay]
     _require_distinct([*logs, *others])
     recording = joined(logs)
     without_v_y = any(one.v_y is None for one in (*logs, *others))
-    choice = {"without_v_y": without_v_y, "online": beside}
-    law, design = shared.chosen_method(options, vehicle, seed, **choice)
     for one in (*logs, *others):
         check_recording(one, design)
     if without_v_y:
@@ -110,16 +84,14 @@ def run(options: argparse.Namespace) -> int:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         recording = joined(logs)
         vehicle = repair.on(vehicle)
-        law, design = shared.chosen_method(options, vehicle, seed, **choice)
+        law, design = shared.chosen_method(options, vehicle, seed)
     if options.repair is not None and not options.no_check:
         for one in (*logs, *others):
             check_physics(one)
             check_against_vehicle(one, vehicle)
-    network = shared.network_model(options, vehicle, design.min_speed)
     freeze_times = sorted(set(options.freeze or [float(recording.t[-1])]))
     _require_inside(freeze_times, recording)
-    if network is None:
-        _require_model(law, design, vehicle)
+    _require_model(law, design, vehicle)
     if start is not None and start.scales_with_load and not start.vehicle.moves_as(vehicle):
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     count = 1.0 + len(others)
@@ -139,29 +111,20 @@ def run(options: argparse.Namespace) -> int:
             )
             say(f"learnt {law} over {one.name}")
         progress.begin(_JUDGING)
-        learnt, last, closing = runs[0], freeze_times[-1], ""
-        if network is not None:
-            verdict = with_doctor(judge_prediction(network, learnt.recording), diagnosis, repair)
-            asked, file = _asked(network, others), options.network.name
-            found = Results.of_network(law, runs, network, file, verdict, asked)
-        else:
-            for t in freeze_times:
-                _require_tires(learnt, t)
-            pieces = learnt.parts(logs) if len(logs) > 1 else []
-            verdict = with_doctor(judge(learnt, last), diagnosis, repair)
-            asked = _asked(learnt.freeze(last), others)
-            tire = calibrated(learnt, last, verdict)
-            if options.bound is not None:
-                tire = guaranteed(learnt, bound, last, tire)
-            found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
-            closing = _closing_line(learnt, last, vehicle, resumed=start is not None)
-        figures = found.write(folder, curves=options.curves, progress=progress.begin(_DRAWING))
+        learnt, last = runs[0], freeze_times[-1]
+        for t in freeze_times:
+            _require_tires(learnt, t)
+        pieces = learnt.parts(logs) if len(logs) > 1 else []
+        verdict = with_doctor(judge(learnt, last), diagnosis, repair)
+        asked = _asked(learnt.freeze(last), others)
+        tire = calibrated(learnt, last, verdict)
+        found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
+        figures = found.write(folder, progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(folder, found, figures, diagnosis, options.words)
         given = (
             found.table(),
-            closing,
-            "" if options.bound is None else guaranteed_text(found.model),
+            _closing_line(learnt, last, vehicle),
             doctor_text(diagnosis, repair, options.repair),
             verdicts_text(asked, "replayed on"),
             verdict_text(verdict),
@@ -172,21 +135,6 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join(part for part in given if part))
     say(f"wrote {options.out}/")
     return max(shared.exit_code(one, options) for one in (verdict, *asked.values()))
-
-
-def _force_bound(numbers: Sequence[float]) -> ForceBound | None:
-    """Return the bound of --bound: error [static axle loads] and lateness [s]; None estimates it.
-
-    numbers : the two, or the first of them, or none.
-    """
-    if len(numbers) > 2:
-        raise ValueError(
-            f"--bound takes an error and a lateness, it was given {len(numbers)} numbers"
-        )
-    if not numbers:
-        return None
-    error, late = (*numbers, 0.0)[:2]
-    return ForceBound(error=(error, error), lateness=(late, late))
 
 
 def _asked(model: TireModel, others: list[Recording]) -> dict[str, Verdict]:
@@ -215,13 +163,11 @@ def _require_tires(learnt: History, t: float) -> None:
         ) from None
 
 
-def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool) -> str:
+def _closing_line(learnt: History, t: float, vehicle: Vehicle) -> str:
     """Return the certificate of the paper's identifier, or what the axle identifier knows."""
-    model, certificate = learnt.freeze(t), learnt.design.certify(vehicle)
+    model, certificate = learnt.freeze(t), learnt.method.certify(vehicle)
     if model.known_slip is None and certificate.properties:
-        first = Weights(W=learnt.state["W"][0], V=learnt.state["V"][0])
-        beyond = resumed_line(certificate, paper_design(learnt), first) if resumed else ""
-        return "\n".join(line for line in (verdict_line(certificate), beyond) if line)
+        return verdict_line(certificate)
     if model.known_slip is None:
         return "frozen; `tireid compare` sets it beside the other methods"
     known = np.degrees(model.known_slip)
@@ -236,14 +182,11 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle, *, resumed: bool)
     )
 
 
-def _read(
-    log: str, run_name: str | None, vehicle: Vehicle, design: Method, options: argparse.Namespace
-) -> Recording:
+def _read(log: str, vehicle: Vehicle, design: Method, options: argparse.Namespace) -> Recording:
     recording = shared.read_log(
         log,
         vehicle,
         shared.given_map(options),
-        run_name=run_name,
         check=not options.no_check and options.repair is None,  # else once it is repaired
         dt=design.dt,
     )

@@ -1,4 +1,4 @@
-"""Options that commands share, each declared once; what they read: methods, logs, networks.
+"""Options that commands share, each declared once; what they read: methods, logs.
 
 One word means one thing in every command: `--vehicle` the car, `--method`, `--paper` and `--design`
 what learns, `--weights` what was learnt before, `--out` the folder that is written, `--force` that
@@ -6,9 +6,7 @@ what is there is replaced, `--seed` chance, `--jobs` processes.
 """
 
 import argparse
-import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -19,15 +17,12 @@ from identifier.methods import (
     DEFAULT,
     LIVE,
     REFERENCE,
-    WITHOUT_V_Y,
     draws_weights,
     make_method,
     methods,
     require_method,
 )
-from identifier.own_network import OnnxModel
 from identifier.paper.design import read_design
-from identifier.paper.network import SIGNALS
 from identifier.tire_model import TireModel, load_model
 from identifier.verdict import Verdict
 from models.recordings import LogMap, Recording, read_repaired, split_log_argument
@@ -160,16 +155,6 @@ def jobs_of(options: argparse.Namespace) -> int:
     return jobs
 
 
-def number_with_unit(text: str, *units: str) -> tuple[float, str | None]:
-    """Return a number and its unit, None where it has none; NaN where the text is neither."""
-    known = "|".join(map(re.escape, units))
-    found = re.fullmatch(rf"\s*([-+.\deE]+?)\s*({known})?\s*", text, re.ASCII)
-    try:
-        return (float(found[1]), found[2]) if found else (math.nan, None)
-    except ValueError:
-        return math.nan, None
-
-
 def method_name(text: str) -> str:
     """Return the name of a method, for argparse.
 
@@ -214,13 +199,11 @@ def chosen_method(
     vehicle: Vehicle,
     seed: int | None = None,
     *,
-    without_v_y: bool = False,
     online: bool = False,
 ) -> tuple[str, Method]:
     """Return what --method, --paper or --design say, by the name of its results, or the default.
 
     seed : of initial weights; None where nobody asks for one.
-    without_v_y : whether a log has no lateral velocity, which changes the default.
     online : whether the default is the one that learns sample by sample.
     """
     method_is_given(options)
@@ -229,8 +212,7 @@ def chosen_method(
             raise ValueError(f"--seed is for a method: the seed of a design is in {options.design}")
         design = read_design(options.design)
         return design.law, design
-    usual = (WITHOUT_V_Y if without_v_y else LIVE) if online else DEFAULT
-    name = options.method or (REFERENCE if options.paper else usual)
+    name = options.method or (REFERENCE if options.paper else LIVE if online else DEFAULT)
     if seed is not None and not draws_weights(name):
         raise ValueError(f"--seed is of random initial weights, and {name} begins with none")
     return name, make_method(name, vehicle, seed or 0)
@@ -277,8 +259,7 @@ def _map_path(options: argparse.Namespace) -> Path | None:
     path: Path | None = getattr(options, "log_map", None)
     if path is not None and path.suffix.lower() != ".toml":
         raise ValueError(
-            f"--log {path}: must be a log.toml, by its ending; give a log after the command "
-            "(check: after --along)"
+            f"--log {path}: must be a log.toml, by its ending; give a log after the command"
         )
     return path
 
@@ -300,7 +281,6 @@ def read_log(
     vehicle: Vehicle,
     declared: LogMap,
     *,
-    run_name: str | None = None,
     check: bool = True,
     dt: float = 0.01,
 ) -> Recording:
@@ -309,11 +289,7 @@ def read_log(
     dt : sampling interval that it is brought to [s].
     """
     path, named = split_log_argument(log)
-    if named is not None and run_name is not None and named != run_name:
-        raise ValueError(f"{log} names the run {named}, --run names {run_name}: name one of them")
-    recording, _ = read_repaired(
-        path, vehicle, run=run_name or named, dt=dt, check=check, log_map=declared
-    )
+    recording, _ = read_repaired(path, vehicle, run=named, dt=dt, check=check, log_map=declared)
     say(f"read {recording.name}: {recording.t.size} samples, {recording.duration:.1f} s")
     for note in recording.notes:
         say(f"{recording.name}: {note}")
@@ -331,43 +307,3 @@ def _column_words(pairs: Sequence[str]) -> dict[str, str]:
             raise ValueError(f"--columns gives {name} twice")
         columns[name] = column
     return columns
-
-
-_CONVENTIONS = (
-    "A network of --network is static: its outputs are the lateral forces F_yf, F_yr of both tires "
-    "of an axle [N], left positive, frame of the body; its inputs are slip angles alpha_f, alpha_r "
-    "[rad] in the sign in which F_y = +C alpha, alpha = delta - (v_y +- l r)/v_x, or v_x, v_y "
-    "[m/s], r [rad/s], delta_f, delta_r [rad], all SI, not scaled. Input tensors that bear the "
-    "names of signals are taken by name, else two columns are alpha_f, alpha_r and five are v_x, "
-    "v_y, r, delta_f, delta_r. Tensors are float32 or float64, (columns,) or (batch, columns)."
-)
-
-
-def add_network_arguments(parser: argparse.ArgumentParser, what: str) -> None:
-    group = parser.add_argument_group("your tire network", _CONVENTIONS)
-    add_options(group, Path, {"--network FILE.onnx": what})
-    text = f"what its columns are, in order, of {', '.join(SIGNALS)}"
-    group.add_argument("--network-inputs", nargs="+", metavar="SIGNAL", help=text)
-    text = "its slip angles have the sign of ISO 8855, in which F_y = -C alpha"
-    add_options(group, bool, {"--network-iso": text})
-
-
-def network_model(
-    options: argparse.Namespace, vehicle: Vehicle, min_speed: float
-) -> OnnxModel | None:
-    """Return the network as a frozen model, None where there is none.
-
-    min_speed : below this speed [m/s] the forces read zero.
-    """
-    if options.network is None:
-        if options.network_inputs or options.network_iso:
-            raise ValueError("--network-inputs and --network-iso go with --network FILE.onnx")
-        return None
-    inputs = options.network_inputs
-    return OnnxModel.from_onnx(
-        options.network,
-        vehicle,
-        min_speed=min_speed,
-        inputs=None if inputs is None else tuple(inputs),
-        slip_sign=-1 if options.network_iso else 1,
-    )

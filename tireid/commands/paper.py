@@ -164,24 +164,18 @@ _FIGURES = {  # number of the paper's figure, by maneuver and law
 }
 
 
-def _study_text(study: paper_study.Study) -> str:
-    tables = [table_text(maneuver, study) for maneuver in study.errors]
-    return "\n".join([*tables, settings(paper_study.GAINS, paper_study.NETWORK), *_verdicts()])
-
-
-def _verdicts() -> list[str]:
-    return [
-        f"{VARIANTS[law].title}: {verdict_line(certify(design, sedan()))}"
-        for law in paper_study.LAWS
-        for design in [paper_study.paper_design(law, seed=0)]
-    ]
-
-
 def write_study(folder: Path, study: paper_study.Study) -> dict[str, Figure]:
     """Write tables.json, diverged.json, tables.txt and figures of a study; return the figures."""
     write_json(folder / "tables.json", study.tables())
     write_json(folder / "diverged.json", study.diverged())
-    write_file(folder / "tables.txt", _study_text(study) + "\n")
+    tables = [table_text(maneuver, study) for maneuver in study.errors]
+    verdicts = [
+        f"{VARIANTS[law].title}: "
+        + verdict_line(certify(paper_study.paper_design(law, seed=0), sedan()))
+        for law in paper_study.LAWS
+    ]
+    said = [*tables, settings(paper_study.GAINS, paper_study.NETWORK), *verdicts]
+    write_file(folder / "tables.txt", "\n".join(said) + "\n")
     say("drawing figures")
     write_file(folder / SCHEME.name, SCHEME.read_bytes())
     figures: dict[str, Figure] = {}

@@ -2,22 +2,20 @@
 
 import argparse
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from codegen.arrays import Array, blocks
+from codegen.arrays import Array
 from codegen.escape import visible
 from identifier.band import UNCALIBRATED
 from identifier.frozen import vehicle_numbers
 from identifier.prediction import Prediction
 from identifier.reproducibility import beyond_known
 from identifier.tire_model import TireModel
-from identifier.verdict import RoadFriction, Verdict, contradictions, within_band
+from identifier.verdict import within_band
 from identifier.verdict.verdict import PERCENT
 from models.files import digest
 from tireid import __version__, output
@@ -36,7 +34,8 @@ from tireid.reports.identify import (
     asked_warnings,
     band_sentence,
     curve_drawing,
-    guaranteed_sentence,
+    error_numbers,
+    error_table,
 )
 from tireid.verdicts import (
     known_headline,
@@ -63,7 +62,6 @@ def add_parser(commands: Any) -> None:
     parser.add_argument("model", type=Path, metavar="MODEL", help="weights.json, as identified")
     parser.add_argument("log", metavar="LOG", help="recording; LOG:RUN names one of its runs")
     shared.add_vehicle(parser, default="that of the model")
-    parser.add_argument("--run", dest="run_name", metavar="NAME", help="run of LOG")
     shared.add_log_reading(parser)
     shared.add_accept(parser)
     shared.add_output(parser, "predict")
@@ -73,34 +71,33 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where the model does not give back the drive's motion."""
     model = _model(options)
-    recording = shared.read_log(
-        options.log,
-        model.vehicle,
-        shared.given_map(options),
-        run_name=options.run_name,
-        check=not options.no_check,
-    )
+    log_map, check = shared.given_map(options), not options.no_check
+    recording = shared.read_log(options.log, model.vehicle, log_map, check=check)
     prediction = replay(recording, model)
-    recording = prediction.recording
+    recording, verdict = prediction.recording, prediction.verdict
     if recording.estimated:
         say(f"{recording.name}: vy is estimated, beginning with the tires of the model")
-    verdict, facts = prediction.verdict, _Facts.of(prediction)
+    half = None if model.band is None else model.band.over(recording)
+    facts, friction = summary(prediction, half), verdict.friction
+    lines = _prediction_text(prediction, facts)
     with output.output_folder(options.out, force=options.force) as folder:
-        columns = (_force_columns(prediction, facts.half, part) for part in blocks(len(recording)))
-        output.write_long_csv(folder / "forces.csv", columns)
-        if (friction := verdict.friction) is not None:
+        alpha = recording.alpha(model.vehicle.l_f, model.vehicle.l_r)
+        forces = {"predicted": prediction.axle_force, "half_band": half}
+        columns = {"t_s": recording.t, **output.axle_columns("alpha_{}_rad", alpha)}
+        columns |= output.force_columns({**forces, "true": recording.axle_force})
+        output.write_csv(folder / "forces.csv", columns)
+        if friction is not None:
             given = {"t_s": friction.t, "friction": friction.ratio, "sd_of_log": friction.sd}
             given |= {"another": friction.another, "unexplained": friction.unexplained}
             output.write_csv(folder / "friction.csv", given)
-        output.write_json(folder / "summary.json", summary(prediction, verdict, facts))
-        lines = _prediction_text(prediction, friction, facts)
+        output.write_json(folder / "summary.json", facts)
         say("drawing figures")
         figures = {
             "slip": slip_figure(model, recording),
             "forces": prediction_figure(prediction),
         }
-        if verdict.shown is not None:
-            figures["motion"] = motion_figure(verdict.shown, model.vehicle)
+        if verdict.forces is not None:
+            figures["motion"] = motion_figure(verdict.forces, model.vehicle)
         if friction is not None:
             figures["friction"] = friction_figure(friction)
         save_figures(folder, figures)
@@ -134,66 +131,22 @@ def _model(options: argparse.Namespace) -> TireModel:
     return model.mounted_on(vehicle)
 
 
-class _Facts(NamedTuple):
-    """What is asked of a prediction, each None where nobody knows.
+def summary(prediction: Prediction, half: Array | None) -> dict[str, Any]:
+    """Return what summary.json holds; null stands for what cannot be known.
 
-    half : width of the band of its forces (n, 2) [N].
-    beyond : share of samples whose slip is beyond the known.   inside : of windows whose force that
-        the motion shows lies in the band.   held : of samples whose true force does, (2,) each.
-    against : times [s] of windows, and whether they contradict what is guaranteed (n, 2).
+    half : width of the band (n, 2) [N]; None where the model has none.
     """
-
-    half: Array | None
-    beyond: tuple[float, float] | None
-    inside: Array | None
-    held: Array | None
-    against: tuple[Array, NDArray[np.bool_]] | None
-
-    @classmethod
-    def of(cls, prediction: Prediction) -> "_Facts":
-        model, recording = prediction.model, prediction.recording
-        half, truth, held = None, recording.axle_force, None
-        if model.band is not None:
-            half = model.band.over(recording)
-        if half is not None and truth is not None and (half > 0.0).any():
-            inside = (np.abs(prediction.axle_force - truth) <= half) & (half > 0.0)
-            held = inside.sum(axis=0) / np.maximum((half > 0.0).sum(axis=0), 1)
-        return cls(
-            half,
-            beyond_known(model, recording),
-            within_band(model, recording),
-            held,
-            contradictions(model, recording),
-        )
-
-
-def _force_columns(prediction: Prediction, half: Array | None, part: slice) -> dict[str, Array]:
-    """Return the columns of forces.csv: time, slip angles, predicted, band and true forces.
-
-    half : width of its band (n, 2) [N]; None where the model has none.
-    """
-    recording, car = prediction.recording, prediction.model.vehicle
-    alpha = recording.alpha(car.l_f, car.l_r, part)
-    columns = {"t_s": recording.t[part], **output.axle_columns("alpha_{}_rad", alpha)}
-    forces = {"predicted": prediction.axle_force, "half_band": half, "true": recording.axle_force}
-    for name, force in forces.items():
-        if force is not None:
-            columns |= output.axle_columns(f"Fy{{}}_{name}_N", force[part])
-    return columns
-
-
-def summary(prediction: Prediction, verdict: Verdict, facts: _Facts) -> dict[str, Any]:
-    """Return what summary.json holds; null stands for what cannot be known."""
-    error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
-    friction, model = verdict.friction, prediction.model
-    inside, held, against, known = facts.inside, facts.held, facts.against, model.known_slip
-    shares = (None, None) if motion is None else motion.explained
+    model, recording, motion = prediction.model, prediction.recording, prediction.motion
+    friction, truth, held = prediction.verdict.friction, recording.axle_force, None
+    if half is not None and truth is not None and (half > 0.0).any():
+        inside = (np.abs(prediction.axle_force - truth) <= half) & (half > 0.0)
+        held = inside.sum(axis=0) / np.maximum((half > 0.0).sum(axis=0), 1)
     return {
-        "verdict": verdict.to_dict(),
-        "recording": prediction.recording.name,
-        "samples": len(prediction.recording),
-        "rmse_N": None if error is None else asdict(error),
-        "rms_force_N": None if size is None else asdict(size),
+        "verdict": prediction.verdict.to_dict(),
+        "recording": recording.name,
+        "samples": len(recording),
+        "rmse_N": prediction.against_truth,
+        "rms_force_N": prediction.true_force,
         "motion": None
         if motion is None
         else {
@@ -201,14 +154,12 @@ def summary(prediction: Prediction, verdict: Verdict, facts: _Facts) -> dict[str
             "missed_yaw_rad_s2": motion.yaw,
             "rms_lateral_m_s2": motion.lateral_rms,
             "rms_yaw_rad_s2": motion.yaw_rms,
-            "explained_lateral": shares[0],
-            "explained_yaw": shares[1],
+            **dict(zip(("explained_lateral", "explained_yaw"), motion.explained, strict=True)),
         },
-        "known_slip_rad": None if known is None else known.tolist(),
-        "beyond_known_slip": facts.beyond,
-        "windows_within_band": None if inside is None else inside.tolist(),
-        "truth_within_band": None if held is None else held.tolist(),
-        "moments_against_guarantee": None if against is None else against[1].mean(axis=0).tolist(),
+        "known_slip_rad": model.known_slip,
+        "beyond_known_slip": beyond_known(model, recording),
+        "windows_within_band": within_band(model, recording),
+        "truth_within_band": held,
         "friction": None
         if friction is None
         else {"unchanged": friction.unchanged, "roads": [one._asdict() for one in friction.roads]},
@@ -218,13 +169,23 @@ def summary(prediction: Prediction, verdict: Verdict, facts: _Facts) -> dict[str
     }
 
 
-def _prediction_text(prediction: Prediction, friction: RoadFriction | None, facts: _Facts) -> str:
+_SHARES = {  # keys of summary.json, and what their shares are printed as
+    "beyond_known_slip": "known to {1:.1f} / {2:.1f} deg of slip, which {0} of the samples exceed "
+    "(front / rear)",
+    "windows_within_band": "in {0} of the windows of 0.3 s the force in the motion lies in the "
+    "band of 90 % (front / rear)",
+    "truth_within_band": "{0} of the true forces lie in it, the noise of the sensors in the band "
+    "(front / rear)",
+}
+
+
+def _prediction_text(prediction: Prediction, facts: Mapping[str, Any]) -> str:
     """Return what is to be said of a prediction beside its errors, as lines of text.
 
-    friction : of the drive's road; None where it is not observable.
+    facts : its summary.
     """
-    motion, model, lines = prediction.motion, prediction.model, []
-    inside, held, beyond, known = facts.inside, facts.held, facts.beyond, model.known_slip
+    motion, band, lines = prediction.motion, prediction.model.band, []
+    friction, known = prediction.verdict.friction, facts["known_slip_rad"]
     if prediction.against_truth is None:
         lines.append("no true forces in the log: the error cannot be given in newtons")
     if motion is not None:
@@ -233,25 +194,12 @@ def _prediction_text(prediction: Prediction, friction: RoadFriction | None, fact
             f"m/s² lateral and {motion.yaw:.3g} of {motion.yaw_rms:.3g} rad/s² yaw acceleration, "
             f"rms, sensor noise included; {prediction.motion_text()}"
         )
-    if beyond is not None and known is not None:
-        front, rear = np.degrees(known)
-        lines.append(
-            f"known to {front:.1f} / {rear:.1f} deg of slip, which {100.0 * beyond[0]:.0f} / "
-            f"{100.0 * beyond[1]:.0f} % of the samples exceed (front / rear)"
-        )
-    if inside is not None:
-        lines.append(
-            f"in {100.0 * inside[0]:.0f} / {100.0 * inside[1]:.0f} % of the windows of 0.3 s the "
-            f"force in the motion lies in the band of 90 % (front / rear)"
-        )
-    if held is not None:
-        lines.append(
-            f"{100.0 * held[0]:.0f} / {100.0 * held[1]:.0f} % of the true forces lie in it, the "
-            "noise of the sensors in the band (front / rear)"
-        )
-    if facts.against is not None:
-        lines.append(_contradiction_line(*facts.against))
-    if model.band is not None and not model.band.calibrated:
+    for key, text in _SHARES.items():
+        if facts[key] is not None:
+            share = "{:.0f} / {:.0f} %".format(*100.0 * np.array(facts[key]))
+            slip = () if known is None else np.degrees(known)
+            lines.append(text.format(share, *slip))
+    if band is not None and not band.calibrated:
         lines.append(f"friction: not observable, the band is {UNCALIBRATED}")
     if friction is not None and not friction.roads:
         lines.append(
@@ -260,16 +208,6 @@ def _prediction_text(prediction: Prediction, friction: RoadFriction | None, fact
             else "friction: not observable, slip is too small"
         )
     return "\n".join(lines)
-
-
-def _contradiction_line(t: Array, broken: NDArray[np.bool_]) -> str:
-    if not broken.any():
-        return "no moment of the drive contradicts the guaranteed forces"
-    front, rear = 100.0 * broken.mean(axis=0)
-    return (
-        f"the bound of the guaranteed forces is violated: {front:.2g} / {rear:.2g} % of the "
-        f"moments of 0.3 s contradict it (front / rear), first at {t[broken.any(axis=1)][0]:g} s"
-    )
 
 
 def write_predict_report(
@@ -287,7 +225,9 @@ def write_predict_report(
     """
     model, recording, verdict = prediction.model, prediction.recording, prediction.verdict
     notes: list[str | page.Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
-    found: list[page.Block] = [*_errors(prediction)]
+    error, found = prediction.against_truth, list[page.Block]()
+    if error is not None:
+        found.append(error_table([[recording.name, *error_numbers(error, prediction.true_force)]]))
     found += [page.Paragraph(text=page.printed(line)) for line in lines.splitlines()]
     captions = {
         "motion": "Mean force over windows of 0.3 s: from the motion, and from the model.",
@@ -299,9 +239,8 @@ def write_predict_report(
         for name, caption in captions.items()
         if name in figures
     ]
-    tires = [
-        page.Paragraph(text=text) for text in (band_sentence(model), guaranteed_sentence(model))
-    ]
+    if band := band_sentence(model):
+        found.append(page.Paragraph(text=band))
     report = page.Report(
         title=f"Tires of {source.name} on {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, not used for "
@@ -314,9 +253,7 @@ def write_predict_report(
         warnings=[*verdict_warnings(verdict), *notes],
         sections=[
             verdict_section(verdict),
-            page.Section(
-                heading="What it predicts", blocks=[*found, *(one for one in tires if one.text)]
-            ),
+            page.Section(heading="What it predicts", blocks=found),
             origin(
                 command,
                 model.vehicle,
@@ -342,18 +279,3 @@ def _predict_headlines(prediction: Prediction) -> list[page.Headline]:
             page.Headline(f"{lateral} / {yaw} %", "explained of the lateral / the yaw acceleration")
         )
     return [*numbers, *known_headline(prediction.model)]
-
-
-def _errors(prediction: Prediction) -> list[page.Block]:
-    error, size = prediction.against_truth, prediction.true_force
-    if error is None or size is None:
-        return []
-    rows: list[list[page.Cell]] = [
-        [axle, newtons, PERCENT * newtons / force if force > 0.0 else None]
-        for axle, newtons, force in (
-            ("front", error.front, size.front),
-            ("rear", error.rear, size.rear),
-        )
-    ]
-    caption = "RMSE of the axle force against the true one, and its share of the rms force."
-    return [page.Table(caption=caption, header=["axle", "RMSE [N]", "share [%]"], rows=rows)]

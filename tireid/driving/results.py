@@ -17,9 +17,8 @@ from models.vehicle import Vehicle
 from mpc.handover.rules import Verdict
 from mpc.loop.record import Drive, estimate_scores
 from mpc.tires import CurveFitError, prediction_tire
+from mpc.tires.tire import curves_at
 from tireid import __version__
-from tireid.animation import write_film
-from tireid.animation.known import known_over_time, steady_curve
 from tireid.driving.chosen import CHOSEN
 from tireid.driving.runs import (
     FROZEN,
@@ -28,8 +27,8 @@ from tireid.driving.runs import (
     LEARNING,
     LINEAR,
     ORACLE,
+    ClosedLoop,
     Conditions,
-    Run,
     run_drive,
 )
 from tireid.driving.setup import PLANT, Setup
@@ -40,6 +39,7 @@ from tireid.figures.drive import (
     drive_solve_figure,
     drive_steering_figure,
 )
+from tireid.figures.film import Film, write_film
 from tireid.figures.side_slip import drive_lateral_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
@@ -118,7 +118,7 @@ class Drives(NamedTuple):
     """
 
     conditions: Conditions
-    runs: Sequence[Run]
+    runs: Sequence[ClosedLoop]
     learnt: TireModel | None
     source: str
 
@@ -138,7 +138,7 @@ class Drives(NamedTuple):
     def write(self, folder: Path, film: str) -> dict[str, Figure]:
         """Write everything about the drives; return the figures by the name of their file.
 
-        film : webp, gif, mp4 or none.
+        film : webp, gif or none.
         """
         first, setup, faults = self.runs[0], self.conditions.setup, self.conditions.faults
         curves = _known_curves(self.runs, setup, self.learnt)
@@ -163,10 +163,9 @@ class Drives(NamedTuple):
             figures["lateral"] = drive_lateral_figure(first.drive)
         save_figures(folder, figures)
         if film != NO_FILM:
-            title, v_x = f"{first.drive.path.name}: {first.label} tires", first.drive.v_x.mean()
-            known = known_over_time(first.known, first.model, float(v_x))
-            path = folder / f"drive.{film}"
-            write_film(path, drives, curves, drops=setup.drops, title=title, known=known)
+            title = f"{first.drive.path.name}: {first.label} tires"
+            shown = Film(title, drives, curves, setup.drops, first.known, first.model)
+            write_film(folder / f"drive.{film}", shown)
         return figures
 
     def text(self) -> str:
@@ -182,7 +181,7 @@ class Drives(NamedTuple):
 SCORES = ("tires", "rms e_y", "peak e_y", "completed", "failures", "wall time: median / p99 / max")
 
 
-def score_rows(runs: Sequence[Run]) -> list[list[str]]:
+def score_rows(runs: Sequence[ClosedLoop]) -> list[list[str]]:
     rows = []
     for run in runs:
         score, end = run.scores, f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"
@@ -194,7 +193,7 @@ def score_rows(runs: Sequence[Run]) -> list[list[str]]:
     return rows
 
 
-def _summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[str, Any]:
+def _summarize_drives(runs: Sequence[ClosedLoop], inputs: Mapping[str, Any]) -> dict[str, Any]:
     """Return what summary.json holds: scores of the first drive and of each, and what went in."""
     by_label = {run.label: _scores(run) for run in runs}
     return {
@@ -207,7 +206,7 @@ def _summarize_drives(runs: Sequence[Run], inputs: Mapping[str, Any]) -> dict[st
     }
 
 
-def _scores(run: Run) -> dict[str, Any]:
+def _scores(run: ClosedLoop) -> dict[str, Any]:
     notes = [{"t_s": t, "note": text} for t, text in run.drive.notes]
     given = estimate_scores(run.drive)
     lateral = {} if given is None else {"lateral_velocity": given._asdict()}
@@ -249,7 +248,9 @@ def _drive_columns(drive: Drive) -> dict[str, Array]:
     }
 
 
-def _known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
+def _known_curves(
+    runs: Sequence[ClosedLoop], setup: Setup, learnt: TireModel | None
+) -> list[TireCurve]:
     """Return the tires of the trackers, and the linear and the true tire beside it."""
     models = {LINEAR: prediction_tire(setup.vehicle)}
     if learnt is not None:
@@ -263,11 +264,14 @@ def _known_curves(runs: Sequence[Run], setup: Setup, learnt: TireModel | None) -
         models[ORACLE] = setup.oracle()
         if setup.drops:
             models[ORACLE + AT_THE_END] = setup.oracle(setup.drops[-1][1])
-    v_x = float(setup.speeds().mean())
-    return [steady_curve(label, model, v_x) for label, model in models.items()]
+    v_x, slip = float(setup.speeds().mean()), np.linspace(-0.35, 0.35, 281)
+    return [
+        TireCurve(label=label, alpha=slip, force=curves_at(model, slip, v_x).T)
+        for label, model in models.items()
+    ]
 
 
-def _estimate_words(run: Run) -> str:
+def _estimate_words(run: ClosedLoop) -> str:
     got = estimate_scores(run.drive)
     assert got is not None
     return (
@@ -307,7 +311,7 @@ def write_drive_report(
     write_report(folder / REPORT, report)
 
 
-def _drive_headlines(runs: Sequence[Run]) -> list[Headline]:
+def _drive_headlines(runs: Sequence[ClosedLoop]) -> list[Headline]:
     first = runs[0].scores
     numbers = [
         Headline(
@@ -338,11 +342,11 @@ def _drive_headlines(runs: Sequence[Run]) -> list[Headline]:
     return numbers
 
 
-def _end(run: Run) -> str:
+def _end(run: ClosedLoop) -> str:
     return "" if run.scores.completed else f", who {run.drive.ending}"
 
 
-def _drive_warnings(runs: Sequence[Run]) -> list[str]:
+def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
     said = []
     for run in runs:
         scores = run.scores
@@ -367,7 +371,7 @@ def _bad(text: str) -> bool:
 
 
 def _drive_blocks(
-    runs: Sequence[Run], figures: Mapping[str, Figure], film: Path | None
+    runs: Sequence[ClosedLoop], figures: Mapping[str, Figure], film: Path | None
 ) -> list[Block]:
     blocks: list[Block] = [
         Table(caption="Scores of the drives.", header=SCORES, rows=score_rows(runs))
@@ -383,7 +387,7 @@ def _drive_blocks(
     return [*blocks, *drawings(figures, captions)]
 
 
-def known_blocks(runs: Sequence[Run], figures: Mapping[str, Figure]) -> list[Block]:
+def known_blocks(runs: Sequence[ClosedLoop], figures: Mapping[str, Figure]) -> list[Block]:
     """Return what trackers believed of the tires, and what they were given on the way."""
     captions = {
         "tires": "Forces of the first drive, and the tire models of the trackers.",

@@ -155,7 +155,7 @@ class Conditions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Run:
+class ClosedLoop:
     """A drive and what is known of it.
 
     Parameters
@@ -176,7 +176,7 @@ class Run:
     def __repr__(self) -> str:
         rms, peak = self.scores.rms_e_y_m, self.scores.peak_e_y_m
         return (
-            f"<Run on {self.label} tires along {self.drive.path.name}: {self.drive.ending}; "
+            f"<ClosedLoop on {self.label} tires along {self.drive.path.name}: {self.drive.ending}; "
             f"{rms:.3f} m rms off the path, {peak:.3f} m at most>"
         )
 
@@ -214,9 +214,7 @@ def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> Prediction
     return prediction_tire(begun(learnt) if label == LEARNING else learnt, setup.vehicle)
 
 
-def run_drive(
-    label: str, conditions: Conditions, learnt: TireModel | None, *, linearizations: int = 1
-) -> Run:
+def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> ClosedLoop:
     """Drive the path once with the tracker on a tire."""
     setup, problem = conditions.setup, Problem()
     model = given_tire(label, setup, learnt)
@@ -227,7 +225,6 @@ def run_drive(
             problem,
             period=CHOSEN.period,
             delay=conditions.delay * CHOSEN.period + lag,
-            linearizations=linearizations,
             caution=conditions.caution,
         )
     except NoCompilerError as error:
@@ -252,7 +249,7 @@ def run_drive(
             name=f"{setup.path.name}, {label}",
             progress=progress,
         )
-    return Run(
+    return ClosedLoop(
         label=label,
         model=model,
         final=tracker.tire,
@@ -288,7 +285,7 @@ def drive(
     laps: float = 1.0,
     seed: int = 0,
     caution: float = 0.0,
-) -> Run:
+) -> ClosedLoop:
     """Drive a double-track car along a path; the tracker steers by the given tires.
 
     Parameters
@@ -312,7 +309,7 @@ def drive(
 
     Returns
     -------
-    Run
+    ClosedLoop
         `drive` holds every signal, `scores` what it is worth.
 
     Raises

@@ -9,14 +9,7 @@ class Chosen(NamedTuple):
     # compare
     compare_farthest: float = 300.0  # [%], what is worse is drawn at the end of the axis
     row: float = 0.3  # height of a method [in]
-    best: float = 1.0  # [%], lower end of the color scale
-    worst: float = 100.0  # [%], upper end of the color scale
-    dark: float = 0.55  # share of the color scale from which text is white
-    longest: int = 17  # letters of a recording's name beside a map
     # drive
-    bins: int = 60  # of a histogram
-    drive_wide: float = 10.0  # times slower than the median: from there on the axis is logarithmic
-    ms_per_s: float = 1e3  # ms in a second
     # dashes of tires as they are at the end of a drive [points]
     later: tuple[int, tuple[float, float]] = (0, (2.5, 0.9))
     near: float = 0.75  # a limit is drawn where a command comes this close to it
@@ -36,17 +29,12 @@ class Chosen(NamedTuple):
     run_up: float = 16.0  # of the straights before and after the cones that is shown [m]
     highest: float = 5.0  # panel [in]
     cars_every: float = 2.6  # wheelbases between two outlines
-    small: float = 160.0  # in a picture of more than that [m] cars cannot be seen
-    # a part of such a path that is drawn large, where a car was farthest off [m]
-    zoom: float = 44.0
-    seen: float = 0.05  # deviations are drawn larger until the largest is this share of the picture
     # paper
     paper_wide: float = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
     offset: float = 0.2  # between neighboring laws, as a share of the distance of columns
     # side_slip
     most: int = 4  # recordings that are drawn
     columns: int = 5  # entries of a row of the legend
-    mm_per_m: float = 1e3  # mm/s in a m/s
     beyond: float = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
     # style
     page: float = 7.16  # width of both columns of a paper [in]

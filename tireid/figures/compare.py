@@ -1,29 +1,25 @@
 """Methods side by side: how far off online, frozen where learnt, and frozen elsewhere."""
 
-import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.colors import Colormap, LogNorm
 from matplotlib.figure import Figure
 
 from codegen.escape import mathtext
 from identifier.compare.course import same_and_other
 from identifier.compare.study import Comparison, ranking
-from identifier.reproducibility import AxleRmse
 from tireid.figures import style
 from tireid.figures.chosen import CHOSEN
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:
     """Return the names of recordings without the file where all are runs of one."""
-    files = {name.split(":", 1)[0] for name in names}
-    if len(files) > 1 or not all(":" in name for name in names):
-        return {name: mathtext(name) for name in names}
-    return {name: mathtext(name.split(":", 1)[1]) for name in names}
+    parted = {name: name.partition(":") for name in names}
+    one_file = len({file for file, _, _ in parted.values()}) == 1
+    runs = all(run for _, _, run in parted.values())
+    return {n: mathtext(run if one_file and runs else n) for n, (_, _, run) in parted.items()}
 
 
 def method_label(name: str) -> str:
@@ -85,71 +81,3 @@ def _draw_row(axes: Axes, position: int, errors: Mapping[str, list[float]]) -> N
         axes.plot([shown.min(), shown.max()], [y, y], color=color, linewidth=1.0, alpha=0.6)
         mean = min(float(np.mean(values)), CHOSEN.compare_farthest * 1.1)
         axes.plot(mean, y, marker, color=color, ms=4.5, clip_on=False, label=kind)
-
-
-# Learnt on one recording, replayed on another: a map of errors for each method.
-
-
-@style.styled
-def matrix_figure(comparison: Comparison) -> Figure:
-    """Draw the frozen error of each method, rows learnt on, columns replayed on."""
-    maps = {
-        method_label(name): frozen
-        for name in ranking(comparison)
-        if (frozen := comparison.trials[name].frozen) is not None
-    }
-    if not maps:
-        raise ValueError("no method of the comparison can be frozen")
-    size = len(comparison.names)
-    columns = min(len(maps), 4 if size <= 4 else 2)
-    rows = math.ceil(len(maps) / columns)
-    cell = (CHOSEN.page - 1.6) / columns / size
-    figure = style.new_figure(CHOSEN.page, 0.6 + rows * (0.42 + size * min(cell, 0.42)))
-    grid = figure.subplots(rows, columns, squeeze=False)
-    norm, colors = LogNorm(CHOSEN.best, CHOSEN.worst), colormaps["viridis_r"]
-    for axes, (label, frozen) in zip(grid.flat, maps.items(), strict=False):
-        _draw_map(axes, comparison, frozen, norm, colors)
-        axes.set_title(label, fontsize=7.2)
-    for number, axes in enumerate(grid.flat):
-        axes.set_visible(number < len(maps))
-        if number % columns:
-            axes.set_yticklabels([])
-    figure.supylabel("learnt on", fontsize=8.0)
-    figure.supxlabel("frozen, replayed on", fontsize=8.0)
-    figure.suptitle(f"{comparison.course.measure}, both axles [% of rms force]", fontsize=8.0)
-    return figure
-
-
-def _draw_map(
-    axes: Axes,
-    comparison: Comparison,
-    frozen: Mapping[str, Mapping[str, AxleRmse]],
-    norm: LogNorm,
-    colors: Colormap,
-) -> None:
-    names = comparison.names
-    shares = np.full((len(names), len(names)), np.nan)
-    for i, learnt in enumerate(names):
-        for j, name in enumerate(names):
-            if learnt in frozen:
-                shares[i, j] = comparison.course.share(name, frozen[learnt][name])
-    shown = np.clip(np.nan_to_num(shares, nan=CHOSEN.worst), CHOSEN.best, CHOSEN.worst)
-    axes.imshow(shown, norm=norm, cmap=colors, aspect="auto")
-    for (i, j), share in np.ndenumerate(shares):
-        dark = norm(shown[i, j]) > CHOSEN.dark
-        text = f"{share:.1f}" if share < 10.0 else f"{share:.0f}" if share < 1e3 else ">999"
-        text = "div." if np.isnan(share) else text
-        axes.text(j, i, text, ha="center", va="center", color="white" if dark else "black")
-    labels = short_names(names).values()
-    cut = [one if len(one) <= CHOSEN.longest else f"{one[: CHOSEN.longest - 1]}…" for one in labels]
-    letters = [_letter(number) for number in range(len(names))]
-    axes.set_xticks(range(len(names)), letters)
-    both = [f"{label}  {letter}" for label, letter in zip(cut, letters, strict=True)]
-    axes.set_yticks(range(len(names)), both)
-    axes.tick_params(length=0.0)
-    axes.grid(visible=False)
-
-
-def _letter(number: int) -> str:
-    """A to Z, then numbers: what stands for a recording below a map."""
-    return chr(ord("A") + number) if number < 26 else str(number + 1)

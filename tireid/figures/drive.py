@@ -21,35 +21,25 @@ if TYPE_CHECKING:
 
 @style.styled
 def drive_solve_figure(drive: "Drive") -> Figure:
-    """Draw the solve times of a drive as a histogram and over time."""
-    times = CHOSEN.ms_per_s * drive.solve_time
-    median, p99, largest = np.quantile(times, [0.5, 0.99, 1.0])
-    figure = style.new_figure(CHOSEN.page, 2.7)
-    left, right = figure.subplots(1, 2)
-    wide = largest > CHOSEN.drive_wide * median
-    low = float(times.min()) / 1.1 if wide else 0.0
-    bins = (np.geomspace if wide else np.linspace)(low, 1.1 * largest, CHOSEN.bins)
-    left.hist(times, bins=list(bins), color=style.BLUE, alpha=0.8)
-    left.set(xlabel="solve time [ms]", ylabel="steps [-]", xlim=(low, 1.1 * largest))
-    right.plot(
+    """Draw the solve times of a drive, their median and the time that one of a hundred exceeds."""
+    times = 1e3 * drive.solve_time  # ms
+    figure = style.new_figure(CHOSEN.page, 2.5)
+    axes = figure.subplots()
+    axes.plot(
         drive.t, times, ".", ms=2.2, mew=0.0, color=style.BLUE, rasterized=True, label="a step"
     )
     failed = drive.status != 0
     if failed.any():
         label = f"failed ({np.count_nonzero(failed)})"
-        right.plot(drive.t[failed], times[failed], "x", ms=4.0, color=style.ORANGE, label=label)
-    for value, name, color in ((median, "median", style.PURPLE), (p99, "99 %", style.ORANGE)):
-        text = f"{name} {value:.3g} ms"
-        left.axvline(value, color=color, linewidth=1.1, linestyle=(0, (4, 1.5)), label=text)
-    right.set(xlabel=style.TIME, ylabel="solve time [ms]", ylim=(low, 1.3 * largest))
-    if wide:
-        left.set_xscale("log")
-        right.set_yscale("log")
-        for axis in (left.xaxis, right.yaxis):
-            style.few_ticks(axis)
-    period = f"largest {largest:.3g} ms of a period of {CHOSEN.ms_per_s * drive.period:g} ms"
-    right.set_title(period, loc="right")
-    left.set_title(f"{times.size} steps")
+        axes.plot(drive.t[failed], times[failed], "x", ms=4.0, color=style.ORANGE, label=label)
+    for share, name, color in ((0.5, "median", style.PURPLE), (0.99, "99 %", style.ORANGE)):
+        value = float(np.quantile(times, share))
+        axes.axhline(value, color=color, linewidth=1.1, label=f"{name} {value:.3g} ms")
+    axes.set(xlabel=style.TIME, ylabel="solve time [ms]", yscale="log")
+    style.few_ticks(axes.yaxis)
+    period = f"largest {times.max():.3g} ms of a period of {1e3 * drive.period:g} ms"
+    axes.set_title(period, loc="right")
+    axes.set_title(f"{times.size} steps")
     style.legend_above(figure)
     return figure
 
@@ -112,7 +102,10 @@ def drive_errors_figure(
         curves = (drive.e_y, np.rad2deg(drive.e_psi), drive.a_y, drive.v_x)
         for axes, curve in zip(panels, curves, strict=True):
             axes.plot(drive.s, curve, label=label, **look)
-        _mark_notes(panels[0], drive, look["color"])
+        if drive.notes:
+            at = np.searchsorted(drive.t, [t for t, _ in drive.notes]).clip(max=drive.t.size - 1)
+            mark: Mapping[str, Any] = {"color": look["color"], "ms": 3.2, "mfc": "white"}
+            panels[0].plot(drive.s[at], drive.e_y[at], "D", label=_REPLANNED, **mark, zorder=3.0)
     for axes, label in zip(panels, (*labels, "speed $v_x$\n[m/s]"), strict=True):
         axes.set_ylabel(label)
         _mark_road(axes, drives, drops, faults)
@@ -124,7 +117,9 @@ def drive_errors_figure(
     if reach > 0.8 * off_path:
         for side in (-off_path, off_path):
             panels[0].axhline(side, color="#AA4499", linewidth=0.8, label="off the path")
-    _roomy(panels[3], min(float(drive.v_x.min()) for drive in drives.values()))
+    low, high = panels[3].get_ylim()
+    room = max(0.5 * (2.0 - high + low), 0.0)  # a speed that is held is a level line
+    panels[3].set_ylim(low - room, high + room)
     last = max(float(drive.s[-1]) for drive in drives.values())
     panels[-1].set(xlabel=ARC, xlim=(0.0, last))
     figure.align_ylabels(panels)
@@ -174,24 +169,6 @@ def friction_label(mu: float) -> str:
     return f"friction {mu:g}"
 
 
-def _mark_notes(axes: Axes, drive: "Drive", color: str) -> None:
-    """Mark on the curve from where the tracker plans with another tire or grip."""
-    if drive.notes:
-        at = np.searchsorted(drive.t, [t for t, _ in drive.notes])
-        at = np.minimum(at, drive.t.size - 1)
-        look: Mapping[str, Any] = {"color": color, "ms": 3.2, "mfc": "white", "mew": 0.9}
-        axes.plot(drive.s[at], drive.e_y[at], "D", zorder=3.0, label=_REPLANNED, **look)
-
-
-def _roomy(axes: Axes, slowest: float) -> None:
-    """Show a speed that is held as a level line, not as noise at full height."""
-    low, high = axes.get_ylim()
-    if high - low < 2.0:
-        middle = 0.5 * (low + high)
-        low, high = middle - 1.0, middle + 1.0
-    axes.set_ylim(min(low, slowest), high)
-
-
 @style.styled
 def drive_steering_figure(
     drives: Mapping[str, "Drive"],
@@ -221,19 +198,16 @@ def drive_steering_figure(
         (rate, rate_limit, f"rate, {name}\n[deg/s]"),
     ):
         axes.set_ylabel(label)
-        _limits(axes, float(np.rad2deg(limit)))
+        most = float(np.rad2deg(limit))
+        if max(np.abs(axes.get_ylim())) > CHOSEN.near * most:
+            for side in (-most, most):
+                look = {"color": "#AA4499", "linewidth": 0.8, "linestyle": (0, (4, 2))}
+                axes.axhline(side, label="limit", **look)
         _mark_road(axes, drives, drops, faults)
     rate.set(xlabel=ARC, xlim=(0.0, max(float(drive.s[-1]) for drive in drives.values())))
     figure.align_ylabels([angle, rate])
     style.legend_above(figure, order=tuple(drives))
     return figure
-
-
-def _limits(axes: Axes, limit: float) -> None:
-    low, high = axes.get_ylim()
-    if max(-low, high) > CHOSEN.near * limit:
-        for side in (-limit, limit):
-            axes.axhline(side, color="#AA4499", linewidth=0.8, linestyle=(0, (4, 2)), label="limit")
 
 
 # The car from above as polygons: a body and four wheels, the front ones steered.
@@ -294,16 +268,10 @@ _INNER_WIDTH = CHOSEN.page - 0.75  # what labels leave of the page [in]
 
 @style.styled
 def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
-    """Draw the path, its cones and where every car drove; the first with its outlines.
-
-    A path too large for cars to be seen is drawn as a whole with its deviations magnified, as the
-    legend says, and beside it the place of the largest deviation at its true scale.
-    """
+    """Draw the path, its cones and where every car drove; the first with its outlines."""
     path = next(iter(drives.values())).path
     low, high = _extent(path, drives)
     width, height = high - low
-    if width <= CHOSEN.narrow * height and max(width, height) > CHOSEN.small:
-        return _large(path, drives)
     rows = 1
     if width > CHOSEN.narrow * height:
         rows = min(CHOSEN.most_rows, max(1, round(width / CHOSEN.row_length)))
@@ -329,72 +297,29 @@ def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
     if len(path.cones):
         first, last = path.cones.min(axis=0), path.cones.max(axis=0)
         low, high = np.minimum(low, first - CHOSEN.margin), np.maximum(high, last + CHOSEN.margin)
-        low[0], high[0] = (
-            max(low[0], first[0] - CHOSEN.run_up),
-            min(high[0], last[0] + CHOSEN.run_up),
-        )
+        low[0] = max(low[0], first[0] - CHOSEN.run_up)
+        high[0] = min(high[0], last[0] + CHOSEN.run_up)
+    driven = np.concatenate([drive.Y for drive in drives.values()])
     room = 2.0 * CHOSEN.margin
-    for drive in drives.values():
-        driven = np.column_stack([drive.X, drive.Y])
-        low[1] = max(min(low[1], driven[:, 1].min() - 2.0), low[1] - room)
-        high[1] = min(max(high[1], driven[:, 1].max() + 2.0), high[1] + room)
+    low[1] = np.clip(driven.min() - 2.0, low[1] - room, low[1])
+    high[1] = np.clip(driven.max() + 2.0, high[1], high[1] + room)
     return low, high
-
-
-def _large(path: "Path", drives: Mapping[str, "Drive"]) -> Figure:
-    figure = style.new_figure(CHOSEN.page, 3.6)
-    whole, part = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
-    largest = max(float(np.abs(drive.e_y).max()) for drive in drives.values())
-    size = max(float(np.ptp(path.X)), float(np.ptp(path.Y)))
-    times = _round(CHOSEN.seen * size / max(largest, 1e-3))
-    whole.plot(path.X, path.Y, **PATH)
-    for label, drive in reversed(list(drives.items())):
-        X, Y, psi = path.pose(drive.s)
-        off = times * drive.e_y
-        look = tire_look(label)
-        whole.plot(X - off * np.sin(psi), Y + off * np.cos(psi), label=label, **look)
-    whole.set(aspect="equal", title=f"deviation drawn {times:g} times larger")
-    worst = max(drives.values(), key=lambda drive: float(np.abs(drive.e_y).max()))
-    k = int(np.abs(worst.e_y).argmax())
-    X0, Y0, _ = (float(value) for value in path.pose(worst.s[k]))
-    whole.plot(X0, Y0, marker="s", markersize=9.0, markerfacecolor="none", color="#AA4499")
-    half = 0.5 * CHOSEN.zoom
-    part.set(xlim=(X0 - half, X0 + half), ylim=(Y0 - half, Y0 + half), aspect="equal")
-    _draw(part, path, drives)
-    part.set_title(f"the largest deviation, {abs(worst.e_y[k]):.2f} m, to scale")
-    for axes in (whole, part):
-        axes.set(xlabel="X [m]", ylabel="Y [m]")
-    style.legend_above(figure, order=tuple(drives))
-    return figure
-
-
-def _round(value: float) -> float:
-    """Return the largest of 1, 2, 5, 10, ... that is not larger, at least 1."""
-    steps = np.array([a * 10.0**b for b in range(4) for a in (1.0, 2.0, 5.0)])
-    return float(steps[steps <= max(value, 1.0)][-1])
 
 
 def _draw(axes: Axes, path: "Path", drives: Mapping[str, "Drive"]) -> None:
     axes.plot(path.X, path.Y, **PATH)
     if len(path.cones):
-        axes.plot(path.cones[:, 0], path.cones[:, 1], **CONES)
-    first = next(iter(drives))
-    _draw_cars(axes, drives[first], tire_look(first)["color"])
-    for label, drive in reversed(list(drives.items())):
-        axes.plot(drive.X, drive.Y, label=label, **tire_look(label))
-
-
-def _draw_cars(axes: Axes, drive: "Drive", color: str) -> None:
-    every = CHOSEN.cars_every * drive.vehicle.wheelbase
+        axes.plot(*path.cones.T, **CONES)
+    label, drive = next(iter(drives.items()))
+    color, every = tire_look(label)["color"], CHOSEN.cars_every * drive.vehicle.wheelbase
     at = np.searchsorted(drive.s, np.arange(drive.s[0], drive.s[-1], every))
-    signals = (drive.X, drive.Y, drive.psi, drive.delta)
     shapes = [
-        car_shape(drive.vehicle, *(float(values[k]) for values in signals))
+        car_shape(drive.vehicle, drive.X[k], drive.Y[k], drive.psi[k], drive.delta[k])
         for k in at[at < drive.s.size]
     ]
-    bodies = [shape.body for shape in shapes]
-    wheels = [wheel for shape in shapes for wheel in shape.wheels]
-    axes.add_collection(
-        PolyCollection(bodies, facecolors=(color, 0.12), edgecolors=color, linewidths=0.5)
-    )
+    bodies, wheels = [one.body for one in shapes], [wheel for one in shapes for wheel in one.wheels]
+    outline = PolyCollection(bodies, facecolors=(color, 0.12), edgecolors=color, linewidths=0.5)
+    axes.add_collection(outline)
     axes.add_collection(PolyCollection(wheels, facecolors="#333333", edgecolors="none"))
+    for label, drive in reversed(list(drives.items())):
+        axes.plot(drive.X, drive.Y, label=label, **tire_look(label))

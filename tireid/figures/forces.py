@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.doctor.consistency import Motion, Reading, forces_and_slips
+from identifier.doctor.readings import Motion, Reading, forces_and_slips
 from identifier.prediction import Prediction
-from identifier.reproducibility import Replay, freeze_key, online_error
+from identifier.reproducibility import Replay, online_error
 from identifier.run import History
 from models.recordings import Recording
 from models.rules import require_kind
@@ -105,8 +105,6 @@ def force_figure(
     """
     replays = dict(sorted((replays or {}).items()))
     recording, truth, first = history.recording, history.recording.axle_force, int(history.online)
-    for at, replay in replays.items():
-        _require_same(replay, history, f"the replay frozen at {freeze_key(at)} s")
     online: list[_Curve] = [(history.axle_force, style.ONLINE)] * first
     shown_in_all = online if truth is None else [(truth, style.TRUTH), *online]
     frozen = {at: (replay.axle_force, style.FROZEN) for at, replay in replays.items()}
@@ -136,25 +134,17 @@ def force_figure(
     return figure
 
 
-def _require_same(replay: Replay | Prediction, online: History, what: str = "the replay") -> None:
-    if replay.axle_force.shape != online.axle_force.shape:
-        raise ValueError(
-            f"{what} is of {replay.recording.name}, the online run of {online.recording.name}"
-        )
-
-
 def _errors(replay: Replay | Prediction, unit: style.ForceUnit, axle: int) -> str:
     """Return the error of a replay, and below it the paper's measure where it is known."""
-    against = replay.against_truth, getattr(replay, "against_online", None)
-    said = [
-        f"RMSE{to} {unit.format(error, axle)}"
-        for error, to in zip(against, ("", " to online"), strict=True)
-        if error is not None
-    ][:1]
+    online = getattr(replay, "against_online", None)
+    error, to = replay.against_truth, ""
+    if error is None:
+        error, to = online, " to online"
+    said = "" if error is None else f"RMSE{to} {unit.format(error, axle)}"
     sides = getattr(replay, "reproduction", None)
     if said and sides is not None and sides.past_against_online is not None:
-        said.append(f"past to online {unit.format(sides.past_against_online, axle)}")
-    return "\n".join(said)
+        said += f"\npast to online {unit.format(sides.past_against_online, axle)}"
+    return said
 
 
 @style.styled
@@ -165,10 +155,8 @@ def prediction_figure(replay: Replay | Prediction, online: History | None = None
     no truth; with neither there is no residual.
     """
     recording, known, look = replay.recording, replay.recording.axle_force, style.TRUTH
-    if online is not None:
-        _require_same(replay, online)
-        if known is None:
-            known, look = online.axle_force, style.ONLINE
+    if online is not None and known is None:
+        known, look = online.axle_force, style.ONLINE
     frozen = (replay.axle_force, style.FROZEN)
     row = [frozen] if known is None else [(known, look), frozen]
     figure, panels, unit = _force_panels(recording, [("", row)], known, [frozen])
@@ -181,11 +169,10 @@ def prediction_figure(replay: Replay | Prediction, online: History | None = None
 
 @style.styled
 def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
-    """Draw the forces of several frozen models over one drive, and what each misses."""
-    recordings = [replay.recording for replay in replays.values()]
-    recording, truth = recordings[0], recordings[0].axle_force
-    if truth is None or any(other.name != recording.name for other in recordings):
-        raise ValueError("replays of one recording with true forces are needed")
+    """Draw forces of frozen models over one drive with true forces, and what each misses."""
+    recording = next(iter(replays.values())).recording
+    truth = recording.axle_force
+    assert truth is not None
     colors = (style.ORANGE, *style.SERIES)
     curves = [
         (replay.axle_force, {"color": color, "linewidth": 1.1, "label": label})
@@ -198,13 +185,10 @@ def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
 
 
 @style.styled
-def inputs_figure(recording: Recording, *, window: style.Window = None) -> Figure:
-    """Draw the signals of a recording; rear steering and a_y only where there are any.
-
-    window : first and last time to show [s]; None shows all.
-    """
+def inputs_figure(recording: Recording) -> Figure:
+    """Draw the signals of a recording; rear steering and a_y only where there are any."""
     require_kind(Recording, "as of read_recording, or run.recording", recording=recording)
-    ends = style.time_window(recording.t, window)
+    ends = float(recording.t[0]), float(recording.t[-1])
     estimated = ", estimated" if recording.estimated else ""
     logged = {
         "$v_x$ [m/s]": (recording.v_x, 1.0),

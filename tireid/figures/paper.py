@@ -13,7 +13,7 @@ from codegen.arrays import Array
 from identifier.paper.design import VARIANTS
 from identifier.run import History
 from identifier.setup import force_unit_name
-from identifier.stability.loop import INTEGRATORS, Loop, eigenvalues, root_locus
+from identifier.stability.loop import Loop, eigenvalues, root_locus
 from identifier.stability.margins import gain_margin, phase_margin
 from tireid.figures import style
 from tireid.figures.chosen import CHOSEN
@@ -98,8 +98,10 @@ def weights_figure(history: History, freeze_times: Sequence[float] = ()) -> Figu
     lower.set(ylabel=r"weights $\hat{V}$ [-]")
     style.label_time(lower, recording.t)
     for axes, values in ((upper, W), (lower, V)):
-        settled = values if history.diverged_at is None else _settled(values)
-        axes.set_ylim(style.force_range(settled))
+        if history.diverged_at is not None:  # before the law runs away
+            peak = np.abs(values).max(axis=(1, 2))
+            values = values[peak <= 10.0 * np.median(peak[np.isfinite(peak)])]
+        axes.set_ylim(style.force_range(values))
         for t_freeze in freeze_times:
             style.mark_freeze(axes, t_freeze, prediction=False)
         style.legend_beside(axes)
@@ -113,26 +115,18 @@ def _lines(axes: Axes, t: Array, values: Array, color: str, label: str) -> None:
     axes.plot(t, drawn, color=color, linewidth=0.7)[0].set_label(label)
 
 
-def _settled(values: Array) -> Array:
-    """Return the samples of `values` (n, i, k) before a law that diverges runs away."""
-    peak = np.abs(values).max(axis=(1, 2))
-    kept: Array = values[peak <= 10.0 * np.median(peak[np.isfinite(peak)])]
-    return kept
-
-
 _Quartiles = tuple[float, float, float]  # median, lower and upper quartile
 _MARKS: Mapping[str, tuple[str, str]] = {  # color, marker
     "instantaneous": (style.ORANGE, "s"),
     "integral": (style.BLUE, "o"),
     "instantaneous_scaled": (style.GREEN, "D"),
 }
-_FURTHER = ((style.PURPLE, "^"), (style.AMBER, "v"))
 
 
 @style.styled
 def comparison_figure(
     results: Mapping[str, Mapping[str, _Quartiles]],
-    paper: Mapping[str, Mapping[str, float]] | None = None,
+    paper: Mapping[str, Mapping[str, float]],
 ) -> Figure:
     """Draw medians of the force RMSE with whiskers from quartile to quartile, the paper's hollow.
 
@@ -141,8 +135,6 @@ def comparison_figure(
     paper : by law, by column: the value that the paper prints [kN].
     """
     columns = list(dict.fromkeys(name for row in results.values() for name in row))
-    if not columns:
-        raise ValueError("a comparison needs at least one law with one column")
     figure = style.new_figure(CHOSEN.page, 2.9)
     axes = figure.subplots()
     drawn: list[float] = []
@@ -151,7 +143,7 @@ def comparison_figure(
         if not row:
             continue
         label = VARIANTS[law].title.replace("eta/lambda", "η/λ")
-        color, marker = _MARKS.get(law, _FURTHER[number % len(_FURTHER)])
+        color, marker = _MARKS[law]
         order += [label, f"{label} (paper)"]
         shift = CHOSEN.offset * (number - (len(results) - 1) / 2)
         middle, low, high = np.array(list(row.values()), dtype=np.float64).T
@@ -160,7 +152,7 @@ def comparison_figure(
         at = [columns.index(name) + shift for name in row]
         look: Mapping[str, Any] = {"color": color, "ms": 4.5, "elinewidth": 1.2, "capsize": 3.0}
         axes.errorbar(at, middle, yerr=whiskers, fmt=marker, label=label, **look)
-        printed = {name: value for name, value in (paper or {}).get(law, {}).items() if name in row}
+        printed = {name: value for name, value in paper.get(law, {}).items() if name in row}
         if printed:
             at = [columns.index(name) + shift + 0.07 for name in printed]
             look = {"ms": 5.0, "mfc": "white", "mec": color, "mew": 1.1}
@@ -185,17 +177,16 @@ _FACTORS = np.geomspace(1e-3, 1e3, 1500)  # on the loop gain, along the locus
 
 
 @style.styled
-def locus_figure(loop: Loop, *, integrator: str, dt: float) -> Figure:
+def locus_figure(loop: Loop, dt: float) -> Figure:
     """Draw the root locus of the sampled loop, with the design on it and the gain at its limit.
 
     Left all of the unit circle, right the part near z = 1, where slow poles are.
 
-    integrator : "euler" or "rk4".   dt : sampling interval [s].
+    dt : sampling interval [s].
     """
-    step = INTEGRATORS[integrator]
-    locus = step(root_locus(loop, _FACTORS) * dt).ravel()
-    design = step(eigenvalues(loop.matrix()) * dt)
-    margin = gain_margin(loop, step, dt)
+    locus = 1.0 + root_locus(loop, _FACTORS).ravel() * dt
+    design = 1.0 + eigenvalues(loop.matrix()) * dt
+    margin = gain_margin(loop, dt)
     circle = np.exp(1j * np.linspace(-np.pi, np.pi, 2881))
     figure = style.new_figure(CHOSEN.page, 3.5)
     panels = figure.subplots(1, 2)
@@ -207,14 +198,14 @@ def locus_figure(loop: Loop, *, integrator: str, dt: float) -> Figure:
         axes.plot(locus.real, locus.imag, ".", color=style.GREY, markersize=1.0, label="any gain")
         axes.plot(design.real, design.imag, "o", color=style.BLUE, markersize=4.5, label="design")
         if 0.0 < margin.factor < np.inf:
-            edge = step(eigenvalues(loop.scaled(margin.factor).matrix()) * dt)
+            edge = 1.0 + eigenvalues(loop.scaled(margin.factor).matrix()) * dt
             name = f"{margin.factor:.3g} times its gain"
             axes.plot(edge.real, edge.imag, "x", color=style.ORANGE, markersize=5.5, label=name)
         axes.set(xlim=(left, right), ylim=(-height, height), aspect="equal")
         axes.set_xlabel("real part of z [-]")
     panels[0].set_ylabel("imaginary part of z [-]")
     panels[0].set_title("Poles of the sampled loop")
-    phase = phase_margin(loop, step, dt)
+    phase = phase_margin(loop, dt)
     panels[1].set_title(f"Near z = 1; phase margin {phase:.0f}°")
     style.legend_above(figure)
     return figure

@@ -1,6 +1,7 @@
 """Side slip and lateral velocity as they were estimated, with their band, beside what is known."""
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from tireid.figures import style
 from tireid.figures.chosen import CHOSEN
 from tireid.figures.compare import method_label, short_names
 from tireid.figures.drive import ARC
-from tireid.figures.thinned import Signal, drawn_times, shown
+from tireid.figures.thinned import drawn_times, shown
 
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
@@ -23,78 +24,66 @@ _FIRST = "inertial"  # which has the band where several estimate v_y
 _OTHERS = (style.ORANGE, style.GREEN, style.PURPLE, style.AMBER, style.SKY, style.GREY)
 _BAND = "within 2 standard deviations"
 _SHADE: Mapping[str, Any] = {"color": style.BLUE, "alpha": 0.2, "linewidth": 0.0}
+_ALONE: Mapping[str, Any] = {"color": style.GREY, "label": "inertial identifier alone"}
 
 
 @style.styled
 def side_slip_figure(
     recordings: Sequence[Recording], given: Mapping[str, Mapping[str, SideSlip]]
 ) -> Figure:
-    """Draw side slip and what estimates miss of it; the band is of the inertial identifier.
+    """Draw side slip as it was recorded and estimated; the band is of the inertial identifier.
 
-    Without a recorded v_y there is an estimate with its band, and nothing is missed. A band is
-    drawn of the inertial identifier, of the first method with one where it is not there.
+    Where that is not there, it is of the first method that has one.
     """
     drawn = list(recordings)[: CHOSEN.most]
     given = {name: by_name for name, by_name in given.items() if by_name}
-    if not given:
-        raise ValueError("no method estimated a lateral velocity")
     has_band = {n: any(one.v_y_sd is not None for one in given[n].values()) for n in given}
     first = max(given, key=lambda name: (name == _FIRST, has_band[name]))
-    known = [recording.logged_v_y is not None for recording in drawn]
-    ratios = [ratio for one in known for ratio in ([1.5, 0.9] if one else [1.5])]
-    figure = style.new_figure(CHOSEN.page, 0.7 + sum(ratios))
-    panels = iter(figure.subplots(len(ratios), 1, squeeze=False, height_ratios=ratios)[:, 0])
+    looks: dict[str, dict[str, Any]] = {
+        first: {"color": style.BLUE, "zorder": 2.5}
+    }  # above the others
+    others = [name for name in given if name != first]
+    looks |= {n: {"color": color} for n, color in zip(others, cycle(_OTHERS), strict=False)}
+    figure = style.new_figure(CHOSEN.page, 0.7 + 1.5 * len(drawn))
+    panels = figure.subplots(len(drawn), 1, squeeze=False)[:, 0]
     names = short_names([recording.name for recording in recordings])
-    for recording, has_truth in zip(drawn, known, strict=True):
-        here = {name: by_name[recording.name] for name, by_name in given.items()}
-        upper = next(panels)
-        upper.set_title(names[recording.name])
-        _draw(upper, next(panels) if has_truth else None, recording, here, first)
+    for axes, recording in zip(panels, drawn, strict=True):
+        axes.set_title(names[recording.name])
+        _draw(axes, recording, {name: given[name][recording.name] for name in looks}, looks)
     figure.align_ylabels()
     style.legend_above(figure, columns=CHOSEN.columns)
     return figure
 
 
 def _draw(
-    upper: Axes, lower: Axes | None, recording: Recording, given: Mapping[str, SideSlip], first: str
+    axes: Axes,
+    recording: Recording,
+    given: Mapping[str, SideSlip],
+    looks: Mapping[str, Mapping[str, Any]],
 ) -> None:
-    """Draw the side slip of a recording, and below it the errors of the estimates."""
-    v_x, truth, ends = recording.v_x, recording.logged_v_y, (recording.t[0], recording.t[-1])
-    signals: list[Signal] = [one.v_y.__getitem__ for one in given.values()]
-    part = shown(recording.t, ends, *signals)
-    t, at = drawn_times(recording, recording.t[part]), v_x[part]
-    slips = {name: _degrees(one.v_y[part], at) for name, one in given.items()}
-    exact = None if truth is None else _degrees(truth[part], at)
-    reach = float(np.abs(slips[first] if exact is None else exact).max())
-    limit = CHOSEN.beyond * max(reach, 0.1)
-    band = given[first].v_y_sd
-    if band is not None:
-        low, high = (
-            np.clip(
-                _degrees(given[first].v_y[part] + side * SIGMAS * band[part], at), -limit, limit
-            )
-            for side in (-1.0, 1.0)
-        )
-        upper.fill_between(t, low, high, label=_BAND, **_SHADE)
-    if exact is not None:
-        upper.plot(t, exact, **{**style.TRUTH, "label": "recorded"})
-    colors = dict(
-        zip((name for name in given if name != first), _OTHERS * len(given), strict=False)
-    )
-    errors = {}
-    for name in (*colors, first):  # the first lies above the others
-        look: dict[str, Any] = {"color": colors.get(name, style.BLUE), "linewidth": 0.9}
-        upper.plot(t, np.clip(slips[name], -limit, limit), **look, label=method_label(name))
-        if lower is not None and exact is not None:
-            errors[name] = slips[name] - exact
-            lower.plot(t, np.clip(errors[name], -limit, limit), **look, rasterized=True)
-    upper.set(xlim=ends, ylim=(-limit, limit), ylabel="side slip [deg]")
-    if given[first].rms is not None:
-        style.note(upper, f"RMSE {given[first].rms:.2g} deg")
-    if lower is not None:
-        lower.axhline(0.0, color=style.GREY, linewidth=0.6)
-        lower.set(xlim=ends, ylabel="error [deg]")
-    style.label_time(upper if lower is None else lower, recording.t)
+    """Draw the side slip of a recording, with the band of the first estimate."""
+    truth, ends, first = recording.logged_v_y, recording.t[[0, -1]], next(iter(given.values()))
+    part = shown(recording.t, ends, *(one.v_y.__getitem__ for one in given.values()))
+    t = drawn_times(recording, recording.t[part])
+
+    def slip(v_y: Array) -> Array:
+        return _degrees(v_y[part], recording.v_x[part])
+
+    main = slip(first.v_y if truth is None else truth)
+    limit = CHOSEN.beyond * max(float(np.abs(main).max()), 0.1)
+    if first.v_y_sd is not None:
+        room = SIGMAS * first.v_y_sd
+        low, high = (slip(end).clip(-limit, limit) for end in (first.v_y - room, first.v_y + room))
+        axes.fill_between(t, low, high, label=_BAND, **_SHADE)
+    if truth is not None:
+        axes.plot(t, main, **{**style.TRUTH, "label": "recorded"})
+    for name, one in given.items():
+        drawn = slip(one.v_y).clip(-limit, limit)
+        axes.plot(t, drawn, linewidth=0.9, label=method_label(name), **looks[name])
+    axes.set(xlim=ends, ylim=(-limit, limit), ylabel="side slip [deg]")
+    if first.rms is not None:
+        style.note(axes, f"RMSE {first.rms:.2g} deg")
+    style.label_time(axes, recording.t)
 
 
 def _degrees(v_y: Array, v_x: Array) -> Array:
@@ -106,23 +95,20 @@ def _degrees(v_y: Array, v_x: Array) -> Array:
 def drive_lateral_figure(drive: "Drive") -> Figure:
     """Draw the estimated v_y over the true one, and its error, each with the band of two sigma."""
     v_y, band = drive.estimates["v_y"], SIGMAS * drive.estimates["v_y_sd"]
-    inertial = drive.estimates["inertial_v_y"]
     figure = style.new_figure(CHOSEN.page, 3.6)
-    above, below = figure.subplots(2, 1, sharex=True)
-    shade: Mapping[str, Any] = {**_SHADE, "label": "estimate, two sigma"}
-    look: Mapping[str, Any] = {**style.ONLINE, "label": "estimate"}
-    alone: Mapping[str, Any] = {"color": style.GREY, "label": "inertial identifier alone"}
-    above.fill_between(drive.s, v_y - band, v_y + band, **shade)
-    above.plot(drive.s, inertial, **alone)
-    above.plot(drive.s, drive.v_y, **style.TRUTH)
-    above.plot(drive.s, v_y, **look)
-    above.set_ylabel("$v_y$\n[m/s]")
-    below.fill_between(drive.s, -CHOSEN.mm_per_m * band, CHOSEN.mm_per_m * band, **shade)
-    below.plot(drive.s, CHOSEN.mm_per_m * (inertial - drive.v_y), **alone)
-    below.plot(drive.s, CHOSEN.mm_per_m * (v_y - drive.v_y), **look)
-    reach = 1.2 * CHOSEN.mm_per_m * float(np.max(np.maximum(band, np.abs(v_y - drive.v_y))))
-    below.set(ylabel="error of it\n[mm/s]", xlabel=ARC, ylim=(-reach, reach))
-    below.set_xlim(0.0, float(drive.s[-1]))
-    figure.align_ylabels([above, below])
+    panels = figure.subplots(2, 1, sharex=True)
+    for axes, scale, zero in zip(panels, (1.0, 1e3), (0.0, drive.v_y), strict=True):  # m/s, mm/s
+        for curve, look in (
+            (drive.estimates["inertial_v_y"], _ALONE),
+            (drive.v_y, style.TRUTH),
+            (v_y, {**style.ONLINE, "label": "estimate"}),
+        ):
+            axes.plot(drive.s, scale * (curve - zero), **look)
+        ends = scale * (v_y - band - zero), scale * (v_y + band - zero)
+        axes.fill_between(drive.s, *ends, label="estimate, two sigma", **_SHADE)
+    reach = 1.2e3 * float(np.max(np.maximum(band, np.abs(v_y - drive.v_y))))
+    panels[0].set(ylabel="$v_y$\n[m/s]", xlim=drive.s[[0, -1]])
+    panels[1].set(ylabel="error of it\n[mm/s]", xlabel=ARC, ylim=(-reach, reach))
+    figure.align_ylabels(panels)
     style.legend_above(figure)
     return figure

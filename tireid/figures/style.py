@@ -209,12 +209,7 @@ def time_window(t: Array, window: Window) -> tuple[float, float]:
     """
     if window is None:
         return float(t[0]), float(t[-1])
-    first, last = window
-    if not (first < last and first < t[-1] and last > t[0]):
-        raise ValueError(
-            f"a window must lie within {t[0]:g} s to {t[-1]:g} s, it is {first:g} s to {last:g} s"
-        )
-    return max(first, float(t[0])), min(last, float(t[-1]))
+    return max(window[0], float(t[0])), min(window[1], float(t[-1]))
 
 
 def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
@@ -310,9 +305,9 @@ def force_unit_of(force: Array) -> ForceUnit:
 
 def paper_design(history: History) -> PaperIdentifier:
     """Return the design of a run of the paper's identifier, whose weights and error have units."""
-    if not isinstance(history.design, PaperIdentifier):
-        raise TypeError(f"a run of the paper's identifier is needed, not of {history.design}")
-    return history.design
+    if not isinstance(history.method, PaperIdentifier):
+        raise TypeError(f"a run of the paper's identifier is needed, not of {history.method}")
+    return history.method
 
 
 def force_range(reference: Array, *others: Array) -> tuple[float, float]:

@@ -17,7 +17,7 @@ from models.recordings import Recording
 
 COLUMNS = 1500  # of pixels, more than any panel has
 
-_Samples = NDArray[Any]  # indices, or whether each sample is meant
+_Samples = NDArray[np.intp]  # indices
 Signal = Callable[[slice | _Samples], NDArray[Any]]  # values (k,) or (k, m) at some samples
 
 
@@ -26,20 +26,13 @@ def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> _Samples:
 
     t : times of the samples (n,) [s].   ends : first and last time [s].
     """
-    if len(t) <= LONG:
-        within: _Samples = (t >= ends[0]) & (t <= ends[1])
-        return within
     first = int(np.searchsorted(t, ends[0], side="left"))
     last = int(np.searchsorted(t, ends[1], side="right"))
     if last - first <= LONG:
         return np.arange(first, last)
-    width = -(-(last - first) // COLUMNS)
-    size = width * max(1, LONG // (4 * width))  # whole columns at once
-    found = [np.array([first, last - 1])]
-    for begin in range(first, last, size):
-        part = slice(begin, min(begin + size, last))
-        found.append(begin + _farthest([signal(part) for signal in signals], width))
-    return np.unique(np.concatenate(found))
+    part = slice(first, last)
+    outermost = _outermost([signal(part) for signal in signals], last - first)
+    return np.unique(np.concatenate([[first, last - 1], first + outermost]))
 
 
 def drawn_times(recording: Recording, t: Array) -> Array:
@@ -52,22 +45,18 @@ def drawn_times(recording: Recording, t: Array) -> Array:
     return np.where(np.diff(segment, prepend=segment[:1]) > 0, np.nan, t)
 
 
-def _farthest(signals: Iterable[Array], width: int) -> NDArray[np.intp]:
-    """Return the samples that are lowest or highest among `width` neighbors, rising.
+def _outermost(signals: Iterable[Array], of: int) -> _Samples:
+    """Return the samples that are lowest or highest in a column of pixels, rising.
 
-    signals : (k,) or (k, m) each; the last neighbors may be fewer.
+    signals : (k,) or (k, m) each.   of : samples that are drawn over all columns.
     """
     found = []
     for signal in signals:
-        values = np.asarray(signal).reshape(len(signal), -1)
-        missing = -len(values) % width
-        columns = np.pad(values, ((0, missing), (0, 0)), mode="edge").reshape(
-            -1, width, values.shape[1]
-        )
-        begins = width * np.arange(len(columns))[:, None]
-        for ends in (columns.argmin(axis=1), columns.argmax(axis=1)):
-            found.append(np.minimum(begins + ends, len(values) - 1).ravel())
-    return np.unique(np.concatenate(found))
+        begins = np.arange(0, len(signal), -(-of // COLUMNS))
+        for column in np.split(np.arange(len(signal)), begins[1:]):
+            values = signal[column]
+            found += [column[values.argmin(axis=0)], column[values.argmax(axis=0)]]
+    return np.unique(np.hstack(found))
 
 
 def shown_of_run(
@@ -77,15 +66,14 @@ def shown_of_run(
 
     tell : returns the values of a block.
     """
-    recording, n = history.recording, len(history.recording)
-    times, found = [], []
+    recording, n, found = history.recording, len(history.recording), []
     for block in history.blocks():
-        values, here = tell(block), recording.t[block.part]
-        part: Any = slice(None) if n <= LONG else _farthest(values, -(-n // COLUMNS))
-        times.append(here[part])
+        values = [recording.t[block.part], *tell(block)]
+        rows = [one.reshape(len(one), -1) for one in values]
+        part: Any = slice(None) if n <= LONG else _outermost(rows, n)
         found.append([one[part] for one in values])
-    joined = [np.concatenate(one) for one in zip(*found, strict=True)]
-    return drawn_times(recording, np.concatenate(times)), joined
+    t, *joined = (np.concatenate(one) for one in zip(*found, strict=True))
+    return drawn_times(recording, t), joined
 
 
 def cloud(t: Array, *signals: Signal) -> _Samples:

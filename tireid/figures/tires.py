@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 _UNKNOWN = "slip not known"
 _BAND = "band of 90 %"
-_GUARANTEED = "guaranteed, steady"
 _CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
     "linestyle": "",
     "marker": ".",
@@ -43,10 +42,6 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     The slip angle has the paper's sign, α = δ - atan2(v_y ± l r, v_x), the negative of ISO 8855, so
     that the curves rise. Samples below the model's minimum speed are left out.
     """
-    if online is not None and online.axle_force.shape != (recording.t.size, 2):
-        raise ValueError(
-            f"the model is drawn on {recording.name}, the online run is of {online.recording.name}"
-        )
     if not (recording.v_x >= model.min_speed).any():
         raise ValueError(f"{recording.name}: v_x never reaches {model.min_speed:g} m/s")
     vehicle, force = model.vehicle, model.predict(recording)
@@ -83,8 +78,10 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **style.LINEAR)
         if model.known_slip is not None:
             _draw_curve(axes, model, axle, ends, unit.newtons)
-            for panel in panels[:, axle]:
-                _shade_unknown(panel, float(np.rad2deg(model.known_slip[axle])), ends)
+            edge, look = float(np.rad2deg(model.known_slip[axle])), {"lw": 0.0, "zorder": 0}
+            for low, high in ((ends[0], -edge), (edge, ends[1])):
+                for panel in panels[:, axle] if low < high else ():
+                    panel.axvspan(low, high, color="#EFE9DD", label=_UNKNOWN, **look)
         axes.set(xlim=ends, ylim=limits)
         _label_slip(lowest, axle)
     style.label_forces(panels, unit, residual=known is not None)
@@ -106,19 +103,9 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
         edge: Mapping[str, Any] = {"edgecolor": style.BLUE, "linewidth": 0.4, "zorder": 1.5}
         low, high = (force[:, axle] / newtons for force in model.band.at(slip))
         axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=_BAND, **edge)
-    look: Mapping[str, Any] = {"color": style.PURPLE, "linewidth": 0.9, "linestyle": "--"}
-    for side in () if model.guarantee is None else model.guarantee.at(slip):
-        axes.plot(degrees, side[:, axle] / newtons, label=_GUARANTEED, **look)
     label = f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}"
-    look = {"color": style.BLUE, "linewidth": 1.2, "zorder": 4, "label": label}
+    look: Mapping[str, Any] = {"color": style.BLUE, "linewidth": 1.2, "zorder": 4, "label": label}
     axes.plot(degrees, model.force(slip)[:, axle] / newtons, **look)
-
-
-def _shade_unknown(axes: Axes, known: float, ends: Array) -> None:
-    """Shade the slip [deg] that the model does not know."""
-    for low, high in ((ends[0], -known), (known, ends[1])):
-        if low < high:
-            axes.axvspan(low, high, color="#EFE9DD", linewidth=0.0, zorder=0, label=_UNKNOWN)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -206,7 +193,7 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     """
     tracks, t = history.tracks_over(next(history.blocks())), history.recording.t
     if not tracks:
-        raise TypeError(f"{history.design} has no estimates of the axles")
+        raise TypeError(f"{history.method} has no estimates of the axles")
     at, curves = shown_of_run(history, lambda block: [o.values for o in history.tracks_over(block)])
     figure = style.new_figure(CHOSEN.page, 4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)

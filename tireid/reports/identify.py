@@ -1,6 +1,7 @@
 """The report of `tireid identify`: what was learnt, how well it predicts, where not to ask it."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,7 @@ def write_identify_report(
     diagnosis: Diagnosis,
     command: str,
 ) -> None:
-    """Write the report of what was learnt, or of a network that was judged."""
+    """Write the report of what was learnt."""
     learnt, model, verdict, asked = found.runs[0], found.model, found.verdict, found.asked
     notes = [*diagnosis_warnings(diagnosis), *identify_warnings(model, found.runs)]
     numbers = [
@@ -81,7 +82,7 @@ def write_identify_report(
                 command,
                 learnt.vehicle,
                 [run.recording for run in found.runs],
-                method=f"{found.method}, hash {digest(learnt.design.numbers())}",
+                method=f"{found.method}, hash {digest(learnt.method.numbers())}",
             ),
         ],
     )
@@ -104,7 +105,7 @@ def side_slip_text(learnt: History) -> str:
     """Return how well a run knew side slip, where it estimated it; else nothing."""
     if not {"v_y_sd", "side_slip_observable"} <= set(learnt.outputs):
         return ""
-    moves = learnt.recording.v_x >= learnt.design.min_speed
+    moves = learnt.recording.v_x >= learnt.method.min_speed
     sd = learnt.outputs["v_y_sd"].ravel()[moves] / learnt.recording.v_x[moves]
     seen = 100.0 * float(np.mean(learnt.outputs["side_slip_observable"].ravel()[moves]))
     median = float(np.degrees(np.median(sd)))
@@ -200,9 +201,8 @@ def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> 
         blocks.append(
             page.Table(caption=f"Parameters of the tires, {law}.", header=["", *AXLES], rows=facts)
         )
-    for declared in (band_sentence(model), guaranteed_sentence(model)):
-        if declared:
-            blocks.append(page.Paragraph(text=declared))
+    if band := band_sentence(model):
+        blocks.append(page.Paragraph(text=band))
     captions = {
         "side_slip": "Side slip as it was estimated.",
         "learnt": "Estimates over time.",
@@ -226,35 +226,6 @@ def band_sentence(model: TireModel) -> str:
     )
 
 
-def guaranteed_sentence(model: TireModel) -> str:
-    """Return which forces are guaranteed where slip is known, in words; empty where none are."""
-    known, guarantee = model.known_slip, model.guarantee
-    if known is None or guarantee is None:
-        return ""
-    low, high = (np.diag(side) / model.vehicle.axle_loads for side in guarantee.at(known))
-    ends = [f"{least:.2f} to {most:.2f}" for least, most in zip(low, high, strict=True)]
-    given = guarantee.possible
-    front, rear = given.bound.error
-    late_front, late_rear = (1e3 * tau for tau in given.bound.lateness)
-    fast_front, fast_rear = given.fastest
-    return (
-        f"Guaranteed at the end of the known slip: a force of {ends[0]} / {ends[1]} static axle "
-        "loads (front / rear), if no force of the drive or of another differs from the best curve "
-        f"by more than {front:.3f} / {rear:.3f} static axle loads, and {late_front:.0f} / "
-        f"{late_rear:.0f} ms times how fast it changes. Where slip is beyond that of the drive, "
-        f"or a force changes faster than there, by more than {fast_front:.1f} / {fast_rear:.1f} "
-        "static axle loads a second, the difference may be as much larger. That bound was "
-        f"{'given' if given.given else 'estimated from the drive'}."
-    )
-
-
-def guaranteed_text(model: TireModel) -> str:
-    return guaranteed_sentence(model) or (
-        "no guaranteed band: it takes --method axle, a lateral velocity that was measured, and "
-        "enough driving"
-    )
-
-
 def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
     rows: list[list[page.Cell]] = []
     for name, verdict in asked.items():
@@ -275,21 +246,16 @@ def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
 
 def _errors(found: Results, figures: Mapping[str, Figure]) -> list[page.Block]:
     learnt, *others = found.runs
-    rows, online = [], learnt.online
+    rows, online = list[list[page.Cell]](), learnt.online
     for run in (learnt, *found.parts, *others):
         name, size = run.recording.name, force_rms(run)
         if online:
-            rows.append([name, "online", *_cells(online_error(run), size)])
-        for when, replays in found.by_label.items():
+            rows.append([f"{name}, online", *error_numbers(online_error(run), size)])
+        for key, replays in found.frozen.items():
             error = replays[name].against_truth or replays[name].against_online
-            rows.append([name, f"frozen, {when}", *_cells(error, size)])
+            rows.append([f"{name}, frozen, {key} s", *error_numbers(error, size)])
     blocks: list[page.Block] = [
-        page.Table(
-            caption="RMSE of the axle force, and its share of the rms force where there is a "
-            "truth" + ("; without one it is against what was identified online." * online or "."),
-            header=["drive", "", "front [N]", "share", "rear [N]", "share"],
-            rows=rows,
-        )
+        error_table(rows, "; without one it is against what was identified online" * online)
     ]
     if "forces" in figures:
         caption = f"Axle forces over time: {'online, and ' * online}replayed with frozen weights."
@@ -302,12 +268,22 @@ def _errors(found: Results, figures: Mapping[str, Figure]) -> list[page.Block]:
     return blocks
 
 
-def _cells(error: AxleRmse | None, size: AxleRmse | None) -> list[str | float | None]:
+def error_table(rows: Sequence[Sequence[page.Cell]], more: str = "") -> page.Table:
+    """Return a table of errors, of rows of a name and `error_numbers`."""
+    return page.Table(
+        caption="RMSE of the axle force, and its share of the rms force where there is a "
+        f"truth{more}.",
+        header=["drive", "front [N]", "share", "rear [N]", "share"],
+        rows=rows,
+    )
+
+
+def error_numbers(error: AxleRmse | None, size: AxleRmse | None) -> list[page.Cell]:
+    """Return front and rear error, each with its share of the rms force where it is known."""
     if error is None:
         return [None] * 4
-    cells: list[str | float | None] = []
-    for newtons, force in zip(
-        (error.front, error.rear), (size.front, size.rear) if size else (0.0, 0.0), strict=True
-    ):
-        cells += [newtons, f"{100.0 * newtons / force:.1f} %" if force > 0.0 else None]
-    return cells
+    shares = [
+        f"{100.0 * newtons / force:.1f} %" if force > 0.0 else None
+        for newtons, force in zip(astuple(error), astuple(size) if size else (0, 0), strict=True)
+    ]
+    return [error.front, shares[0], error.rear, shares[1]]

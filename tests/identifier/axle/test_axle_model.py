@@ -6,13 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.extrapolate_recorded import outside_known
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.model import BESIDE
 from identifier.frozen import FrozenModelError
 from identifier.run import identify
 from identifier.tire_model import load_model, stored_verdict
-from tests.identifier.conftest import learnt, missed, saturating
+from tests.identifier.conftest import learnt, outside_known, saturating
 
 
 def test_told_another_stiffness_it_reads_off_the_true_one(car, drive):
@@ -171,24 +170,3 @@ def test_designs_are_similar_for_a_model_car(car, model_car):
     assert small.sway.frequency / full.sway.frequency == pytest.approx(np.sqrt(10.0))
     assert full.regression.noise / small.regression.noise == pytest.approx(np.sqrt(10.0))
     assert full.regression == replace(small.regression, noise=full.regression.noise)
-
-
-def test_curves_may_be_kept_from_falling_before_a_slip(car, drive):
-    """Left free, the learnt curve falls at some time; held, it never does from the start on."""
-    recording, until = drive(amplitude=0.08), 0.2
-    free = replace(AxleIdentifier.for_vehicle(car), rising_until=None)
-    held = replace(free, rising_until=until)
-    lowest = []
-    for design in (free, held):
-        history = identify(recording, car, design)
-        scales = np.array(design.ladder)
-        W = history.state["W"][1:]
-        slope = (W / (scales * np.cosh(until / scales) ** 2)).sum(axis=2)
-        lowest.append(slope.min())
-        assert (missed(history.freeze(), recording) < 0.05).all()
-    assert lowest[0] < -0.01
-    assert lowest[1] > -1e-9
-    grid = np.linspace(0.0, until, 81)
-    assert (np.diff(history.freeze().force(grid), axis=0) > -1.0).all()
-    with pytest.raises(ValueError, match="rising_until must not be negative"):
-        replace(free, rising_until=-0.1)

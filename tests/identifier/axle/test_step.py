@@ -230,7 +230,7 @@ class ByHand:
         self.evidence = kept * self.evidence + new
         self.ln_friction += change
         squared, told = np.minimum(error**2 / V, 25), (error / sd) ** 2
-        self.fast += dt / c.fast * (squared - self.fast)
+        self.fast += min(dt / c.fast, 1) * (squared - self.fast)
         self.trend += dt / c.trend * (np.maximum(squared, 1) - self.trend)
         self.slow += dt / c.slow * (np.minimum(told, 4 * self.slow) - self.slow)
         self.slow = np.clip(self.slow, 1, 4)
@@ -321,6 +321,7 @@ def with_accelerometer(car, recording, angle):
     return replace(Bank(vehicle=car, angle=angle, period=7.0).apply(recording), a_y=felt)
 
 
+@pytest.mark.sweep("0.06-{'share'*")
 @pytest.mark.parametrize(
     ("angle", "road"),
     [(0.02, {}), (-0.03, {}), (0.06, {"most": 0.03}), (0.06, {"share": 0.05, "doubt": 0.01})],
@@ -349,6 +350,7 @@ def with_a_rest(recording):
     )
 
 
+@pytest.mark.sweep("0.02", "0.09")
 @pytest.mark.parametrize("dt", [0.004, 0.02, 0.05, 0.09])
 def test_step_repeats_the_equations_at_every_rate_above_ten_hertz(dt, car, drive):
     design = AxleIdentifier.for_vehicle(car, dt=dt)
@@ -389,6 +391,7 @@ NEVER = (
 )
 
 
+@pytest.mark.sweep("0.01-errors are clipped")
 @pytest.mark.parametrize("rare", RARE)
 @pytest.mark.parametrize("dt", [0.01, 0.04])
 def test_step_repeats_the_equations_where_limits_act(rare, dt, car, drive):

@@ -6,22 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.answers import drawn
 from benchmarks.doctor_cases import KINDS, planted
 from benchmarks.everyday_drives import drawn_everyday
-from benchmarks.faults import Lagging, Late, Misaligned, Together
-from identifier.doctor import Finding, diagnose, examine
-from identifier.doctor.faults import Candidate, Search, _all_move, prepared
-from identifier.doctor.pieces import segments_of
+from benchmarks.faults import Late, Misaligned
+from identifier.doctor import Finding, examine
+from identifier.doctor.faults import Candidate, Search, prepared
 from identifier.doctor.suspects import NOTES, SUSPECTS
 from identifier.estimate import Drive
-from identifier.estimate.solve import descend, simulate
+from identifier.estimate.solve import descend
 from identifier.motion.parameters import INDEX
-from models.faults import SensorFault
-from models.recordings import Repair
-from models.vehicle import GRAVITY, sedan
+from models.vehicle import GRAVITY
 from tests.identifier.conftest import areas_of, pressed
-from tireid.diagnoses import NAMES
 
 # Kinds whose sizes this drive tells well, and how well: of the size, or where "" absolutely.
 SIZED = {
@@ -53,6 +48,7 @@ def test_nothing_is_found_on_a_clean_drive_and_little_is_unseen(driven):
     assert len(said.unobservable) < 3
 
 
+@pytest.mark.sweep("offset v_y", "delay r")
 @pytest.mark.parametrize("kind", SIZED)
 def test_a_planted_fault_is_named_first_or_second_with_its_size(driven, kind):
     car, log, _ = driven
@@ -86,19 +82,11 @@ def rolling(exact, log, degrees_per_g):
     return replace(log, a_y=shown + log.a_y - exact.a_y)
 
 
+@pytest.mark.sweep("0.0", "6.0")
 @pytest.mark.parametrize("degrees_per_g", [0.0, 2.0, 4.0, 6.0])
 def test_an_accelerometer_on_a_body_that_rolls_has_no_fault(driven, degrees_per_g):
     car, log, exact = driven
     assert examine(rolling(exact, log, degrees_per_g), car).findings == ()
-
-
-@pytest.mark.parametrize("factor", [0.8, 1.28, 1.4])
-def test_a_scale_that_no_roll_explains_is_named_beside_it(driven, factor):
-    car, log, exact = driven
-    shown = rolling(exact, log, 4.0)
-    found = found_in(replace(shown, a_y=factor * shown.a_y), car)
-    assert (found[0].code, found[0].channel) == ("factor", "a_y")
-    assert found[0].size == pytest.approx(factor, rel=0.1)
 
 
 def test_downforce_is_a_note_and_none_is_missing_where_it_is_told():
@@ -119,38 +107,6 @@ def test_every_kind_of_fault_has_a_suspect():
         assert (fault.code, fault.channel) in codes
 
 
-def test_two_faults_at_once_are_both_found(driven):
-    car, log, _ = driven
-    faults = Together(
-        faults=(
-            Late(channels=("a_y",), delay=0.06),
-            SensorFault(channel="delta_f", kind="biased", size=0.02),
-        )
-    )
-    codes = {(one.code, one.channel): one.size for one in found_in(faults.apply(log), car)}
-    assert codes["delay", "a_y"] == pytest.approx(0.06, abs=0.006)
-    assert codes["offset", "delta_f"] == pytest.approx(0.02, abs=0.002)
-
-
-def test_a_slow_yaw_rate_is_found_where_a_place_of_the_accelerometer_explains_more_than_a_delay():
-    drive = drawn("sedan", 8001)
-    log = replace(drive.log(np.random.default_rng([8001, 1])), axle_force=None)
-    slow = Lagging(channels=("r",), time_constant=0.16).apply(log)
-    (found, *others) = found_in(slow, drive.car.told)
-    assert (found.code, found.channel) == ("lag", "r")
-    assert found.size == pytest.approx(0.16, abs=0.02)
-    assert not any(one.code == "acceleration_sensor_x" for one in others)
-
-
-def test_an_inertial_unit_that_is_late_is_one_fault(driven):
-    car, log, _ = driven
-    found = found_in(Late(channels=("r", "a_y"), delay=0.09).apply(log), car)
-    one = next(one for one in found if one.code == "delay")
-    assert one.channel == "r+a_y"
-    assert one.size == pytest.approx(0.09, abs=0.005)
-    assert one.repair == Repair(delay={"r": one.size, "a_y": one.size})
-
-
 def test_a_repair_of_what_was_found_leaves_a_log_in_which_nothing_is_found(driven):
     car, log, _ = driven
     late = Late(channels=("r",), delay=0.08).apply(log)
@@ -160,6 +116,7 @@ def test_a_repair_of_what_was_found_leaves_a_log_in_which_nothing_is_found(drive
     assert not [one for one in found_in(repaired, same) if one.matters]
 
 
+@pytest.mark.heavy
 def test_what_is_alike_at_constant_speed_is_named_beside_it(driven):
     """v_y off by 3 % of the speed: a sensor that is turned, or what looks so."""
     car, log, _ = driven
@@ -194,42 +151,6 @@ def test_swapped_lengths_are_a_note_that_names_the_swap():
     assert "swapped" not in shift.words(2.0 * (car.l_f - car.l_r), 0.05, car)
 
 
-def test_what_the_estimate_takes_out_by_itself_is_no_finding_until_it_stands_out():
-    """A race car on whose drive the place of the sensor of v_y stands 9 nats out of zero."""
-    drive = drawn_everyday("race", "lane change", 7002)
-    log = replace(drive.log(np.random.default_rng([7002, 1])), axle_force=None)
-    assert found_in(log, drive.car.told) == ()
-
-
-def test_a_motion_that_is_shrunk_explains_nothing(driven):
-    """A v_x that is told smaller misses less of the force, and of what the accelerometer shows."""
-    car, log, _ = driven
-    search = prepared(log, car)
-    p = search.nominal().p
-    small = p.copy()
-    small[INDEX["v_x_factor"]] = -0.2
-    missed = simulate(search.problem.drives[0], small, car)["missed"][search.problem.places(0)]
-    e = search.problem.residuals(small).e
-    np.testing.assert_allclose(e * 0.8 * search.problem.size[:, None], missed, rtol=1e-6, atol=1e-9)
-    wide = {"a_y.factor": 0.5}
-    lines = [search.accelerometer.line(q, wide) for q in (p, small)]
-    assert lines[1].of("a_y.factor")[0] > 0.15, "a_y seems too large then"
-    assert lines[1].cost > lines[0].cost
-
-
-def test_slopes_over_a_shrunk_v_x_are_those_of_its_residuals(driven):
-    car, log, _ = driven
-    search = prepared(log, car)
-    problem = search.problem.under(_all_move(search.problem.priors))
-    k, h = INDEX["v_x_factor"], 1e-5
-    p = search.nominal().p
-    p[k] = -0.1
-    at = problem.residuals(p)
-    beside = [problem.residuals(p + sign * h * np.eye(p.size)[k]).e for sign in (1.0, -1.0)]
-    slope = at.slopes[:, :, list(problem.index).index(k)]
-    np.testing.assert_allclose(slope, (beside[0] - beside[1]) / (2.0 * h), rtol=1e-3, atol=2e-3)
-
-
 def test_a_move_to_where_a_y_fits_stays_within_bounds(driven):
     car, log, _ = driven
     search = prepared(Late(channels=("v_y",), delay=0.1).apply(log), car)
@@ -248,9 +169,9 @@ def test_what_leaves_no_car_is_not_believed(driven):
     car, _, _ = driven
     by_code = {one.code: one for one in SUSPECTS}
     center, inertia, lag = (by_code[code] for code in ("center_of_gravity", "yaw_inertia", "lag"))
-    assert center.possible(0.1, car) and not center.possible(0.9 * car.l_f, car)
-    assert inertia.possible(1.3, car) and not inertia.possible(8.0, car)
-    assert lag.possible(0.1, car) and not lag.possible(-0.1, car)
+    assert center.plausible(0.1, car) and not center.plausible(0.9 * car.l_f, car)
+    assert inertia.plausible(1.3, car) and not inertia.plausible(8.0, car)
+    assert lag.plausible(0.1, car) and not lag.plausible(-0.1, car)
 
 
 # When a repair is sure.
@@ -287,21 +208,7 @@ def test_what_does_not_help_the_other_half_is_not_sure(driven, monkeypatch):
     assert (found.code, found.channel, found.sure) == ("delay", "r", False)
 
 
-def test_a_rival_that_helps_as_much_takes_the_sureness(driven):
-    """Two suspects of one gain: the drive does not tell which of them it is."""
-    car, log, _ = driven
-    late = Late(channels=("r",), delay=0.08).apply(log)
-    search, _ = searched(late, car)
-    best = search.found[0].first
-    search.wide, search.mean = {}, {}
-    base = search.nominal()
-    rival = best._replace(gain=best.gain - 1.0)
-    assert search.stands(best, None, base)
-    assert not search.stands(best, rival, base)
-    same = best._replace(gain=best.gain - 20.0)
-    assert not search.stands(best, same, base), "the rival's repair is as good as this"
-
-
+@pytest.mark.sweep("3")
 @pytest.mark.parametrize("between", [2, 3])
 def test_nothing_is_found_in_a_right_log_that_was_drawn_from_a_slower_clock(driven, between):
     car, log, _ = driven
@@ -309,25 +216,6 @@ def test_nothing_is_found_in_a_right_log_that_was_drawn_from_a_slower_clock(driv
     names = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
     signals = {name: np.interp(t, log.t, getattr(log, name)) for name in names}
     assert found_in(replace(log, t=t, **signals), car) == ()
-
-
-@pytest.mark.parametrize(
-    ("parameter", "word"),
-    [("r_delay", "early"), ("r_bias", "too little"), ("v_y_lever", "behind"),
-     ("cg_shift", "too far forward"), ("bank", "to the right")],
-)  # fmt: skip
-def test_what_is_negative_is_said_the_other_way_round(parameter, word):
-    suspect = next(one for one in SUSPECTS if one.parameter == parameter)
-    assert word not in suspect.words(0.1, 0.01, sedan())
-    said = suspect.words(-0.1, 0.01, sedan())
-    assert word in said and "-" not in said
-
-
-def test_a_yaw_inertia_that_the_file_leaves_out_was_estimated_and_not_told():
-    suspect = next(one for one in SUSPECTS if one.code == "yaw_inertia")
-    assert suspect.words(1.35, 0.1, sedan()).startswith("the declared yaw inertia is 1.35")
-    left_out = replace(sedan(), estimated=("yaw_inertia",))
-    assert suspect.words(1.35, 0.1, left_out).startswith("the estimated yaw inertia is 1.35")
 
 
 def test_a_log_that_no_fault_explains_is_found_to_be_one(driven):
@@ -340,68 +228,11 @@ def test_a_log_that_no_fault_explains_is_found_to_be_one(driven):
     assert said.unobservable == ("sizes of faults: no tire explains the log",)
 
 
-def test_what_a_straight_drive_cannot_tell_is_said(driven):
-    car, log, _ = driven
-    names = ("v_y", "r", "delta_f", "a_y")
-    straight = replace(log, **{name: 0.003 * getattr(log, name) for name in names})
-    said = examine(straight, car)
-    assert said.findings == ()
-    assert any(line.startswith("center of gravity") for line in said.unobservable)
-
-
 def test_a_drive_that_never_drives_is_not_asked(driven):
     car, log, _ = driven
     said = examine(replace(log, v_x=0.01 * log.v_x), car)
     assert said.findings == ()
     assert "hardly drives" in said.unobservable[0]
-
-
-def test_a_long_log_is_looked_at_where_it_is_lively(driven):
-    car, log, _ = driven
-    n = 10 * len(log)
-    longer = replace(
-        log,
-        t=log.dt * np.arange(n),
-        **{
-            name: np.tile(getattr(log, name), 10)
-            for name in ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
-        },
-    )
-    parts = segments_of(longer, car, longest=60.0, pieces=4)
-    assert len(parts) == 4
-    assert sum(part.duration for part in parts) == pytest.approx(60.0, abs=0.1)
-    turning = math.sqrt(sum(np.mean(part.r**2) for part in parts) / 4.0)
-    assert turning > math.sqrt(np.mean(log.r**2))
-    assert segments_of(log, car, longest=61.0, pieces=4) == (log,)
-
-
-@pytest.mark.parametrize("n", range(6000, 6006))
-def test_a_log_that_is_hardly_longer_than_what_is_looked_at_is_cut_all_the_same(driven, n):
-    """A minute at 100 Hz and some samples: parts then are as long as what is taken of them."""
-    car, log, _ = driven
-    fine = np.linspace(0.0, 59.0, n)
-    names = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_y")
-    signals = {name: np.interp(fine, log.t, getattr(log, name)) for name in names}
-    minute = replace(log, t=0.01 * np.arange(n), **signals)
-    parts = segments_of(minute, car, longest=60.0, pieces=4)
-    if minute.duration <= 60.0:
-        assert parts == (minute,)
-    else:
-        assert [len(part) for part in parts] == [1500] * 4
-
-
-def test_nothing_is_made_of_the_jump_over_a_gap(driven):
-    car, log, _ = driven
-    n = len(log)
-    kept = np.r_[0 : n // 3, n // 3 + 700 : n // 3 + 750, n // 2 : n]
-    broken = log.taken(kept)
-    assert len(broken.breaks) == 2
-    parts = segments_of(broken, car, longest=61.0, pieces=4)
-    assert [len(part) for part in parts] == [n // 3, n - n // 2]  # half a second is left out
-    assert not any(part.breaks for part in parts)
-    assert found_in(broken, car) == ()
-    late = Late(channels=("r",), delay=0.08).apply(log).taken(kept)
-    assert found_in(late, car)[0].size == pytest.approx(0.08, abs=0.006)
 
 
 @pytest.mark.parametrize("suspect", SUSPECTS, ids=lambda one: one.parameter)
@@ -434,41 +265,11 @@ def test_a_late_signal_is_read_on_time_within_each_segment(driven):
     np.testing.assert_array_equal(read.signals[:, 3], drive.signals[:, 3])
 
 
-def test_a_line_of_the_accelerometer_tells_what_is_wrong_with_it(driven):
-    car, log, _ = driven
-    wrong = replace(log, a_y=1.3 * log.a_y + 0.5)
-    search = prepared(Late(channels=("a_y",), delay=0.05).apply(wrong), car)
-    base = search.nominal()
-    wide = {"a_y.offset": 1.0, "a_y.factor": 0.5, "a_y.delay": 0.2}
-    b, factor, late, *_ = search.accelerometer.line(base.p, wide).numbers
-    assert 1.0 / factor == pytest.approx(1.3, rel=0.03)
-    assert b / factor == pytest.approx(0.5, abs=0.05)
-    assert late == pytest.approx(0.05, abs=0.005)
-
-
 def test_a_finding_that_is_sure_has_a_repair():
     with pytest.raises(ValueError, match="must have a repair"):
         Finding(code="delay", confidence=1.0, sure=True)
     with pytest.raises(ValueError, match="between 0 and 1"):
         Finding(code="delay", confidence=1.2)
-
-
-def test_every_suspect_has_a_name_in_words():
-    assert {one.code for one in SUSPECTS if "_" in one.code} <= set(NAMES)
-
-
-def test_a_candidate_without_a_variance_is_not_believed(driven):
-    """As a matrix that is singular but for rounding leaves it."""
-    car, log, _ = driven
-    search = prepared(log, car)
-    assert search is not None and search.accelerometer is not None
-    base = search.nominal()
-    k = INDEX["v_y_bias"]
-    covariance = base.covariance.copy()
-    covariance[k, k] = -1e-9
-    _, sd, cost, _ = search.both(replace(base, covariance=covariance), "v_y_bias")
-    assert sd == cost == np.inf
-    assert np.isfinite(search.both(base, "v_y_bias")[1:]).all()
 
 
 @pytest.mark.parametrize(("ahead", "sure"), [(1.0, True), (4.0, False)])
@@ -479,12 +280,3 @@ def test_a_sensor_that_no_car_carries_is_never_sure(driven, ahead, sure):
     suspect = next(one for one in SUSPECTS if one.parameter == "v_y_lever")
     one = Candidate(suspect, ahead, 0.1, 50.0, 50.0, 0.0, None)
     assert search.finding(one, (0.9, 0.9), (), sure=True).sure is sure
-
-
-def test_speeds_in_knots_are_told_from_mph_by_nobody(driven):
-    car, log, _ = driven
-    for unit in (0.44704, 1852.0 / 3600.0):
-        said = diagnose(replace(log, v_x=log.v_x / unit, v_y=log.v_y / unit), car)
-        first = said.findings[0]
-        assert (first.code, first.channel, first.sure) == ("unit", "v_x", False)
-        assert "mph" in first.text and "knots" in first.text

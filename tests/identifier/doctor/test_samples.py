@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from identifier.doctor.chosen import CHOSEN as DOCTOR_CHOSEN
-from identifier.doctor.samples import _is_late, _rounded_alike, sample_findings
+from identifier.doctor.samples import _is_late, sample_findings
 from models.recordings import Recording
+from models.recordings.samples import alike_by_rounding
 
 DT = 0.01
 T = np.arange(3000) * DT
@@ -113,7 +114,7 @@ def test_one_sample_that_is_zero_is_no_dropout(noisy):
 @pytest.mark.parametrize("step", [0.5, 1.0, 1.5])
 def test_rounding_makes_as_many_neighbors_alike_as_is_said(step):
     signal = step * np.round(np.random.default_rng(2).standard_normal(100_000) / step)
-    assert _rounded_alike(signal) == pytest.approx(np.mean(np.diff(signal) == 0.0), rel=0.1)
+    assert alike_by_rounding(signal) == pytest.approx(np.mean(np.diff(signal) == 0.0), rel=0.1)
 
 
 def test_single_samples_far_off_are_spikes(noisy):

@@ -44,12 +44,6 @@ def test_a_channel_that_does_not_follow_the_speed_is_left_aside(felt: Array) -> 
     np.testing.assert_array_equal(a_x_of(felt), a_x_of(None))
 
 
-def test_a_car_that_tells_nothing_is_believed_to_be_any_car() -> None:
-    priors = Priors.of(CAR)
-    assert priors.mean[INDEX["load_transfer"]] == OF_CAR["load_transfer"].mean
-    assert priors.mean[INDEX["driving_f"]] == priors.mean[INDEX["driving_r"]]
-
-
 def test_height_and_shares_move_what_is_believed() -> None:
     L = CAR.wheelbase
     told = replace(CAR, cg_height=0.6, drive_front_share=0.0, brake_front_share=0.7)
@@ -62,12 +56,6 @@ def test_height_and_shares_move_what_is_believed() -> None:
     assert mean["driving_r"] == pytest.approx(0.65 * L / CAR.l_f / 0.85)
     assert mean["braking_f"] / mean["braking_r"] == pytest.approx(0.7 / 0.3 * CAR.l_f / CAR.l_r)
     assert sd["braking_f"] == pytest.approx(0.5 * mean["braking_f"])
-
-
-def test_a_chassis_is_believed_as_the_car_itself_is() -> None:
-    built = sedan()
-    np.testing.assert_array_equal(Priors.of(built).mean, Priors.of(built.without_chassis()).mean)
-    assert Priors.of(built).mean[INDEX["driving_r"]] == 0.0  # front-wheel drive
 
 
 def test_tires_push_against_the_air_at_one_speed() -> None:

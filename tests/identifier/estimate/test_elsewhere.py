@@ -1,4 +1,4 @@
-"""A fit where other rooms take it: hidden units, going on learning, C, ONNX, tracker, plan."""
+"""A fit where other rooms take it: hidden units, going on learning, C, ONNX, tracker."""
 
 from dataclasses import replace
 
@@ -13,6 +13,7 @@ from identifier.axle.model import begun
 from identifier.estimate.fit import fit
 from identifier.estimate.method import FitMethod
 from identifier.estimate.model import FittedModel
+from identifier.estimate.posterior import Reach
 from identifier.estimate.priors import Priors
 from identifier.export.compiled import CompiledPackage
 from identifier.export.onnx import onnx_bytes
@@ -29,7 +30,6 @@ from mpc.tires.tire import Car, Point
 from tireid import exporting
 from tireid.driving.runs import LEARNING, given_tire, make_learner
 from tireid.driving.setup import Setup, SpeedWish
-from tireid.planning import plan
 
 CAR = sedan()
 PRESSED = replace(CAR, downforce_area_front=1.0, downforce_area_rear=1.2)
@@ -50,10 +50,13 @@ def believed(p=PRIORS.mean, **numbers):
         vehicle=CAR,
         p=p,
         covariance=0.01 * COVARIANCE,
-        driven=np.array([0.17, 0.12]),
-        speeds=np.array([16.0, 20.0]),
-        a_x=np.zeros(2),
-        unexplained=np.array([0.6, 0.4]),
+        reach=Reach(
+            np.array([0.17, 0.12]),
+            np.array([16.0, 20.0]),
+            np.zeros(2),
+            np.array([0.6, 0.4]) ** 2,
+            1.0,
+        ),
     )
 
 
@@ -160,7 +163,7 @@ def test_a_network_file_tells_curves_and_band_of_a_fit(fitted):
     out = session.run(None, {"alpha_f": alpha[:, None], "alpha_r": alpha[:, None]})
     loads = np.array(CAR.axle_loads)
     np.testing.assert_allclose(np.hstack(out[:2]), fitted.force(alpha), atol=1e-9 * loads.min())
-    band = fitted.band.half(alpha, v_x=float(fitted.speeds.mean()))
+    band = fitted.band.half(alpha, v_x=float(fitted.reach.speeds.mean()))
     np.testing.assert_allclose(np.hstack(out[2:]), band, rtol=1e-9)
 
 
@@ -223,8 +226,3 @@ def test_who_goes_on_learning_steers_on_what_is_learnt_in_its_units(fitted):
     handed = prediction_tire(learner.supervisor.identifier.model())
     assert told.structure == handed.structure
     np.testing.assert_allclose(told.weights, handed.weights)
-
-
-def test_a_plan_goes_on_from_a_fit(fitted):
-    found = plan(CAR, after=fitted, area=(60.0, 20.0), speed=12.0, time=1.5)
-    assert found.error_before < 0.03  # of the grip; before learning it is above a tenth

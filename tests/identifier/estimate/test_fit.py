@@ -8,7 +8,6 @@ import pytest
 
 from identifier.estimate.fit import fit
 from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
-from identifier.estimate.roads import _cheapest
 from identifier.motion.parameters import INDEX, NAMES
 from models.vehicle import estimate, sedan
 from tests.identifier.estimate.conftest import DROP, driven
@@ -92,9 +91,9 @@ def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt):
 
 
 def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
-    assert learnt.model.segments == ()
+    assert learnt.model.reach.segments == ()
     wet = fit([driven(5, scale=0.5, amplitude=0.06, swing=0.0)], sedan()).model
-    (segment,) = wet.segments
+    (segment,) = wet.reach.segments
     begins = segment.begin > 0.0  # else what came before the drop is the segment
     assert (segment.begin if begins else segment.end) == pytest.approx(DROP, abs=1.5)
     ratio = segment.ratio if begins else 1.0 / segment.ratio
@@ -103,19 +102,6 @@ def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
     assert wet.drives.road_differs(at).tolist() == [not begins, begins]
     (note,) = (text for _, text in wet.drives.notes)
     assert f"{segment.ratio:.2f} ±" in note
-
-
-def test_the_cheapest_path_changes_where_it_gains_more_than_the_price():
-    loss = np.zeros((2, 30))
-    loss[0, 10:20], loss[1, :10], loss[1, 20:] = 1.0, 1.0, 1.0
-    assert _cheapest(loss, 4.0).tolist() == [0] * 10 + [1] * 10 + [0] * 10
-    assert not _cheapest(loss, 6.0).any()
-
-
-def test_a_log_without_a_sample_that_counts_is_refused_by_its_name():
-    slow = replace(driven(3), v_x=np.full(len(driven(3)), 0.5))
-    with pytest.raises(ValueError, match="drive3: no sample is fast enough to learn from"):
-        fit([slow], sedan())
 
 
 def test_a_steering_with_play_leaves_a_curve_that_rises(learnt):
@@ -130,8 +116,6 @@ def test_a_steering_with_play_leaves_a_curve_that_rises(learnt):
 
 # A steering ratio that somebody typed is right to a few percent, or plainly wrong.
 
-GAIN = INDEX["steering_gain"]
-
 
 @pytest.mark.parametrize("ratio", [0.75, 1.4])
 def test_a_wrong_steering_ratio_does_not_reach_the_stiffness(ratio, car, drive):
@@ -141,19 +125,6 @@ def test_a_wrong_steering_ratio_does_not_reach_the_stiffness(ratio, car, drive):
     np.testing.assert_allclose(found.stiffness, right.stiffness, rtol=0.08)
     assert found["steering_gain"] == pytest.approx(1.0 / ratio - 1.0, abs=0.06)
     assert abs(right["steering_gain"]) < 0.04
-
-
-def test_the_belief_in_it_is_a_student_one_of_the_same_width(car):
-    priors, sd = Priors.of(car), OF_CAR["steering_gain"].sd
-    p = priors.mean.copy()
-    p[GAIN] = 0.1 * sd
-    assert priors.cost(p) == pytest.approx(0.5 * 0.1**2, rel=0.01)
-    p[GAIN] = 10.0 * sd
-    assert priors.cost(p) < 5.0, "a Gaussian has 50"
-    step = np.zeros_like(p)
-    step[GAIN] = 1e-4 * sd
-    slope = (priors.cost(p + step) - priors.cost(p - step)) / (2.0 * step[GAIN])
-    assert slope == pytest.approx(priors.around(p)[0][GAIN], rel=1e-5)
 
 
 def test_a_yaw_inertia_that_nobody_measured_does_not_become_a_steering_ratio():

@@ -1,7 +1,6 @@
 """A fitted model as a file, in other units and sample by sample."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -54,18 +53,6 @@ def test_sample_by_sample_it_says_what_it_says_of_the_drive(learnt):
     assert (away < 0.03 * size).all()
 
 
-def test_braking_takes_of_the_lateral_force_and_shifts_load(learnt):
-    model, f = learnt.model, 5.0 / 9.81
-    coasts, free, braked = (model.force(0.03, v_x=0.1, a_x=a) for a in (None, 0.0, -5.0))
-    np.testing.assert_allclose(free, coasts, rtol=1e-6)  # without drag
-    transfer = model["load_transfer"] * model.vehicle.wheelbase * f
-    used = np.array([model["braking_f"], model["braking_r"]]) * f
-    load = 1.0 + transfer * np.array([1.0 / model.vehicle.l_r, -1.0 / model.vehicle.l_f])
-    expected = load * np.sqrt(np.maximum(1.0 - used**2, 0.05))
-    np.testing.assert_allclose(braked / coasts, expected, rtol=1e-3)
-    assert model.force(0.03, "front", v_x=0.1, a_x=-5.0) == braked[0]
-
-
 def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):
     model = learnt.model
     slip = np.array([0.0005, 0.05])
@@ -75,22 +62,6 @@ def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):
     np.testing.assert_array_equal(model.band.on_another_road().force(slip), model.force(slip))
     with pytest.raises(ValueError, match="sd_friction"):
         model.band.on_another_road(-0.1)
-
-
-def test_on_half_the_friction_its_stiffness_stays(learnt):
-    model, slip = learnt.model, np.array([0.001, 0.02, 0.05])
-    half = model.at_friction(0.5)
-    np.testing.assert_allclose(half.force(0.5 * slip), 0.5 * model.force(slip), rtol=1e-9)
-    np.testing.assert_allclose(half.stiffness, model.stiffness, rtol=1e-9)
-
-
-def test_the_band_of_a_fit_grows_with_the_load(learnt):
-    pressed = replace(sedan(), downforce_area_front=1.0, downforce_area_rear=1.2)
-    slip = np.linspace(0.01, 0.1, 5)
-    cars = pressed, sedan()
-    halves = [replace(learnt.model, vehicle=car).band.half(slip, v_x=40.0) for car in cars]
-    wider = np.broadcast_to(pressed.load_ratio(40.0), (5, 2))
-    np.testing.assert_allclose(halves[0], wider * halves[1], rtol=1e-9)
 
 
 def test_grip_is_the_top_of_the_curve_and_known_slip_ends_where_a_drive_decides_the_force():
@@ -109,7 +80,7 @@ def test_grip_is_the_top_of_the_curve_and_known_slip_ends_where_a_drive_decides_
         run = identify(plant.simulate(maneuver, speed=20.0).recording(), car)
         grip = [one for one in run.tire.estimates() if one.title == GRIP]
         found.append(([one.value for one in grip], [one.sd for one in grip]))
-        assert (run.tire.known_slip > 0.9 * run.tire.driven).all()
+        assert (run.tire.known_slip > 0.9 * run.tire.reach.slip).all()
     values, sd = np.array([value for value, _ in found]), np.array([sd for _, sd in found])
     assert (np.abs(values - values[1]) < 2.0 * sd).all()
     assert (sd[:2] < 0.12).all() and (sd[2] > sd[:2]).all()

@@ -66,13 +66,6 @@ def test_logs_added_up_teach_what_they_do_at_once(drives, told):
         assert abs(p[INDEX[name]] - at_once.posterior[name]) < at_once.posterior.sd(name)
 
 
-def test_nothing_told_leaves_the_prior():
-    p, covariance = settled(PRIORS.after(Information.nothing()), PRIORS.mean)
-    assert p == pytest.approx(PRIORS.mean)
-    moves = np.ix_(PRIORS.moves, PRIORS.moves)
-    assert covariance[moves] == pytest.approx(PRIORS.covariance[moves], rel=1e-6, abs=1e-12)
-
-
 def test_errors_of_a_drives_own_are_marginal(told):
     """As a Gaussian of u and the errors, whose inverse of the covariance of u it is."""
     along = np.zeros((SIZE, 2))
@@ -91,12 +84,3 @@ def test_errors_of_a_drives_own_are_marginal(told):
     there = np.linalg.solve(whole + held, vector)[:SIZE]
     again = np.linalg.solve(found.matrix + held[:SIZE, :SIZE], found.vector)
     assert again == pytest.approx(there, rel=1e-3, abs=1e-4)
-
-
-def test_what_cannot_be_added_is_refused(told):
-    with pytest.raises(ValueError, match="matrix must have shape"):
-        replace(told[0], matrix=np.zeros((3, 3)))
-    with pytest.raises(ValueError, match="vector holds a number that is not finite"):
-        replace(told[0], vector=np.full(SIZE, np.nan))
-    with pytest.raises(ValueError, match="seconds must not be negative, it is -1"):
-        replace(told[0], seconds=-1.0)

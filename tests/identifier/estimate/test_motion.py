@@ -5,7 +5,7 @@ import pytest
 
 from identifier.estimate.drive import Drive
 from identifier.estimate.priors import Priors
-from identifier.estimate.solve import DELAYS, Problem, _arguments, car_numbers, simulate
+from identifier.estimate.solve import DELAYS, Problem, car_numbers, simulate
 from identifier.motion.chosen import CHOSEN as MOTION_CHOSEN
 from identifier.motion.model import motion_scan
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
@@ -136,7 +136,8 @@ def test_slopes_over_faults_and_the_road_are_finite_differences(drive):
     moves = Priors.of(sedan()).moves
     names = tuple(name for name, moving in zip(NAMES, moves, strict=True) if not moving)
     scan, p, car = motion_scan(names), parameters(), car_numbers(sedan())
-    inputs = _arguments(drive, np.zeros(len(p)), car, scan)  # delays as the model reads them
+    inputs = {**scan.zeros(), "signals": drive.signals, "rates": drive.rates}
+    inputs |= {"car": car, "dt": np.array(drive.dt)}
 
     def run(p, port):
         return scan(len(drive.signals), {**inputs, "parameters": p}, ports=(port,))[port]

@@ -7,7 +7,7 @@ import pytest
 
 import tireid as ti
 from identifier.estimate.fit import fit
-from identifier.estimate.poor import _Kinematics, _new_values, _Shown, on_time
+from identifier.estimate.poor import _new_values, on_time
 from models.recordings.record import joined
 
 from .conftest import driven
@@ -64,30 +64,11 @@ def test_rare_and_late_values_are_found_and_brought_on_time(log, how):
     assert "every 100 ms" in found.notes[-1] and "ay" in found.notes[-1]
 
 
-def test_noise_is_smoothed(log):
-    noise = 0.1 * np.random.default_rng(1).normal(size=len(log))
-    found = on_time(replace(log, v_y=log.v_y + noise), CAR)
-    assert off(found, log) < 0.03
-
-
 def test_a_good_v_y_stays_as_it_is(log):
     for one in (log, replace(log, a_y=None), replace(log, v_y=None)):
         assert on_time(one, CAR) is one
     with_a_lateness = replace(log, v_y=np.interp(log.t - 0.1, log.t, log.v_y))
     assert on_time(with_a_lateness, CAR) is with_a_lateness  # it is the doctor's
-
-
-def test_a_y_of_another_motion_smooths_nothing(log):
-    rng = np.random.default_rng(2)
-    noisy = log.v_y + 0.1 * rng.normal(size=len(log))
-    wrong = replace(log, v_y=noisy, a_y=20.0 * rng.normal(size=len(log)))
-    assert on_time(wrong, CAR) is wrong
-
-
-def test_without_a_y_lines_are_drawn(log):
-    shown = replace(received(log, late=0.0, lost=(0, 0)), a_y=None)
-    found = on_time(shown, CAR)
-    assert off(found, log) < 0.5 * off(shown, log)
 
 
 def test_a_single_wrong_value_does_not_move_it(log):
@@ -106,42 +87,6 @@ def test_a_drive_of_two_pieces_is_two_problems(log):
     assert np.std(found.v_y - exact.v_y) < 0.05
     parts = ti.identify(joined(shown), CAR, check=False).history.parts(shown)
     np.testing.assert_array_equal(np.concatenate([one.recording.v_y for one in parts]), found.v_y)
-
-
-def test_banded_algebra_gives_the_least_squares(log):
-    """By a dense matrix of the same equations."""
-    some = log.between(2.0, 2.6)
-    new = np.arange(3, len(some), 7)
-    s = _Shown(interval=0.07, late=0.013, noise=0.02, push=0.01, wanders=0.1)
-    v_y, missed = _Kinematics(some, new).carried(s, np.ones(len(new)))
-    n, dt = len(some), some.dt
-    rows, right = [], []
-
-    def row(weight, value, **at):
-        one = np.zeros(2 * n + 1)
-        for place, factor in at.items():
-            one[int(place[1:])] += factor
-        rows.append(weight * one)
-        right.append(weight * value)
-
-    felt = 0.5 * dt * (some.a_y[1:] + some.a_y[:-1])
-    turns = some.v_x * some.r
-    moved = felt - 0.5 * dt * (turns[1:] + turns[:-1])
-    for k in range(n - 1):
-        v, b = 2 * k, 2 * k + 1
-        at = {f"_{v}": -1, f"_{v + 2}": 1, f"_{b}": dt / 2, f"_{b + 2}": dt / 2}
-        row((s.push * dt) ** -0.5, moved[k], **at, **{f"_{2 * n}": felt[k]})
-        row((s.wanders * dt) ** -0.5, 0.0, **{f"_{b}": -1, f"_{b + 2}": 1})
-    row(1e-2, 0.0, _0=1)
-    row(1 / 0.15, 0.0, _1=1)
-    row(1 / 0.04, 0.05, **{f"_{2 * n}": 1})
-    for k in new[new * dt >= s.late]:
-        i, share = divmod(k - s.late / dt, 1.0)
-        at = {f"_{2 * int(i)}": 1 - share, f"_{2 * int(i) + 2}": share}
-        row(1 / s.noise, some.v_y[k], **at)
-    x = np.linalg.lstsq(np.array(rows), np.array(right), rcond=None)[0]
-    np.testing.assert_allclose(v_y, x[: 2 * n : 2], atol=1e-7)
-    assert len(missed) == len(new)
 
 
 def test_a_user_learns_from_a_receiver_nearly_as_well(log, caplog):

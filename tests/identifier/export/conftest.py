@@ -10,12 +10,11 @@ import pytest
 from identifier.axle.band import BandCalibration
 from identifier.export.compiled import samples_of
 from identifier.export.package import build_package
-from identifier.methods import METHODS, make_method
+from identifier.methods import make_method
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
 from tests.kept import Kept
-from tests.rivals import NAMES
 
 STRICT = [
     "-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Wdouble-promotion",
@@ -42,7 +41,7 @@ def packages():
             return banded(car, with_a_y=True)
         return build_package(make_method(law, car), car)
 
-    return Kept((*METHODS, *NAMES, BANKED), make)
+    return Kept(make)
 
 
 def banded(car, **options):
@@ -89,7 +88,7 @@ def drives(packages, slalom, samples):
             rows[2300:2330, 1], rows[2380:2400, 1], rows[2400:, 1] = 1e4, -np.inf, np.nan
         return rows[1900:2600]
 
-    return Kept((*TWO, BANKED, "inertial"), make)
+    return Kept(make)
 
 
 def put(folder, files):

@@ -1,16 +1,12 @@
 """The band in C and FMU: that of the model, narrower as it learns; zero where forces read zero."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identifier.axle.band import BandCalibration
-from identifier.axle.band_step import _hinged, hinges
-from identifier.export import fmu as binaries
 from identifier.export.compiled import CompiledPackage, samples_of
-from identifier.export.fmu import export_fmu, fmu_text
+from identifier.export.fmu import fmu_text
 from identifier.export.onnx import NoOnnxError, onnx_bytes
 from identifier.export.package import build_package, run_in_virtual_machine
 from identifier.export.specialize import specialize
@@ -33,26 +29,6 @@ def a_model(slalom):
 @pytest.fixture(scope="module")
 def package(model):
     return build_package(AXLE, CAR, model, with_band=True)
-
-
-@pytest.mark.parametrize("single", [False, True])
-def test_the_c_tells_the_band_of_the_model(single, package, model, slalom):
-    """That over slip, and on top what the noise of the sensors makes of it."""
-    compiled = CompiledPackage.of(package, single=single)
-    compiled.set_adaptation(False)
-    drive = slalom.between(20.0, 45.0)
-    told = compiled.run(drive).outputs["half_band"]
-    of_slip = model.band.along(model.lagged_slip(drive), drive.v_x)
-    late = drive.t > drive.t[0] + 1.0
-    assert (told[late] > of_slip[late] * (1.0 - 1e-4)).all()
-    silent = replace(model, calibration=replace(CALIBRATION, noise=np.zeros(3)))
-    exact = CompiledPackage.of(build_package(AXLE, CAR, silent, with_band=True), single=single)
-    exact.set_adaptation(False)
-    again = exact.run(drive).outputs["half_band"]
-    np.testing.assert_allclose(again[late], of_slip[late], rtol=2e-4 if single else 1e-6)
-    narrow = replace(model, calibration=replace(CALIBRATION, factors=0.8 * CALIBRATION.factors))
-    other = narrow.band.along(model.lagged_slip(drive), drive.v_x)
-    assert not np.allclose(again[late], other[late], rtol=1e-2)  # the alarm rings
 
 
 def test_noise_widens_it_as_that_of_a_drive_with_such_sensors(package, model, slalom):
@@ -88,60 +64,10 @@ def test_where_forces_read_zero_there_is_no_band(package, slalom):
     assert (told[280:] == 0.0).all()
 
 
-def test_the_manifest_keeps_the_calibration_and_says_what_is_told(package, packages):
-    manifest = json.loads(package.files["tireid.json"])
-    again = BandCalibration.from_dict(manifest["band"])
-    np.testing.assert_array_equal(again.factors, CALIBRATION.factors)
-    assert {"name": "half_band", "size": 2} in [
-        {key: one[key] for key in ("name", "size")} for one in manifest["outputs"]
-    ]
-    afresh = json.loads(build_package(AXLE, CAR, with_band=True).files["tireid.json"])
-    assert afresh["band"] is None
-    assert "band" not in json.loads(packages["axle"].files["tireid.json"])
-
-
-@pytest.mark.parametrize("law", ["integral", "inertial"])
-def test_a_method_that_cannot_tell_how_sure_it_is_has_no_band(law):
-    with pytest.raises(ValueError, match="cannot tell how sure it is: it has no band"):
-        specialize(make_method(law, CAR), CAR, with_band=True)
-
-
-def test_hinges_are_the_straight_lines_between_centers():
-    values, at = np.array([[1.0, 3.0, 2.0, 2.5], [0.5, 0.4, 0.9, 4.0]]), (0.1, 0.2, 0.5, 0.6)
-    for x in (0.0, 0.1, 0.15, 0.2, 0.44, 0.55, 0.6, 9.0):
-        for numbers, row in zip(hinges(values, at), values, strict=True):
-            found = float(_hinged(list(map(float, numbers)), at, x))
-            assert found == pytest.approx(np.interp(x, at, row))
-
-
 def test_an_fmu_has_a_band_where_its_step_tells_one():
     for told in (False, True):
         text = fmu_text(specialize(AXLE, CAR, with_band=told), 3)["modelDescription.xml"]
         assert all((f'name="F_y{end}_half_band"' in text) == told for end in "fr")
-
-
-@pytest.mark.parametrize("version", [2, 3])
-def test_an_fmu_tells_the_band_of_the_step_to_the_last_bit(
-    version, package, slalom, tmp_path, monkeypatch
-):
-    fmpy = pytest.importorskip("fmpy", reason="needs the package fmpy")
-    if not binaries.targets():
-        pytest.skip("needs a C compiler on Linux x86-64")
-    monkeypatch.setattr(binaries, "MINGW", "no-such-compiler")
-    path = tmp_path / "one.fmu"
-    export_fmu(package.specialized, path, version)
-    names = ["F_yf_half_band", "F_yr_half_band"]
-    drive = slalom.taken(np.arange(300))
-    inputs = ("v_x", "v_y", "r", "delta_f")
-    table = np.zeros(len(drive), dtype=[(name, float) for name in ("time", *inputs)])
-    for name in table.dtype.names:
-        table[name] = getattr(drive, "t" if name == "time" else name)
-    told = fmpy.simulate_fmu(
-        *[str(path)], stop_time=3.0, step_size=0.01, output_interval=0.01, input=table, output=names
-    )
-    expected, _ = run_in_virtual_machine(package.specialized, samples_of(drive))
-    for column, name in enumerate(names, start=2):
-        np.testing.assert_allclose(told[name][1:], expected[:, column], rtol=1e-6)
 
 
 @pytest.mark.parametrize("single", [False, True])

@@ -39,16 +39,6 @@ def test_c_computes_the_bits_of_casadi(package, rows):
         np.testing.assert_array_equal(value, state[name].reshape(value.shape))
 
 
-def test_the_package_learns_what_identify_learns(package, slalom):
-    compiled = CompiledPackage.of(build_package(AXLE, RACER))
-    forces = compiled.run(slalom).axle_force
-    np.testing.assert_allclose(forces, identify(slalom, RACER, AXLE).axle_force, atol=1e-3)
-    plain = CompiledPackage.of(build_package(AXLE, sedan())).run(slalom).axle_force
-    assert np.abs(forces - plain).max() > 50.0
-    assert "downforce_area_front" in package.files["tireid.json"]
-    assert "downforce" not in "".join(build_package(AXLE, sedan()).files.values())
-
-
 def test_onnx_has_the_curves_of_the_static_loads_and_says_so(slalom):
     pytest.importorskip("onnx", reason="needs the package onnx")
     runtime = pytest.importorskip("onnxruntime", reason="needs the package onnxruntime")

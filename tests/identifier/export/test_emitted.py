@@ -11,6 +11,7 @@ import pytest
 from identifier.axle.model import begun
 from identifier.band import normal_quantile
 from identifier.estimate.model import FittedModel
+from identifier.estimate.posterior import Reach
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import car_numbers
 from identifier.export.ggv import ggv_text, limits
@@ -43,10 +44,13 @@ def fitted(car=CAR, sd=0.1, **numbers):
         vehicle=car,
         p=p,
         covariance=sd**2 * priors.covariance,
-        driven=np.array([0.2, 0.15]),
-        speeds=np.array([5.0, 30.0]),
-        a_x=np.array([-5.0, 3.0]),
-        unexplained=np.zeros(2),
+        reach=Reach(
+            np.array([0.2, 0.15]),
+            np.array([5.0, 30.0]),
+            np.array([-5.0, 3.0]),
+            np.zeros(2),
+            1.0,
+        ),
     )
 
 
@@ -84,33 +88,6 @@ def test_a_property_file_reads_back_the_axle_over_slip_and_load(tmp_path, i):
         assert np.abs(pair - force).max() <= 0.02 * np.abs(force).max()
 
 
-def test_the_axle_identifier_and_a_network_give_property_files_too(tmp_path):
-    slip = np.linspace(-0.08, 0.08, 9)
-    for model in (begun(fitted(**TIRES)), network()):
-        load = 0.5 * CAR.axle_loads[1]
-        tire = read(model, "rear", tmp_path)
-        pair = np.array([2.0 * float(tire.forces(a, 0.0, 0.0, load).F_y) for a in slip])
-        force = model.force(slip, "rear")
-        assert np.abs(pair - force).max() <= 0.02 * np.abs(force).max(), model.kind
-
-
-def test_a_property_file_says_what_it_is_and_what_it_is_not(tmp_path):
-    model = fitted(**TIRES)
-    tire, load = read(model, "front", tmp_path), 0.5 * CAR.axle_loads[0]
-    assert pytest.approx(load) == tire.coefficients.FNOMIN
-    assert tire.valid_range.F_z[0] < load < tire.valid_range.F_z[1]
-    assert tire.valid_range.alpha[1] == pytest.approx(model.known_slip[0])
-    text = tire_properties(model, "front")
-    words = " ".join(line[2:] for line in text.splitlines() if line.startswith("$"))
-    for part in ("pure slip", "driving log", "friction of the road", "Is not", "Band of 90 %"):
-        assert part in words
-    assert f"{math.degrees(model.known_slip[0]):.3g} deg" in words
-    known = model.known_slip[:1]
-    half = 0.5 * model.band.half(known)[0, 0]
-    assert f"+- {half:.3g} N" in words
-    assert "cannot tell how sure" in tire_properties(network(), "front")
-
-
 def test_a_curve_that_is_no_magic_formula_has_no_property_file():
     bumpy = fitted(residual0_f=2.0, residual1_f=-2.2, residual2_f=0.9)
     with pytest.raises(ValueError, match=r"front axle is no Magic Formula: .* % of its peak"):
@@ -126,7 +103,7 @@ def level(**numbers):
     low = 1.0 - Z * model.band.load_doubt
     grip = dict(zip(("ln_grip_f", "ln_grip_r"), np.log(1.1 / low), strict=True))
     model = fitted(sd=1e-6, **grip, **numbers)
-    return replace(model, driven=np.array([0.5, 0.5]))
+    return replace(model, reach=model.reach._replace(slip=np.array([0.5, 0.5])))
 
 
 NO_ELLIPSE = dict.fromkeys(("braking_f", "braking_r", "driving_f", "driving_r"), 0.0)
@@ -184,14 +161,6 @@ def test_the_diamond_of_planners_lies_within_the_forces_of_the_model(h, braking_
         assert ((np.min(spare, axis=0) < 0.0) | ends | (most > 0.999 * found.a_y)).all(), side
 
 
-def test_the_end_of_what_is_not_known_of_the_ellipse_is_taken():
-    model = level(load_transfer=0.0, **{**NO_ELLIPSE, "braking_r": 1.25})
-    covariance, k = model.covariance.copy(), INDEX["braking_r"]
-    covariance[k, k] = 0.2**2
-    found = limits(replace(model, covariance=covariance))
-    np.testing.assert_allclose(found.braking, GRAVITY / (1.25 + Z * 0.2), rtol=1e-3)
-
-
 def test_limits_fall_with_what_is_not_known_and_models_without_a_band_have_none():
     sure, doubtful = limits(fitted(sd=0.05)), limits(fitted(sd=0.22))
     assert (doubtful.a_y < 0.97 * sure.a_y).all()
@@ -201,7 +170,8 @@ def test_limits_fall_with_what_is_not_known_and_models_without_a_band_have_none(
     with pytest.raises(ValueError, match="NetworkModel cannot tell how sure it is"):
         limits(network())
     with pytest.raises(ValueError, match="front axle is not known at any slip"):
-        limits(replace(fitted(), driven=np.array([0.0, 0.1])))
+        model = fitted()
+        limits(replace(model, reach=model.reach._replace(slip=np.array([0.0, 0.1]))))
 
 
 def test_raceline_planners_read_the_table(tmp_path):
@@ -217,14 +187,6 @@ def test_raceline_planners_read_the_table(tmp_path):
     assert (table[:, 1:] > 0.0).all() and (table[:, 1:] < 50.0).all() and table[-1, 2] > table[0, 2]
     comments = [line for line in path.read_text().splitlines() if line.startswith("#")]
     assert comments[-1] == "# v_mps, ax_max_mps2, ay_max_mps2" and "Lower end" in comments[1]
-
-
-def test_the_loader_of_raceline_planners_takes_the_table(tmp_path):
-    helpers = pytest.importorskip("trajectory_planning_helpers", reason="needs its loader of g-g-v")
-    path = tmp_path / "ggv.csv"
-    path.write_text(ggv_text(fitted()), encoding="utf-8")
-    ggv, _ = helpers.import_veh_dyn_info.import_veh_dyn_info(str(path), None)
-    assert ggv.shape == (13, 3)
 
 
 # Understeer.
@@ -256,14 +218,6 @@ def test_the_gradient_is_that_of_the_single_track_at_every_acceleration(car):
     assert np.isfinite(found.gradient[0]).sum() >= 7
     if car is CAR:
         assert found.gradient[0, 0] == pytest.approx(linear, abs=2e-6)
-
-
-def test_a_softer_front_axle_understeers():
-    found = understeer_gradient(
-        fitted(sd=1e-3, ln_stiffness_f=math.log(12.0), ln_stiffness_r=math.log(16.0)),
-        np.random.default_rng(0),
-    )
-    assert found.gradient[0, 0] == pytest.approx((1 / 12 - 1 / 16) / GRAVITY, rel=1e-2)
 
 
 def test_the_standard_deviation_is_that_of_linear_propagation():

@@ -3,7 +3,6 @@
 import json
 
 from codegen.processor import Cost, Replay, with_figures
-from identifier.export.processor import figures_text
 
 REPLAY = Replay(
     hash="ab", steps=900, faults=2, state=1000, params=200, work=0, stack=30, instructions=77777,
@@ -14,15 +13,6 @@ COST = Cost("Cortex-M4", "gcc 12", single=True, flash=5432, replay=REPLAY, stati
 
 def test_ram_is_static_data_state_and_parameters():
     assert COST.ram == 1204
-
-
-def test_every_number_stands_in_its_column():
-    row = figures_text([COST]).splitlines()[2]
-    cells = [cell.strip() for cell in row.strip("|").split("|")]
-    assert cells == ["Cortex-M4", "float", "5432", "4 + 1000 + 200", "30", "77777", "88888"]
-    assert "\ngcc 12, -O2" in figures_text([COST])
-    assert "| double |" in figures_text([COST._replace(single=False)])
-    assert "Not measured" in figures_text([])
 
 
 def test_the_manifest_gets_the_same_numbers_and_keeps_the_rest():

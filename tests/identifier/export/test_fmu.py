@@ -138,6 +138,7 @@ def in_python(drive, start=None):
     return scan(drive.t.size, {**start, "x": drive.x, "u": drive.u, "v_x": drive.v_x})
 
 
+@pytest.mark.sweep("0.01-2")
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("dt", [0.001, 0.01])
 def test_forces_are_those_of_python_to_the_last_bit(master, version, dt):
@@ -173,17 +174,6 @@ def test_a_long_step_takes_its_samples_with_inputs_held(master):
     assert (coarse == in_python(steps)["axle_force"][3::4]).all()
 
 
-def test_a_run_may_begin_at_any_time(master):
-    drive, one = swaying(50), master(start_time=7.7)
-    forces = np.empty((50, 2))
-    for k, row in enumerate(rows(drive)):
-        one.set(row)
-        one.step(7.7 + 0.01 * k, 0.01)
-        forces[k] = one.forces()
-    assert one.count(SAMPLES) == 50
-    assert (forces == in_python(drive)["axle_force"]).all()
-
-
 def save(one):
     fmu = one.fmu
     state = fmu.getFMUState()
@@ -213,40 +203,7 @@ def test_a_saved_state_goes_on_as_if_nothing_had_happened(master, version):
     assert (other.run(inputs[120:], 0.01, first=120) == through).all()
 
 
-@pytest.mark.parametrize("version", [2, 3])
-def test_after_a_reset_it_is_as_new(master, version):
-    """Weights, counters, time and switches: the second run is the first one, sample by sample."""
-    inputs, one = rows(swaying(150)), master(version)
-    first = one.run(inputs, 0.01)
-    one.adapt(False)
-    one.fmu.reset()
-    assert one.count(SAMPLES) == 0
-    assert one.forces() == [0.0, 0.0]
-    if one.two:
-        one.fmu.setupExperiment(startTime=3.0)
-        one.fmu.enterInitializationMode()
-    else:
-        one.fmu.enterInitializationMode(startTime=3.0)
-    one.fmu.exitInitializationMode()
-    assert (one.run(inputs, 0.01, first=300) == first).all()
-    assert one.count(SAMPLES) == 150
-    assert np.abs(first[-1] - in_python(swaying(150))["axle_force"][0]).max() > 100
-
-
-@pytest.mark.parametrize("version", [2, 3])
-def test_after_a_reset_a_step_waits_for_the_initialization(master, version, capfd):
-    one = master(version)
-    one.run(rows(swaying(10)), 0.01)
-    one.fmu.reset()
-    with pytest.raises(Exception, match="status 3"):
-        one.step(0.1, 0.01)
-    assert "a step before initialization" in capfd.readouterr().out
-    if one.two:
-        one.fmu.setupExperiment(startTime=0.0)
-    one.fmu.enterInitializationMode()
-    one.fmu.exitInitializationMode()
-
-
+@pytest.mark.sweep("3")
 @pytest.mark.parametrize("version", [2, 3])
 def test_the_state_of_another_model_is_refused(master, version, capfd):
     saved = save(master(version, dt=0.001))
@@ -317,18 +274,3 @@ def test_forces_are_zero_and_stale_where_no_sample_comes_for_half_a_second(maste
     assert (one.count(STATUS), (forces == 0.0).all()) == (6, True)
     assert (one.run(inputs[90:], 0.01, first=90) != 0.0).all()
     assert one.count(STATUS) == 0
-
-
-def test_a_sample_that_no_car_can_be_in_is_told(master):
-    inputs, one = rows(swaying(60)), master()
-    one.run(inputs[:30], 0.01)
-    inputs[30, 1] = 100.0  # m/s to the left
-    assert (one.run(inputs[30:31], 0.01, first=30) == 0.0).all()
-    assert one.count(STATUS) == 2
-
-
-def test_below_the_minimum_speed_forces_are_zero(master):
-    one, slow = master(), rows(swaying(10))
-    slow[:, 0] = 0.5
-    assert (one.run(slow, 0.01) == 0.0).all()
-    assert one.count(STATUS) == 1

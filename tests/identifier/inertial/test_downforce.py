@@ -6,15 +6,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.export.compiled import CompiledPackage, samples_of
-from identifier.export.package import build_package, run_in_virtual_machine
 from identifier.inertial import InertialIdentifier
 from identifier.inertial.motion import Sample, predicted, static_load, unknowns
 from identifier.run import identify
 from models.recordings import Recording
 from models.vehicle import load_ratio
-from tests.identifier.axle.test_downforce import RACER, SLIPS, UNTOLD, race, static
-from tests.identifier.conftest import missed
+from tests.identifier.axle.test_downforce import RACER, UNTOLD, race
 from tests.identifier.inertial.test_motion import SCALES, STEPS, V_X, N, car, laws, places, state
 
 METHOD = InertialIdentifier.for_vehicle(RACER)
@@ -36,15 +33,6 @@ def models(drive):
     return [identify(felt(drive), one, METHOD).freeze() for one in (RACER, UNTOLD)]
 
 
-def test_the_told_area_leaves_the_static_curve_to_learn(models, drive):
-    told, untold = models
-    np.testing.assert_allclose(told.force(SLIPS), static(SLIPS[:, None]), rtol=0.15)
-    still = race(car=UNTOLD)  # the same drive of a car without: as well as can be had
-    usual = missed(identify(felt(still), UNTOLD, METHOD).freeze(), still)
-    assert (missed(told, drive) < 1.5 * usual).all()
-    assert (missed(untold, drive) > 3.0 * missed(told, drive)).all()
-
-
 def stepped(z, load):
     """What moves, and the slip, a step later at one speed."""
     symbol, tilt = ca.SX.sym("z", z.size), (ca.SX(2.0), ca.SX(-1.0))
@@ -64,13 +52,3 @@ def test_at_one_speed_a_load_is_a_scale_of_the_weights():
     pressed = stepped(z, lambda v_x: load_ratio(ca.DM(kappa), v_x))
     np.testing.assert_allclose(pressed, stepped(scaled, static_load), rtol=1e-12, atol=1e-15)
     assert np.abs(pressed - stepped(z, static_load)).max() > 1e-4
-
-
-def test_c_computes_the_bits_of_casadi(drive):
-    package = build_package(METHOD, RACER)
-    shown = replace(felt(drive), v_y=drive.v_y)
-    rows = samples_of(shown, [port.name for port in package.specialized.inputs])[:1000]
-    rows[:, 1] = np.nan
-    told, _ = run_in_virtual_machine(package.specialized, rows)
-    shipped = CompiledPackage.of(package, single=False).run_samples(rows)
-    np.testing.assert_array_equal(np.column_stack(list(shipped.outputs.values())), told)

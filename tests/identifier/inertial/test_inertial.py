@@ -9,8 +9,7 @@ from identifier.axle import AxleIdentifier, AxleModel
 from identifier.estimate.fit import fit
 from identifier.inertial import InertialIdentifier
 from identifier.methods import continuing, make_method
-from identifier.motion.parameters import INDEX
-from identifier.run import OnlineIdentifier, identify, learn
+from identifier.run import identify, learn
 from models.friction import Friction, FrictionChange
 from models.recordings import RecordingError
 from models.sensors import Sensor, Sensors
@@ -78,43 +77,6 @@ def test_side_slip_is_told_on_a_banked_road_with_an_honest_deviation(history, ba
     assert degrees(sd) < 4 * degrees(error)  # and not honest by knowing nothing
 
 
-def test_on_tires_of_an_estimate_side_slip_is_known_better_and_they_stay(estimate, history, banked):
-    method = continuing(estimate, CAR, v_y=False)
-    held = identify(as_shown(banked), CAR, method, start=estimate)
-    error, sd, _ = errors(held, banked)
-    assert degrees(error) < 0.85 * degrees(errors(history, banked)[0])
-    assert np.mean(np.abs(error) < 2 * sd) > 0.9
-    W, ladder = held.state["W"], np.array(method.ladder)
-    slope, level = (W / ladder).sum(axis=2), W.sum(axis=2)
-    assert np.abs(slope / slope[0] - 1.0).max() < 0.03
-    assert np.abs(level / level[0] - 1.0).max() < 0.15  # but for their grip
-    assert (held.state["own"] == held.state["own"][0]).all()
-
-
-def test_a_known_factor_of_the_steering_is_taken_out(estimate, banked):
-    p = estimate.p.copy()
-    share = 1.25 / (1.0 + p[INDEX["steering_gain"]])
-    p[INDEX["steering_gain"]] = 0.25
-    short = replace(as_shown(banked), delta_f=as_shown(banked).delta_f / share)
-    found = []
-    for tires, log in ((estimate, as_shown(banked)), (replace(estimate, p=p), short)):
-        history = identify(log, CAR, continuing(tires, CAR, v_y=False), start=tires)
-        found.append(history.outputs["v_y"].ravel())
-        assert history.freeze().sensors.steering_gain == tires["steering_gain"]
-    np.testing.assert_allclose(found[1], found[0], atol=1e-6)
-
-
-def test_the_error_of_an_estimate_widens_what_is_known_of_side_slip(estimate, banked):
-    method, shown = continuing(estimate, CAR, v_y=False), as_shown(banked)
-    sure, unsure = (
-        identify(shown, CAR, replace(method, doubt=doubt), start=estimate)
-        for doubt in ((0.0, 0.0), (0.02, 0.1))
-    )
-    sds = [np.median(one.outputs["v_y_sd"]) for one in (sure, unsure)]
-    assert sds[1] > 1.2 * sds[0]
-    np.testing.assert_array_equal(sure.outputs["v_y"], unsure.outputs["v_y"])
-
-
 def test_an_accelerometer_that_is_late_by_what_is_said_is_read_in_time(estimate, banked):
     method, shown = continuing(estimate, CAR, v_y=False), as_shown(banked)
     late = replace(shown, a_y=np.roll(shown.a_y, 6))
@@ -150,21 +112,6 @@ def test_it_freezes_to_the_kind_of_model_that_an_axle_identifier_learns(history,
     assert (model.band.relative_sd(alpha) < 0.7).all()  # and knows that it learnt
 
 
-def test_its_own_bounds_hold_and_its_own_ladder_is_used(banked):
-    shown = as_shown(banked)
-    tight = replace(METHOD.bounds, most_grip=0.7, most_stiffness=9.0)
-    kept = identify(shown, CAR, replace(METHOD, bounds=tight)).state["W"]
-    free = identify(shown, CAR, METHOD).state["W"]
-    slope = [(W[1:] / np.array(METHOD.ladder)).sum(axis=2).max() for W in (kept, free)]
-    grip = [W[1:].sum(axis=2).max() for W in (kept, free)]
-    assert grip[0] <= 0.7 < grip[1] and slope[0] <= 9.0 < slope[1]
-    ladder = (0.02, 0.08, 0.32)
-    other = learn(shown, CAR, replace(METHOD, ladder=ladder))
-    assert other.ladder == ladder and other.W.shape == (2, 3)
-    exact, usual = banked.recording(), learn(shown, CAR, METHOD)
-    assert (missed(other, exact) < 2.0 * missed(usual, exact)).all()
-
-
 def test_a_recording_without_an_accelerometer_is_refused_before_it_is_learnt_on(banked):
     blind = replace(as_shown(banked), a_y=None)
     for run in (identify, learn):
@@ -182,53 +129,6 @@ def test_what_is_told_for_observed_is_so_and_nothing_is_where_nothing_is_known(h
     parked = identify(replace(slow, v_x=np.full(len(slow), 0.5)), CAR, METHOD)
     assert not parked.outputs["side_slip_observable"].any()
     assert np.isfinite(parked.outputs["v_y"]).all()
-
-
-def test_an_accelerometer_of_the_other_sign_is_noticed_and_nothing_of_the_right_one(
-    history, banked
-):
-    """Forces that contradict the yaw rate are no curve of a tire."""
-    shown = as_shown(banked)
-    assert alarms(identify(replace(shown, a_y=-shown.a_y), CAR, METHOD)).any()
-    assert not alarms(history).any()
-
-
-def test_a_gap_of_the_accelerometer_widens_what_is_not_known(banked):
-    a_y = as_shown(banked).a_y.copy()
-    online = [OnlineIdentifier(METHOD, CAR, 0.01) for _ in range(2)]
-    shown = as_shown(banked)
-    for k in range(1600):
-        for one, gone in zip(online, (False, k >= 1300), strict=True):
-            one.update(shown.x[k], shown.u[k], shown.v_x[k], None if gone else a_y[k])
-    whole, gap = (one.outputs["v_y_sd"].item() for one in online)
-    assert gap > 1.1 * whole
-    assert gap < 1.0
-
-
-def test_a_number_counts_once_also_where_it_is_repeated_or_settles_in_two_steps(history, banked):
-    """A sensor of 10 Hz in a log of 100 Hz has a tenth of the news; behind a filter it shows most
-    of a new number at once and the rest a step later.
-    """
-    shown = as_shown(banked)
-    held = 10 * (np.arange(len(shown)) // 10)
-    first = np.arange(len(shown)) % 10 == 0
-
-    def settling(y):
-        jump = np.diff(y[held], prepend=y[0])
-        return y[held] - 0.03 * first * jump
-
-    once = replace(shown, r=shown.r[held], a_y=shown.a_y[held])
-    twice = replace(once, r=settling(shown.r), a_y=settling(shown.a_y))
-    sds, noises = [np.median(errors(history, banked)[1])], []
-    for recording in (once, twice):
-        found = identify(recording, CAR, METHOD)
-        error, sd, _ = errors(found, banked)
-        assert np.mean(np.abs(error) < 2 * sd) > 0.8
-        sds.append(np.median(sd))
-        noises.append(found.state["readings"][-1].ravel()[4:6])
-    assert sds[1] > 1.05 * sds[0]
-    assert sds[2] == pytest.approx(sds[1], rel=0.1)
-    np.testing.assert_allclose(noises[1], noises[0], rtol=0.35)
 
 
 @pytest.mark.parametrize("tires", ["typical", "held"])
@@ -257,16 +157,6 @@ def test_a_stored_model_is_gone_on_from(history, banked):
     first = slice(500, 1000)
     sd = [one.outputs["v_y_sd"].ravel()[first].mean() for one in (again, history)]
     assert sd[0] < sd[1]
-
-
-def test_how_sure_a_stored_zero_of_the_steering_is_stays_known(history):
-    """What was learnt goes on as one number does: the same covariance, and not the first guess."""
-    stored = history.freeze()
-    again = METHOD.frozen(CAR, METHOD.setup(CAR, stored).carry)
-    np.testing.assert_allclose(again.covariance, stored.covariance, rtol=1e-9, atol=1e-15)
-    sd = np.sqrt(stored.covariance[0, -1, -1])
-    assert sd < 0.5 * METHOD.beliefs.steering
-    assert stored.prior_covariance[0, -1, -1] == METHOD.beliefs.steering**2
 
 
 def test_a_model_of_another_structure_is_refused(history):

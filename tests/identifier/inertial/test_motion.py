@@ -137,13 +137,6 @@ def test_motion_follows_its_equations_and_halving_the_step_more_than_halves_the_
     assert (coarse / fine > 2.2).all()
 
 
-def test_the_bank_and_the_rolling_body_follow_theirs():
-    exact, tilt = integrated(state(), np.array([2.0, 1.0]), 0.08)
-    found, body = walked(0.001)
-    assert found[6] == pytest.approx(exact[6], rel=1e-4)
-    np.testing.assert_allclose(body, tilt, rtol=0.02)
-
-
 def expected(z, tilt=3.0, delta=0.05):
     symbol = ca.SX.sym("z", z.size)
     now = Sample(ca.SX(V_X), ca.SX(ca.DM([delta, 0.0])))

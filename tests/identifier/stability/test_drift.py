@@ -88,7 +88,6 @@ def test_the_certificate_finds_no_gain_limit_of_the_lead_even_for_skewed_error_d
     task = Operation(
         n_h=4,
         dt=0.001,
-        integrator="rk4",
         bandwidth=0.5,
         disturbance=Disturbance(residual=2.0),
         needed_force=2.0,

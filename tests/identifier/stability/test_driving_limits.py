@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.monte_carlo import Drives, measured, random_drives, within
 from identifier.driving import Driving
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import LAWS
@@ -16,7 +15,6 @@ from identifier.stability.operation import (
     declared_signals,
     disturbance,
     expected_residual,
-    minimal_decay,
 )
 
 HARD = {"v_x": 20.0, "slip": 0.12, "friction": 0.9}
@@ -57,39 +55,6 @@ def test_a_smooth_tire_misses_force_long_before_it_slides(car):
     assert late == pytest.approx(np.linalg.norm(slid - 0.9 * np.array(car.axle_loads)), rel=0.05)
 
 
-def test_the_samples_of_drives_show_no_more_than_the_disturbance(car):
-    """Residual, ξ' and what the observer is told, of drives within the conditions, with noise."""
-    noisy = replace(
-        DRIVING, noise_v_x=0.1, noise_v_y=0.1, noise_r=0.01, noise_delta=0.002, bandwidth=1.2
-    )
-    acting = disturbance(car, noisy, dt=0.02, unit=1000.0)
-    rng = np.random.default_rng(2)
-    drives = random_drives(car, rng, 64, driving=noisy, duration=8.0, dt=0.02)
-    kept = within(car, drives, noisy, 0.02)
-    assert kept.sum() > 10
-    drives = Drives(*(values[kept] for values in drives))
-    seen = measured(drives, noisy, rng)
-    K_inv = np.array([[1500.0 * 1.55, 2500.0], [1500.0 * 1.15, -2500.0]]) / 2.7 / 1000.0
-    xi = drives.x @ K_inv.T
-    rate = np.diff(xi, axis=1) / 0.02
-    lever = np.array([car.l_f, -car.l_r])
-    C = np.array([car.cornering_stiffness_front, car.cornering_stiffness_rear]) / 1000.0
-
-    def known(of):
-        alpha = of.u - (of.x[..., :1] + lever * of.x[..., 1:]) / of.v_x[..., None]
-        return alpha * C - np.stack([of.v_x * of.x[..., 1], 0 * of.v_x], axis=-1) @ K_inv.T
-
-    def largest(values):
-        return float(np.linalg.norm(values, axis=2).max())
-
-    # rate and known take both worst cases at once, which a drive does not: 0.15 of them is much
-    assert 0.3 * acting.residual < largest(rate - known(seen)[:, :-1]) <= acting.residual
-    assert 0.15 * acting.rate < largest(rate) <= acting.rate
-    assert 0.15 * acting.known < largest(known(seen)) <= acting.known
-    noise = largest((seen.x - drives.x) @ K_inv.T)
-    assert 0.9 * acting.noise < noise <= acting.noise * (1 + 1e-12)
-
-
 def test_what_each_sensor_adds_is_the_force_of_the_slip_and_of_the_turn_that_it_feigns(car):
     """By hand, with all sensors wrong at once; told nothing of noise, there is none."""
     assert (DRIVING.noise_v_x, DRIVING.noise_v_y, DRIVING.noise_r, DRIVING.noise_delta) == (0,) * 4
@@ -108,7 +73,6 @@ def test_what_each_sensor_adds_is_the_force_of_the_slip_and_of_the_turn_that_it_
         added.append((C * slip + car.mass * other / car.wheelbase * turn) / 1000.0)
     told = np.linalg.norm(added)
     assert wrong.residual - clean.residual == pytest.approx(told, rel=1e-9)
-    assert wrong.known - clean.known == pytest.approx(told, rel=1e-9)
 
 
 def test_the_operation_of_a_design_is_enough_for_its_certificate(car):
@@ -126,7 +90,7 @@ def test_a_network_that_reads_the_estimate_brings_its_feedback_along(car):
     design = replace(PaperIdentifier.for_vehicle(car), input_source="estimated")
     task = design.operation(car, DRIVING)
     assert task.input_feedback is not None
-    assert 5.0 < minimal_decay(task.input_feedback) < 12.0
+    assert 5.0 < np.linalg.eigvals(task.input_feedback).real.max() < 12.0
 
 
 def test_a_speed_that_errs_by_half_of_itself_is_refused():

@@ -1,12 +1,9 @@
 import casadi as ca
 import numpy as np
-import pytest
 
-from benchmarks.steady_cornering import jacobian_feedback
-from identifier.paper.network import hidden_layer
 from identifier.stability.loop import INTEGRAL, Loop
 from identifier.stability.margins import gain_margin
-from identifier.stability.operation import estimated_input_feedback, minimal_decay
+from identifier.stability.operation import estimated_input_feedback
 from models.bicycle import BicycleParameters, bicycle, slip_angles
 
 CAR = {"m": 1500.0, "I_z": 2500.0, "l_f": 1.15, "l_r": 1.55}
@@ -34,38 +31,20 @@ def test_the_feedback_is_the_jacobian_of_what_the_linear_tire_misses():
     assert not np.allclose(found, J_f @ K.T, rtol=1e-2)  # (6) prints the transpose
 
 
-def test_the_coupling_is_symmetric_and_positive_so_that_the_minimal_decay_is_a_real_eigenvalue():
+def test_the_coupling_is_symmetric_and_positive_so_that_the_decay_it_takes_is_a_real_eigenvalue():
     N = estimated_input_feedback(**CAR, stiffness_lost=(1.0, 1.0), v_x=1.0)
     np.testing.assert_allclose(N, N.T)
     assert np.linalg.eigvalsh(N)[0] > 0.0
     feedback = saturated_car_feedback(20.0)
     assert np.abs(np.linalg.eigvals(feedback).imag).max() == 0.0
-    assert 5.0 < minimal_decay(feedback) < 12.0
+    assert 5.0 < np.linalg.eigvals(feedback).real.max() < 12.0
 
 
-def test_below_the_minimal_decay_no_learning_rate_saves_the_loop_that_reads_the_estimate():
+def test_below_the_decay_that_it_takes_no_learning_rate_saves_the_loop_that_reads_the_estimate():
     feedback = saturated_car_feedback(20.0)
-    least = minimal_decay(feedback)
+    least = np.linalg.eigvals(feedback).real.max()
     for a, stable in ((0.95 * least, False), (1.3 * least, True)):
         loop = Loop(
             A_d=-a * np.eye(2), forgetting=a, law=INTEGRAL, G=np.eye(2), input_feedback=feedback
         )
         assert (gain_margin(loop).factor > 0.0) is stable
-
-
-def test_the_feedback_of_a_network_is_its_jacobian():
-    rng = np.random.default_rng(0)
-    W, V = rng.standard_normal((2, 6)), rng.standard_normal((6, 4))
-    scale, K = np.array([1.0, 0.5, 0.1, 0.1]), rng.standard_normal((2, 2))
-    x = ca.SX.sym("x", 2)
-    s = hidden_layer(V, ca.vertcat(x, ca.DM([0.1, 0.0])) / scale)
-    at = np.array([0.3, -0.2])
-    J, s_at = ca.Function("J", [x], [ca.jacobian(W @ s, x), s])(at)
-    V_x = V[:, :2] / scale[:2]
-    found = jacobian_feedback(W=W, V_x=V_x, s=np.array(s_at).ravel(), K=K)
-    np.testing.assert_allclose(found, np.array(J) @ K, rtol=1e-10)
-
-
-def test_a_speed_that_is_not_positive_is_refused():
-    with pytest.raises(ValueError, match="v_x must be positive"):
-        saturated_car_feedback(0.0)

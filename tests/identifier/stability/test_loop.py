@@ -3,21 +3,14 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from identifier.paper.laws import LAWS, DrivingError, Law, filter_rate, weight_rates
-from identifier.paper.laws import euler as euler_step
-from identifier.paper.laws import rk4 as rk4_step
+from identifier.paper.laws import LAWS, DrivingError, filter_rate, weight_rates
 from identifier.paper.network import hidden_layer
 from identifier.stability.loop import (
     INSTANTANEOUS,
     INTEGRAL,
     Loop,
-    euler,
-    exact,
     growth_rate,
-    regressor_gains,
-    rk4,
     root_locus,
-    spectral_radius,
 )
 
 A_D = np.array([[-6.0, 2.5], [-0.7, -4.0]])
@@ -60,7 +53,8 @@ def frozen_identifier(law, leakage_rate, feedback):
     middle = np.hstack([np.array(filter_jacobian(np.zeros(4))), np.zeros((2, 2))])
     bottom = np.hstack([learning, -leakage_rate * np.eye(2)])
     s = np.tanh(V @ x_bar)
-    G = regressor_gains(eta_W=eta_W, eta_V=eta_V, s=s, x_bar=x_bar, W=W)[0]
+    slope = W * (1.0 - s**2)
+    G = eta_W * (s @ s) * np.eye(2) + eta_V * (x_bar @ x_bar) * slope @ slope.T
     return np.vstack([top, middle, bottom]), G
 
 
@@ -82,35 +76,17 @@ def test_a_transpose_forgotten_in_the_gradient_would_be_seen():
     assert np.abs(wrong - jacobian).max() > 1.0
 
 
-@pytest.mark.parametrize(("integrator", "step"), [(euler, euler_step), (rk4, rk4_step)])
-def test_the_integrators_act_on_eigenvalues_as_the_steps_of_the_identifier_act_on_states(
-    integrator, step
-):
+def test_growth_is_that_of_the_powers_of_the_step_or_of_the_matrix_exponential():
     M = Loop(A_d=A_D, forgetting=3.0, law=INTEGRAL, G=40.0 * np.eye(2)).matrix()
-    stepped = np.column_stack([step(lambda s: [M @ s[0]], [e], 0.02)[0] for e in np.eye(6)])
-    radius = np.abs(np.linalg.eigvals(stepped)).max()
-    assert spectral_radius(M, integrator, 0.02) == pytest.approx(radius, rel=1e-12)
+    for step, dt in ((np.eye(6) + 0.02 * M, 0.02), (expm(0.02 * M), None)):
+        radius = np.abs(np.linalg.eigvals(step)).max()
+        assert growth_rate(M, dt) == pytest.approx(np.log(radius) / 0.02, rel=1e-8)
 
 
-def test_the_exact_integrator_is_the_matrix_exponential():
-    M = Loop(A_d=A_D, forgetting=3.0, law=INTEGRAL, G=4000.0 * np.eye(2)).matrix()
-    radius = np.abs(np.linalg.eigvals(expm(0.02 * M))).max()
-    assert spectral_radius(M, exact, 0.02) == pytest.approx(radius, rel=1e-10)
-    assert growth_rate(M) == pytest.approx(np.log(radius) / 0.02, rel=1e-8)
-
-
-def test_a_law_gives_the_coefficients_of_its_driving_error_and_one_that_drives_away_is_refused():
+def test_a_law_gives_the_coefficients_of_its_driving_error():
     assert LAWS["integral"].error(0.2) == INTEGRAL == (1.0, 0.0)
     assert LAWS["instantaneous"].error(0.2) == INSTANTANEOUS == (0.0, 1.0)
     assert LAWS["pi_lead"].error(0.2) == DrivingError(1.0, 0.2) == (1.0, 0.2)
-    with pytest.raises(ValueError, match="positively"):
-        Law(name="away", z=-1.0, xi=1.0)
-    with pytest.raises(ValueError, match="positively"):
-        Law(name="nothing")
-    with pytest.raises(ValueError, match="positively"):
-        Law(name="unknown", z=float("nan"))
-    with pytest.raises(ValueError, match="leakage"):
-        Loop(A_d=A_D, forgetting=3.0, law=INTEGRAL, G=np.eye(2), leakage=-0.1)
 
 
 def test_the_root_locus_begins_at_the_poles_of_the_open_loop_and_keeps_its_center():

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 from scipy.linalg import eigvals
 
-from benchmarks.limits import integral_limit
 from identifier.paper.laws import DrivingError
-from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, euler, exact, growth_rate, rk4
+from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, growth_rate
 from identifier.stability.margins import gain_margin, phase_margin
+from tests.identifier.stability.limits import integral_limit
 
 
 def scalar_loop(
@@ -118,24 +118,23 @@ def test_the_instantaneous_law_too_has_a_gain_limit_where_error_dynamics_are_not
 
 
 @pytest.mark.parametrize("law", [INTEGRAL, INSTANTANEOUS, DrivingError(1.0, 0.05)])
-@pytest.mark.parametrize(("integrator", "dt"), [(exact, None), (euler, 0.01)])
-def test_eigenvalues_and_python_control_find_the_same_margins(law, integrator, dt):
+@pytest.mark.parametrize("dt", [None, 0.01])
+def test_eigenvalues_and_python_control_find_the_same_margins(law, dt):
     a, lam, g, leakage = 6.0, 9.0, 500.0, 0.2
     loop = Loop(A_d=-a * np.eye(2), forgetting=lam, law=law, G=g * np.eye(2), leakage=leakage)
     transfer = scalar_loop(a=a, lam=lam, g=g, law=law, leakage=leakage, dt=dt)
     gain, phase, at_limit, _ = scalar_margins(transfer)
-    found = gain_margin(loop, integrator, 0.01)
+    found = gain_margin(loop, dt)
     assert found.factor == pytest.approx(gain, rel=1e-6)
     if np.isfinite(gain):
         assert found.frequency == pytest.approx(at_limit, rel=1e-6)
-    assert phase_margin(loop, integrator, 0.01) == pytest.approx(phase, rel=1e-6)
+    assert phase_margin(loop, dt) == pytest.approx(phase, rel=1e-6)
 
 
-def test_runge_kutta_keeps_the_phase_margin_and_euler_loses_some():
+def test_euler_loses_some_of_the_phase_margin():
     loop = Loop(A_d=-10 * np.eye(2), forgetting=10.0, law=INTEGRAL, G=0.287 * 1e4 * np.eye(2))
     assert phase_margin(loop) == pytest.approx(60.0, abs=0.03)
-    assert phase_margin(loop, rk4, 0.01) == pytest.approx(phase_margin(loop), abs=1e-3)
-    assert 50.0 < phase_margin(loop, euler, 0.01) < 60.0
+    assert 50.0 < phase_margin(loop, 0.01) < 60.0
 
 
 def test_an_unstable_loop_has_no_margin():

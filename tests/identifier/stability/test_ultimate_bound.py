@@ -92,7 +92,6 @@ def best_printed(*, w_bar, n_h, eta_W, rho_W):
     operation = Operation(
         n_h=n_h,
         dt=0.01,
-        integrator="exact",
         bandwidth=1.0,
         disturbance=Disturbance(residual=w_bar),
         needed_force=1.0,
@@ -103,6 +102,7 @@ def best_printed(*, w_bar, n_h, eta_W, rho_W):
     return {entry.name: entry.value for entry in entries}["printed_bound"]
 
 
+@pytest.mark.heavy
 def test_the_best_scale_of_the_printed_bound_is_found_by_a_search_too():
     numbers = {"n_h": 6, "eta_W": 3.0, "rho_W": 0.8}
     found = min(

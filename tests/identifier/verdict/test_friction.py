@@ -9,7 +9,6 @@ from identifier.axle import AxleIdentifier
 from identifier.prediction import predict
 from identifier.run import identify
 from identifier.verdict import calibrated, judge_prediction, road_friction
-from identifier.verdict.friction import _mixed, filtered
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
 from models.plant import Plant
@@ -67,16 +66,6 @@ def test_the_road_that_taught_is_told_as_such(tires, same):
     assert found.unexplained.max() < 0.5
 
 
-def test_a_band_that_nobody_calibrated_tells_no_friction(tires, wetter):
-    unchecked = tires.band.calibrated_by(None)
-    assert tires.band.calibrated and not unchecked.band.calibrated
-    assert "band: calibrated on the drive" in tires.summary()
-    assert "not calibrated; run.tire" in unchecked.summary()
-    with pytest.raises(ValueError, match=r"friction\(\) wants a calibrated band"):
-        predict(unchecked, wetter).friction()
-    assert predict(unchecked, wetter).verdict.friction is None
-
-
 def test_what_came_later_changes_nothing_that_was_told(tires, wetter):
     whole = road_friction(tires, wetter)
     part = road_friction(tires, wetter.between(0.0, DROP + 4.0))
@@ -104,22 +93,11 @@ def test_a_banked_road_is_taken_off_and_the_verdict_tells_the_same(tires):
     assert road.text in [one.text for one in prediction.verdict.findings]
 
 
-def test_a_gentle_drive_tells_nothing(tires):
-    found = road_friction(tires, driven(6, Friction(scale=0.5), 0.005))
-    assert found.roads == () and not found.unchanged
-
-
 def test_more_friction_is_told_where_the_grip_was_learnt_alone(same):
     wet = taught(driven(5, Friction(scale=0.5), 0.05))
     (road,) = road_friction(wet, same).roads
     assert 1.4 < road.ratio < 2.2  # beyond what was learnt the curve is a guess
     assert road_friction(taught(driven(3, amplitude=0.012)), same).roads == ()
-
-
-def test_forces_that_no_friction_makes_are_told_as_such(tires, same):
-    mirrored = replace(same, v_y=-same.v_y)
-    found = road_friction(tires, mirrored)
-    assert found.unexplained.max() > 0.9
 
 
 def test_the_verdict_of_a_prediction_names_the_road(tires, wetter, same):
@@ -130,40 +108,3 @@ def test_the_verdict_of_a_prediction_names_the_road(tires, wetter, same):
     assert {one.code for one in slippery.findings if one.refuses} == {"force_missed"}
     assert "another_road" in [one.code for one in slippery.findings]
     assert "another_road" not in [one.code for one in judge_prediction(tires, same).findings]
-
-
-def test_tires_on_another_road_keep_their_stiffness(tires):
-    alpha = np.array([0.001, 0.02, 0.1])
-    half = tires.at_friction(0.5)
-    np.testing.assert_allclose(half.force(0.5 * alpha), 0.5 * tires.force(alpha), rtol=1e-12)
-    np.testing.assert_allclose(half.stiffness, tires.stiffness, rtol=1e-12)
-    np.testing.assert_allclose(half.known_slip, 0.5 * tires.known_slip, rtol=1e-9)
-    for ratio in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="ratio must be positive"):
-            tires.at_friction(ratio)
-
-
-def test_a_segment_begins_where_it_is_sure_and_ends_where_it_is_not_likely():
-    """Windows of a road, of half its friction, and of the road again, without noise."""
-    grid = np.log([0.5, 1.0, 2.0])
-    t = 0.15 * np.arange(600)
-    half = (t > 30.0) & (t < 60.0)
-    away = np.full((3, t.size, 2), 0.2)
-    away[0, half], away[1, ~half] = 0.0, 0.0
-    slope, variance = np.zeros((3, t.size, 2)), np.full((t.size, 2), 0.05**2)
-    (road,) = filtered(t, grid, away, slope, variance).roads
-    assert 30.0 < road.first < 30.8 and 59.5 < road.last < 60.8
-    assert road.ratio == pytest.approx(0.5, abs=0.02)
-
-
-def test_a_road_that_begins_takes_over_what_is_known_of_the_zeros(rng):
-    p, stays = np.array([0.2, 0.5, 0.1, 0.2]), np.array([[0.9], [0.6], [0.2]])
-    zero, doubt = rng.normal(size=(3, 2)), rng.uniform(0.1, 0.4, size=(3, 2))
-    mean, variance = _mixed(p, zero, doubt, stays)
-    roads = rng.choice(3, size=400_000, p=p[:3] / p[:3].sum())  # the last is none of them
-    before = zero[roads] + np.sqrt(doubt[roads]) * rng.normal(size=(roads.size, 2))
-    for k in range(3):
-        own = zero[k] + np.sqrt(doubt[k]) * rng.normal(size=before.shape)
-        drawn = np.where(rng.random((roads.size, 1)) < stays[k], own, before)
-        np.testing.assert_allclose(mean[k], drawn.mean(axis=0), atol=0.01)
-        np.testing.assert_allclose(variance[k], drawn.var(axis=0), rtol=0.02)

@@ -5,7 +5,7 @@ import pytest
 
 from identifier.verdict.motion import (
     Evidence,
-    Windows,
+    brisk_windows,
     clean_rms,
     impulse_signals,
     lateral_noise,
@@ -13,6 +13,7 @@ from identifier.verdict.motion import (
     noise_variance,
 )
 from models.recordings import Recording
+from models.recordings.evidence import Windows
 from models.vehicle import GRAVITY, sedan
 
 CAR, DT = sedan(), 0.01
@@ -27,19 +28,19 @@ def recording(**others):
 
 def test_windows_overlap_by_half_and_lie_in_what_counts():
     driven = recording(v_x=np.where((T >= 5.0) & (T < 5.005), 2.9, 15.0))
-    windows = Windows.of(driven, 3.0)
+    windows = brisk_windows(driven, 3.0)
     assert (windows.n, windows.duration) == (30, pytest.approx(0.3))
     assert set(np.diff(windows.starts)) == {15, 45}, "one sample is slow: two windows fall out"
     left = windows.starts[(windows.starts < 500) & (windows.starts + 30 >= 500)]
     assert left.size == 0
     assert windows.starts[-1] + 30 <= T.size - 1 < windows.starts[-1] + 45
-    wide = Windows.where(np.ones(T.size, dtype=bool), driven, 1.0, overlapping=4)
+    wide = Windows.where(np.ones(T.size, dtype=bool), driven, 1.0, every=25)
     assert (wide.n, int(np.diff(wide.starts).max())) == (100, 25)
     assert len(Windows.where(np.ones(T.size, dtype=bool), driven, 60.0)) == 0
 
 
 def test_means_and_rates_over_windows_are_those_of_the_integral():
-    windows = Windows.of(recording(), 3.0)
+    windows = brisk_windows(recording(), 3.0)
     begin, end = T[windows.starts], T[windows.starts + windows.n]
     square = (end**3 - begin**3) / 3.0 / 0.3
     np.testing.assert_allclose(windows.mean(T**2), square, atol=2e-5)
@@ -56,7 +57,7 @@ def test_the_force_that_motion_shows_is_newtons():
     v_y_dot = (F_f + F_r) / CAR.mass - 15.0 * r
     v_y = np.concatenate([[0.0], np.cumsum(0.5 * (v_y_dot[1:] + v_y_dot[:-1]) * DT)])
     driven = recording(v_y=v_y, r=r, a_y=(F_f + F_r) / CAR.mass)
-    windows = Windows.of(driven, 3.0)
+    windows = brisk_windows(driven, 3.0)
     loads = np.array(CAR.axle_loads)
     true = windows.mean(np.column_stack([F_f, F_r])) / loads
     np.testing.assert_allclose(measured_force(driven, CAR, windows), true, atol=1e-5)
@@ -68,7 +69,7 @@ def test_the_force_that_motion_shows_is_newtons():
 
 
 def test_noise_leaves_the_variance_that_is_told(rng):
-    windows = Windows.of(recording(), 3.0)
+    windows = brisk_windows(recording(), 3.0)
     found, lateral = [], []
     for _ in range(30):
         v_y, r = (s * rng.standard_normal(T.size) for s in (0.03, 0.004))
@@ -91,28 +92,11 @@ def of(measured, modelled, noise=(0.0, 0.0)):
 def test_what_is_missed_is_a_share_of_the_force_with_the_noise_taken_off():
     measured = np.column_stack([np.full(100, 0.5), np.linspace(0.0, 1.0, 100)])
     found = of(measured, measured - [0.05, 0.0], noise=(0.0009, 0.0))
-    assert found.missed == pytest.approx([np.sqrt(0.05**2 - 0.0009) / 0.5, 0.0])
+    assert found.model_error == pytest.approx([np.sqrt(0.05**2 - 0.0009) / 0.5, 0.0])
     assert found.force == pytest.approx(
         [np.sqrt(0.25 - 0.0009), np.sqrt(np.mean(measured[:, 1] ** 2))]
     )
     assert found.peak == pytest.approx([0.5 - 3.0 * 0.03, 0.98])
     nothing = np.zeros((9, 2))
-    assert of(nothing, nothing).missed.tolist() == [1.0, 1.0]
+    assert of(nothing, nothing).model_error.tolist() == [1.0, 1.0]
     assert clean_rms(nothing, np.ones(2)).tolist() == [0.0, 0.0]
-
-
-def test_the_segment_in_which_most_is_missed_is_left_out_where_all_else_is_explained():
-    measured = np.column_stack([np.full(100, 0.5), np.full(100, 0.1)])
-    modelled = measured.copy()
-    modelled[60:80, 1] -= 0.05  # half of the rear's force, more of it than
-    modelled[20:22, 0] -= 0.1  # a fifth of the front's
-    found = of(measured, modelled)
-    rest, left_out = found.but_a_segment()
-    assert left_out is not None and left_out[0] <= 60 and left_out[1] >= 80
-    assert left_out[1] - left_out[0] == 30
-    assert len(rest.windows) == 70 and rest.missed[1] == 0.0 < rest.missed[0]
-    first, last = left_out
-    np.testing.assert_array_equal(rest.windows.starts, 15 * np.r_[0:first, last:100])
-    modelled[:, 0] -= 0.05  # a tenth of it everywhere: nothing is left out
-    assert of(measured, modelled).but_a_segment()[1] is None
-    assert of(measured, measured).but_a_segment()[1] is None

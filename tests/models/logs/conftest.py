@@ -1,6 +1,9 @@
 import numpy as np
 import pytest
 
+from models.logs.door import open_log
+from models.logs.log import RecordingError
+
 
 @pytest.fixture
 def drive():
@@ -18,3 +21,13 @@ def assert_equal(channels, t, columns):
         assert np.array_equal(channel.values, values, equal_nan=True), channel.name
         assert channel.t.dtype == channel.values.dtype == np.float64
         assert np.all(np.diff(channel.rows) == 1) and channel.rows[0] in (1, 2)
+
+
+def refusal(path, dbc=None):
+    """The one line with which a log is refused, on opening or on reading."""
+    with pytest.raises(RecordingError) as caught:
+        log = open_log(path, dbc)
+        log.read([one.name for one in log.listed()])
+    text = str(caught.value)
+    assert "\n" not in text and len(text) < 700
+    return text

@@ -9,6 +9,7 @@ import pytest
 from models.logs.can import _group_of, _raw_values, _values_of
 from models.logs.door import open_log
 from models.logs.log import RecordingError
+from tests.models.logs.conftest import refusal
 from tests.models.logs.drive_in_every_format import DBC, write_can, write_mdf_bus
 
 can = pytest.importorskip("can")
@@ -47,14 +48,6 @@ def dbc(folder, text=CAR, encoding="cp1252"):
     path = folder / "car.dbc"
     path.write_bytes(text.encode(encoding))
     return path
-
-
-def refusal(path, base=None):
-    with pytest.raises(RecordingError) as caught:
-        log = open_log(path, base)
-        log.read([one.name for one in log.listed()])
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
 
 
 def random_signal(rng, number):
@@ -133,14 +126,6 @@ def test_a_dbc_tells_the_signals_their_units_and_which_frames_hold_them(ending, 
     assert np.allclose(second.t, 0.02 * k[1::2] + 0.002, rtol=0, atol=1e-9)
 
 
-def test_signals_of_one_frame_share_its_times_and_multiplexed_ones_have_theirs(tmp_path):
-    log = open_log(car_log(tmp_path / "log.blf"), dbc(tmp_path))
-    names = ["Steering.Angle", "Steering.Rate", "Muxed.Page", "Muxed.First", "Muxed.Second"]
-    angle, rate, page, first, second = log.read(names)
-    assert angle.t is rate.t and angle.rows is rate.rows
-    assert len({id(one.t) for one in (angle, page, first, second)}) == 4
-
-
 def test_values_that_the_dbc_names_as_no_number_are_nan(tmp_path):
     raw = [5, 32767, 32766, 1, -5]
     messages = [(k * 0.01, 100, struct.pack("<h", one) + bytes(6), {}) for k, one in enumerate(raw)]
@@ -192,23 +177,6 @@ def test_frames_of_several_groups_are_in_order_and_those_without_data_counted(tm
         "11 error and remote frames are not read",
         "3 other frames are not read",
     }
-
-
-def test_frames_of_a_bus_in_mdf_lie_on_disk_where_they_are_many(tmp_path, drive, monkeypatch):
-    path = bus(tmp_path, *drive)
-    monkeypatch.setattr("models.logs.growing.LONGEST_IN_MEMORY", 200)
-    log = open_log(path, path.with_suffix(".dbc"))
-    for _, (group, _, _) in log.channels:
-        for kept in (group.t, group.data):
-            while not isinstance(kept, np.memmap) and kept.base is not None:
-                kept = kept.base
-            assert isinstance(kept, np.memmap)
-    assert np.array_equal(log.read(["Frame_r.r"])[0].values, drive[1]["r"])
-
-
-def test_a_log_of_frames_without_dbc_asks_for_one(tmp_path, drive):
-    path = write_can(tmp_path / "log.asc", *drive)
-    assert "give the DBC file of their signals, in the [file] of log.toml" in refusal(path)
 
 
 def test_a_dbc_that_knows_none_of_the_frames_is_refused(tmp_path, drive):

@@ -1,6 +1,5 @@
 """One drive through every format: the same doubles, the same clock; what is wrong is one line."""
 
-import builtins
 import gzip
 import importlib
 import random
@@ -15,7 +14,7 @@ from models.logs import can
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.logs.memory import open_arrays
-from tests.models.logs.conftest import assert_equal
+from tests.models.logs.conftest import assert_equal, refusal
 from tests.models.logs.drive_in_every_format import FORMATS, UNITS, write
 
 BINARY = [name for name in FORMATS if name != "CSV"]
@@ -28,16 +27,6 @@ INSTALLED = {
     "can": ["cantools", "python-can"],
 }  # fmt: skip
 LIBRARIES = ("pyarrow", "h5py", "asammdf", "rosbags", "can", "cantools")
-
-
-def refusal(path, dbc=None):
-    """The one line with which a log is refused, on opening or on reading."""
-    with pytest.raises(RecordingError) as caught:
-        log = open_log(path, dbc)
-        log.read([one.name for one in log.listed()])
-    text = str(caught.value)
-    assert "\n" not in text and len(text) < 700
-    return text
 
 
 @pytest.mark.parametrize("format", FORMATS)
@@ -121,26 +110,6 @@ def test_a_column_or_run_that_arrays_do_not_have_is_refused():
     assert np.array_equal(log.read(["vx"], "b")[0].values, t[10:])
     with pytest.raises(RecordingError, match="drive: holds one run without a name, so no run 'a'"):
         open_arrays("drive", {"t": t, "vx": t}).read(["vx"], "a")
-
-
-def test_names_of_runs_break_no_line():
-    t = np.arange(20) / 100
-    log = open_arrays("drive", {"t": t, "vx": t, "run": np.repeat(["lap\n1", "lap\n2"], 10)})
-    with pytest.raises(RecordingError, match=r"one of its runs: lap\\n1, lap\\n2$"):
-        log.read(["vx"])
-
-
-def test_no_library_of_an_extra_is_imported_for_a_text(tmp_path, drive, monkeypatch):
-    written = write("CSV", tmp_path, *drive)
-    real = builtins.__import__
-
-    def watched(name, *rest, **more):
-        assert name.partition(".")[0] not in LIBRARIES
-        return real(name, *rest, **more)
-
-    monkeypatch.delitem(sys.modules, "pyarrow", raising=False)  # another test's
-    monkeypatch.setattr(builtins, "__import__", watched)
-    assert open_log(written.path).read(["r"])[0].values.size == 300
 
 
 def test_a_text_is_told_without_importing_the_readers_of_other_formats(tmp_path, drive):

@@ -9,8 +9,7 @@ import pytest
 import scipy.io
 
 from models.logs.door import open_log
-from models.logs.log import RecordingError
-from models.logs.tree import Leaf, _Walk
+from tests.models.logs.conftest import refusal
 from tests.models.logs.drive_in_every_format import write_mat73
 
 T = np.arange(300) / 100
@@ -66,14 +65,6 @@ WRITERS = {
     "7": lambda path, tree: write_5(path, tree, do_compression=True),
     "7.3": write_mat73,
 }
-
-
-def refusal(path):
-    with pytest.raises(RecordingError) as caught:
-        log = open_log(path)
-        log.read([one.name for one in log.listed()])
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
 
 
 @pytest.mark.parametrize("version", WRITERS)
@@ -149,16 +140,6 @@ def test_signals_of_a_matrix_or_of_structs_are_named_and_timed(version, shape, t
     assert [(one.name, one.unit) for one in log.listed()] == names
     (last,) = log.read([names[-1][0]])
     assert np.array_equal(last.values, B) and np.array_equal(last.t, T)
-
-
-@pytest.mark.parametrize("version", WRITERS)
-def test_clocks_of_the_calendar_keep_their_seconds_since_1970(version, tmp_path):
-    late = 1_700_000_000.0
-    tree = {"a": {"t": late + T, "v": A}, "b": {"time_ms": (late + 0.25 + SLOW) * 1e3, "w": SLOW}}
-    log = open_log(WRITERS[version](tmp_path / "log.mat", tree))
-    a, b = log.read(["a.v", "b.w"])
-    assert np.array_equal(a.t, late + T)
-    assert np.allclose(b.t, late + 0.25 + SLOW, rtol=0, atol=3e-7)
 
 
 @pytest.mark.parametrize("version", WRITERS)
@@ -283,30 +264,3 @@ def test_other_hdf5_files_are_read_as_they_are(tmp_path):
     assert log.format == "HDF5"
     assert np.array_equal(log.read(["drive.v"])[0].values, A)
     assert np.array_equal(log.read(["drive.m(:,2)"])[0].values, B)
-
-
-def test_damaged_files_are_called_by_their_format(tmp_path):
-    other, ours = tmp_path / "log.h5", write_mat73(tmp_path / "log.mat", {"t": T, "v": A})
-    with h5py.File(other, "w") as file:
-        file["t"], file["v"] = T, A
-    for path, what in ((other, "an HDF5 file"), (ours, "a MATLAB 7.3 file")):
-        path.write_bytes(path.read_bytes()[:1000])
-        assert f"is not {what}, or is damaged or cut off" in refusal(path)
-
-
-def test_a_struct_of_many_vectors_is_gone_through_a_few_times():
-    """Not once for each of them: of twice as many vectors it would take four times as long."""
-    touched = 0
-
-    class Counted(dict):
-        def items(self):
-            nonlocal touched
-            touched += len(self)
-            return super().items()
-
-    node = Counted(t=Leaf(shape=(300, 1), load=lambda: T[:, None]))
-    node.update({f"v{k}": Leaf(shape=(300, 1), load=lambda: A[:, None]) for k in range(500)})
-    walk = _Walk()
-    walk.struct(node, "", ())
-    assert len(walk.signals) == 500
-    assert touched < 20 * len(node)

@@ -7,7 +7,7 @@ import pytest
 
 from models.logs import mdf
 from models.logs.door import open_log
-from models.logs.log import RecordingError
+from tests.models.logs.conftest import refusal
 
 asammdf = pytest.importorskip("asammdf")
 T = np.arange(600) / 100
@@ -32,14 +32,6 @@ def signal(name, values, t, unit="", **more):
     return asammdf.Signal(values, t, name=name, unit=unit, **more)
 
 
-def refusal(path):
-    with pytest.raises(RecordingError) as caught:
-        log = open_log(path)
-        log.read([one.name for one in log.listed()])
-    assert "\n" not in str(caught.value)
-    return str(caught.value)
-
-
 @pytest.mark.parametrize("version", ["3.30", "4.10"])
 def test_groups_have_their_own_rates_and_a_name_in_two_of_them_tells_the_group(version, tmp_path):
     gap = np.concatenate([SLOW[:100], SLOW[150:]])
@@ -62,12 +54,6 @@ def test_groups_have_their_own_rates_and_a_name_in_two_of_them_tells_the_group(v
     assert np.array_equal(steer.t, SLOWEST) and np.array_equal(steer.values, A[:60])
     assert np.array_equal(ay.t, T) and np.array_equal(ay.values, A)
     assert np.array_equal(v.t, gap)  # a gap stays one
-
-
-def test_channels_of_a_group_share_one_clock(tmp_path):
-    path = write(tmp_path / "log.mf4", ("g", [signal("a", A, T), signal("b", A, T)]))
-    a, b = open_log(path).read(["a", "b"])
-    assert a.t is b.t
 
 
 @pytest.mark.parametrize("version", ["3.30", "4.10"])
@@ -162,15 +148,6 @@ def test_many_channels_are_read_in_portions_of_the_memory(tmp_path, monkeypatch)
     read = open_log(path).read([f"s{k}" for k in (8, 1, 4, 0)])
     for k, channel in zip((8, 1, 4, 0), read, strict=True):
         assert np.array_equal(channel.values, A + k)
-
-
-def test_rounded_stamps_are_mended_and_it_is_said(tmp_path):
-    rounded = np.repeat(np.arange(60) / 10, 10)
-    path = write(tmp_path / "log.mf4", ("g", [signal("a", A, rounded)]))
-    log = open_log(path)
-    (channel,) = log.read(["a"])
-    assert np.allclose(np.diff(channel.t), 0.01)
-    assert "is rounded to 0.1 s" in log.notes[0]
 
 
 def test_a_group_whose_master_is_no_time_is_left_out(tmp_path):

@@ -136,20 +136,6 @@ def test_a_log_with_units_is_proposed_whole():
     assert set(signals) == {"v_x", "v_y", "r", "delta_f", "a_y"}
 
 
-def test_units_at_the_end_of_names_hide_no_signal():
-    found = proposed(
-        ("vehicle_speed_mps", "m/s", 20 + WAVE),
-        ("vy_mps", "m/s", WAVE),
-        ("yaw_rate_radps", "rad/s", 0.3 * WAVE),
-        ("road_wheel_angle_rad", "rad", 0.1 * WAVE),
-        ("lat_accel_mps2", "m/s^2", WAVE),
-    )
-    assert found.unsure() == ()
-    assert {one.channel[0].split("_")[0] for one in found.signals().values()} == {
-        *("vehicle", "vy", "yaw", "road", "lat")
-    }
-
-
 def test_of_two_that_are_equal_none_is_taken():
     found = proposed(("GPS Speed", "km/h", WAVE), ("Ground Speed", "km/h", WAVE))
     assert not found.is_sure("v_x") and "v_x" in found.unsure()
@@ -318,11 +304,6 @@ def test_a_steering_that_stays_near_in_rad_is_that_of_road_wheels_if_its_name_al
     assert told.hand
 
 
-def test_a_road_wheel_without_a_unit_that_goes_too_far_is_a_hand_wheel_in_degrees():
-    far = proposed(("RoadWheelAngle", "", 400 * WAVE)).guesses["delta_f"]
-    assert far.hand and far.unit == "deg" and "as a hand wheel does in deg" in far.why
-
-
 def test_a_rate_whose_unit_is_an_angles_is_proposed_per_second():
     guess = proposed(("Yaw Rate", "deg", 20 * WAVE)).guesses["r"]
     assert guess.unit == "deg/s" and guess.confidence < LOGS_CHOSEN.names_sure
@@ -343,17 +324,6 @@ def test_a_word_and_a_unit_of_what_no_rule_knows_are_named_and_never_taken():
             ("Lateral Target", "m/s", WAVE), ("Seitenwind", "m/s", WAVE),
             ("dérive pneu", "deg", WAVE), ("Transmission", "km/h", WAVE)]  # fmt: skip
     assert not any({"v_y", "beta"} & set(proposed(one).guesses) for one in none)
-
-
-def test_the_programs_of_stanford_are_understood_but_for_the_ratio():
-    found = proposed(
-        ("vxCG", "m/s", 20 + WAVE), ("vyCG", "m/s", WAVE), ("ayCG", "m/s2", WAVE),
-        ("axCG", "m/s2", WAVE), ("yawRate", "deg/s", WAVE), ("sideSlip", "deg", WAVE),
-        ("handwheelAngle", "deg", 90 * WAVE),
-    )  # fmt: skip
-    assert (
-        set(found.signals()) == {"v_x", "v_y", "r", "a_y", "a_x"} and found.guesses["delta_f"].hand
-    )
 
 
 def test_a_side_and_the_number_of_an_axle_are_a_corner():

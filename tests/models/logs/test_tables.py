@@ -65,6 +65,7 @@ def outcome(path, arrow):
     ]
 
 
+@pytest.mark.sweep("MoTeC", "UTF-16", "quoted decimal commas between commas")
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_pyarrow_changes_neither_bits_nor_messages_however_a_text_is_spoilt(
     tmp_path, monkeypatch, dialect
@@ -111,22 +112,6 @@ print("pyarrow" in sys.modules, "pandas" in sys.modules)
     assert ran.stdout == "True False\n", ran.stderr
 
 
-def test_parquet_of_times_before_all_clocks_is_refused(tmp_path):
-    path = tmp_path / "log.parquet"
-    dates = np.array(["0001-01-01T00:00:00"] * 30, dtype="datetime64[s]")
-    pyarrow.parquet.write_table(pyarrow.table({"time": dates, "v": np.ones(30)}), path)
-    with pytest.raises(RecordingError, match="no column is a time that rises"):
-        open_log(path).read(["v"])
-
-
-def test_parquet_with_a_column_twice_is_refused(tmp_path):
-    t, path = np.arange(20.0) / 100.0, tmp_path / "log.parquet"
-    table = pyarrow.table([t, t, t], names=["t", "vx", "vx"])
-    pyarrow.parquet.write_table(table, path)
-    with pytest.raises(RecordingError, match=r"log.parquet: column vx appears more than once"):
-        open_log(path).read(["vx"])
-
-
 def test_a_column_of_parquet_that_stands_twice_is_listed_as_in_a_text(tmp_path):
     t = np.arange(50.0) / 100.0
     holed = pyarrow.array([None if k % 2 else float(k) for k in range(50)])
@@ -139,20 +124,6 @@ def test_a_column_of_parquet_that_stands_twice_is_listed_as_in_a_text(tmp_path):
         ("v (2)", 50),
     ]
     assert np.array_equal(log.read(["w"])[0].values, t)
-
-
-def test_listing_parquet_reads_the_first_rows_of_all_columns_at_once(tmp_path, monkeypatch):
-    t = np.arange(50.0) / 100.0
-    table = pyarrow.table({f"s{k}": t for k in range(100)} | {"t": t})
-    pyarrow.parquet.write_table(table, tmp_path / "log.parquet")
-    opened = []
-    real = pyarrow.parquet.ParquetFile
-    monkeypatch.setattr(
-        "pyarrow.parquet.ParquetFile",
-        lambda path, **words: opened.append(path) or real(path, **words),
-    )
-    assert len(open_log(tmp_path / "log.parquet").listed()) == 100
-    assert len(opened) <= 3  # its schema, its first rows, its clock
 
 
 @pytest.mark.parametrize("categories", [False, True])
@@ -168,13 +139,6 @@ def test_an_empty_run_cell_is_a_run_without_a_name_in_every_table(tmp_path, cate
         log = open_log(tmp_path / name)
         assert log.runs() == ("lap", "")
         assert np.array_equal(log.read(["vx"], "")[0].values, t[20:])
-
-
-def test_runs_that_are_numbers_are_named_as_they_are_written(tmp_path):
-    t = np.arange(20.0) / 100.0
-    table = pyarrow.table({"t": t, "vx": t, "run": np.repeat([1.0, 2.5], 10)})
-    pyarrow.parquet.write_table(table, tmp_path / "log.parquet")
-    assert open_log(tmp_path / "log.parquet").runs() == ("1.0", "2.5")
 
 
 def test_without_pyarrow_a_text_is_read_all_the_same(tmp_path, monkeypatch):
@@ -247,6 +211,7 @@ def test_too_little_memory_or_room_to_unpack_is_no_fault_of_the_log(tmp_path):
     assert "there is no room in" in str(caught.value) and "damaged" not in str(caught.value)
 
 
+@pytest.mark.heavy
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="counts the pages of Linux")
 def test_memory_does_not_grow_with_the_log(tmp_path):
     """Anonymous memory after reading; what is mapped from disk the system can drop."""

@@ -133,12 +133,6 @@ def test_loads_come_in_every_unit(tmp_path, unit, newton):
     assert nominal_load == pytest.approx(4000.0 * newton, rel=1e-12)
 
 
-def test_only_units_that_are_needed_are_asked_for(tmp_path):
-    stone = f"[UNITS]\nFORCE = 'stone'\n{PLAIN}"
-    assert "FORCE = 'stone'" in complaint(tmp_path, stone)
-    MagicFormula.from_tir(written(tmp_path, stone.replace("FORCE", "PRESSURE")))
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -208,19 +202,6 @@ def test_a_file_of_another_version_is_told_by_its_coefficients_whatever_it_calls
     assert called in message
 
 
-def test_all_marks_of_another_version_are_named_at_once(tmp_path):
-    marks = "PPY5 = -0.6\nNOMPRES = 2\n[LATERAL_COEFFICIENTS]\nPKY4 = 2"
-    assert complaint(tmp_path, f"{PLAIN}\n{marks}").startswith("PKY4 = 2, PPY5 = -0.6, NOMPRES = 2")
-
-
-def test_a_coefficient_of_another_version_that_is_zero_does_nothing(tmp_path):
-    """With PKY4 = 0 a tire of 6.1 would have no cornering stiffness: it is a list of all names."""
-    listed = "FITTYP = 6\nPKY4 = 0\nPKY5 = 0\nPPY5 = 0.0\nNOMPRES = 0"
-    plain = MagicFormula.from_tir(written(tmp_path, PLAIN))
-    tire = MagicFormula.from_tir(written(tmp_path, f"{PLAIN}\n{listed}"))
-    assert tire.coefficients == plain.coefficients
-
-
 def test_the_pressure_coefficients_of_pac2002_are_no_mark_of_another_version(tmp_path):
     """PPX1-4 and PPY1-4 beside IP and IP_NOM are PAC2002's own; only PPY5 is not."""
     own = edited(IP="2", IP_NOM="2", PPX1="0.5", PPY1="-0.4", PPY4="0.1")
@@ -271,16 +252,6 @@ def test_a_negative_lateral_friction_is_the_same_tire(tmp_path):
     S = D * 0.2 * cos(atan(12.0 * alpha)) * sin(1.9 * atan(-10.0 * kappa))
     assert tire.forces(-alpha, kappa, gamma, F_z).F_y == pytest.approx(G * F_0 + S, rel=1e-6)
     assert tire.cornering_stiffness(F_z) > 0.0
-
-
-def test_a_negative_use_mode_mirrors_the_tire(tmp_path):
-    lopsided = {"PHY1": "0.01", "PVY1": "0.02", "RHX1": "0.003"}
-    plain = MagicFormula.from_tir(written(tmp_path, edited(**lopsided, USE_MODE="14")))
-    tire = MagicFormula.from_tir(written(tmp_path, edited(**lopsided, USE_MODE="-14")))
-    assert tire.side == plain.side == "left"
-    there, here = (one.forces(a, 0.0, 0.0, 4000.0).F_y for one, a in ((plain, -0.03), (tire, 0.03)))
-    assert here == pytest.approx(-there)
-    assert plain.forces(0.03, 0.0, 0.0, 4000.0).F_y != pytest.approx(here, rel=1e-3)
 
 
 def test_all_missing_coefficients_are_named_at_once(tmp_path):
@@ -335,14 +306,6 @@ def test_two_lines_that_disagree_are_refused(tmp_path, key, lines):
     assert f"{key} has different values in lines " in complaint(tmp_path, f"{lines}\n{PLAIN}")
 
 
-def test_a_word_said_twice_is_one_word(tmp_path):
-    twice = "PCY1 = 1.30 $ again\nTYRESIDE = 'RIGHT'\nTYRESIDE = Right\n"
-    twice += "[UNITS]\nFORCE = 'kN'\nFORCE = 'KN'"
-    tire = MagicFormula.from_tir(written(tmp_path, f"{twice}\n{PLAIN}"))
-    assert tire.side == "right"
-    assert tire.coefficients.FNOMIN == 4e6
-
-
 @pytest.mark.parametrize(
     ("line", "says"),
     [
@@ -371,17 +334,6 @@ def test_a_symmetric_tire_loses_conicity_and_plysteer(tmp_path):
     tire = MagicFormula.from_tir(written(tmp_path, edited(**lopsided, TYRESIDE="SYMMETRIC")))
     assert plain.forces(0.0, 0.0, 0.0, 4000.0).F_y != 0.0
     assert tire.forces(0.0, 0.0, 0.0, 4000.0).F_y == 0.0
-
-
-def test_inflation_pressure_scales_stiffness_and_friction(tmp_path):
-    """PAC2002: factors 1 + a dp + b dp², dp = (IP - IP_NOM)/IP_NOM = 0.1."""
-    pressure = {"IP": "220000", "IP_NOM": "200000"}
-    effects = {"PPX1": "0.5", "PPX2": "1", "PPX4": "2", "PPY1": "-0.4", "PPY2": "0.2", "PPY3": "-1"}
-    c = MagicFormula.from_tir(written(tmp_path, edited(**pressure, **effects))).coefficients
-    scaled = (c.PKX1, c.PDX1, c.PKY1, c.PKY2, c.PDY1)
-    assert scaled == pytest.approx((22.0 * 1.06, 1.1 * 1.02, -19.0 * 0.96, 1.9 * 1.02, 0.9))
-    plain = MagicFormula.from_tir(written(tmp_path, edited(**effects))).coefficients
-    assert plain.PKX1 == 22.0
 
 
 def test_a_file_that_is_not_there_is_an_os_error(tmp_path):

@@ -22,6 +22,7 @@ def here(packages):
     return cache(lambda law, single: run(packages[law], "gcc", single=single))
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(("law", "single"), CASES)
 def test_clang_computes_the_bits_of_gcc(law, single, here, packages):
     if shutil.which("clang") is None:
@@ -30,6 +31,7 @@ def test_clang_computes_the_bits_of_gcc(law, single, here, packages):
     assert found.hash == here(law, single).hash
 
 
+@pytest.mark.heavy
 @needs_arm
 @pytest.mark.parametrize(("law", "single"), CASES)
 def test_the_processor_computes_the_bits_of_this_machine_within_its_means(

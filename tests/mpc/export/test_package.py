@@ -20,6 +20,7 @@ SHORT = Problem(horizon=8)
 ALLOWED = {"sqrt", "sqrtf", "floor", "floorf", "memcpy", "memset", "memmove"}
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("single", [0, 1])
 def test_no_compiler_has_anything_to_say(law, single, compiler, packages, write, run):
@@ -30,6 +31,7 @@ def test_no_compiler_has_anything_to_say(law, single, compiler, packages, write,
         assert (answer.returncode, answer.stderr) == (0, ""), source
 
 
+@pytest.mark.heavy
 def test_symbols_begin_with_the_name_and_nothing_is_called_but_roots_and_copies(
     compiler, write, run
 ):
@@ -47,6 +49,7 @@ def test_symbols_begin_with_the_name_and_nothing_is_called_but_roots_and_copies(
         assert {name for name in foreign if not name.startswith("left_mpc_")} <= ALLOWED
 
 
+@pytest.mark.sweep("gcc--ffast-math", "clang--Ofast", "*finite*")
 @pytest.mark.parametrize("flag", ["-Ofast", "-ffast-math", "-ffinite-math-only"])
 def test_fast_math_is_refused(flag, compiler, packages, write, run):
     folder = write(packages["integral"])
@@ -62,6 +65,7 @@ def test_the_same_input_gives_the_same_bytes():
     assert mpc_readme(one, "") == mpc_readme(two, "")
 
 
+@pytest.mark.heavy
 def test_everything_that_goes_in_changes_the_hash():
     tire = prediction_tire(CAR)
     packages = [
@@ -97,6 +101,7 @@ def self_test(folder, run, compiler="gcc", single=0, flags=("-O2", "-ffp-contrac
     return run(str(folder / "self_test"))
 
 
+@pytest.mark.sweep("gcc-axle")
 @pytest.mark.parametrize("law", LAWS)
 def test_steering_is_bit_for_bit_that_of_python_in_double(law, compiler, packages, write, run):
     answer = self_test(write(packages[law]), run, compiler)
@@ -104,6 +109,7 @@ def test_steering_is_bit_for_bit_that_of_python_in_double(law, compiler, package
     assert "largest difference of the steering: 0 rad" in answer.stdout
 
 
+@pytest.mark.sweep("clang-axle")
 @pytest.mark.parametrize("law", LAWS)
 def test_float_passes_the_self_test(law, compiler, packages, write, run):
     answer = self_test(write(packages[law]), run, compiler, single=1)
@@ -127,6 +133,7 @@ def test_the_vectors_are_those_of_a_tracker_that_plans_and_falls_back(packages):
     assert np.abs(v.measured[believed][-30:, 0]).max() < 0.1
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(
     ("file", "pattern", "replacement", "complaint"),
     [

@@ -27,6 +27,7 @@ CAR = sedan()
 INCLUDES = ["-Iinclude", "-Iidentifier/include", "-Impc/include"]
 
 
+@pytest.mark.sweep("gcc-precision0-axle", "clang-precision1-integral")
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("precision", [(0, 0), (1, 0), (0, 1)])
 def test_example_and_handover_have_no_warning_in_any_mix_of_precisions(
@@ -54,6 +55,7 @@ def program(folder, run, compiler="gcc", *, single=0):
     return run(compiler, *words, *c_files(folder, "examples"), "-lm", "-o", "loop", cwd=folder)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(("law", "single"), [("axle", 0), ("inertial", 0), ("inertial", 1)])
 def test_a_car_with_an_accelerometer_keeps_its_lane(law, single, sensing, write_pair, run):
     """The inertial one without a sensor of v_y: the tracker steers by the v_y that is told."""
@@ -69,6 +71,7 @@ def test_a_car_with_an_accelerometer_keeps_its_lane(law, single, sensing, write_
     assert np.abs(np.loadtxt(log, delimiter=",", skiprows=1)[:, 3]).max() < 0.3
 
 
+@pytest.mark.heavy
 def test_what_is_learnt_without_v_y_is_handed_over_whole(sensing, write_pair):
     """Compliance, the share of sway, and the zero of the steering: as Python makes the tire."""
     pair = sensing("inertial")
@@ -91,6 +94,7 @@ def test_what_is_learnt_without_v_y_is_handed_over_whole(sensing, write_pair):
     np.testing.assert_allclose(params["weights"], wanted.weights, rtol=1e-14)
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize(("law", "single"), [("integral", "OFF"), ("axle", "ON")])
 def test_cmake_builds_both_and_the_learning_car_keeps_its_lane(law, single, pairs, write_pair, run):
     folder = write_pair(pairs[law])
@@ -127,7 +131,7 @@ def taught(pairs):
         learner.run(recording)
         return learner
 
-    return Kept(LAWS, make)
+    return Kept(make)
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +148,7 @@ def libraries(pairs, tmp_path_factory):
             put(folder / part, files)
         return joined(folder)
 
-    return Kept(LAWS, make)
+    return Kept(make)
 
 
 def joined(folder):
@@ -235,7 +239,7 @@ def test_a_curve_that_falls_is_no_tire(taught, pairs, libraries):
 
 
 @pytest.mark.parametrize(
-    ("law", "complaint"), [rival("washout", "no tire"), ("magic_formula_ekf", "CurveModel")]
+    ("law", "complaint"), [rival("linear_kf", "no tire"), ("lagged_ekf", "CurveModel")]
 )
 def test_what_cannot_be_handed_over_is_said(law, complaint):
     with pytest.raises(NoHandoverError, match=complaint):
@@ -243,7 +247,7 @@ def test_what_cannot_be_handed_over_is_said(law, complaint):
 
 
 def test_a_pair_holds_each_package_under_its_own_name(pairs):
-    for pair in pairs.values():
+    for pair in (pairs[law] for law in LAWS):
         assert pair.identifier.specialized.name + "_mpc" == pair.tracker.name
         assert pair.tracker.params["delay"] == DELAY
 

@@ -28,6 +28,7 @@ def build(folder, run, single, steps, optimized=SOLVES):
     return str(folder / "hostile")
 
 
+@pytest.mark.heavy
 @pytest.mark.parametrize("steps", [1000, 3000])
 @pytest.mark.parametrize("law", LAWS)
 def test_thousands_of_hostile_measurements_find_nothing(law, steps, packages, write, run):
@@ -43,6 +44,7 @@ def test_thousands_of_hostile_measurements_find_nothing(law, steps, packages, wr
     )
 
 
+@pytest.mark.sweep("*is_number*")
 @pytest.mark.parametrize(
     ("file", "pattern", "replacement", "complaint"),
     [

@@ -36,15 +36,6 @@ def test_a_ladder_is_stretched_exactly(tire, ratio):
     )
 
 
-@pytest.mark.parametrize("ratio", [0.3, 1.7])
-def test_a_model_and_the_tire_made_of_it_are_stretched_alike(learnt, ratio):
-    """The law stands twice: of scales of slip in the model, of their inverses among weights."""
-    weights = at_friction(prediction_tire(learnt), ratio).weights
-    np.testing.assert_allclose(
-        weights, prediction_tire(learnt.at_friction(ratio)).weights, rtol=1e-12
-    )
-
-
 def test_a_network_of_slip_is_stretched_exactly(car, rng):
     method = make_method("integral", car)
     method = replace(method, network=Network(inputs=("v_y", "r", "delta_f")))
@@ -81,11 +72,3 @@ def test_without_a_drop_no_other_friction_is_worth_it(tire, dry):
     ]
     assert np.max(gains) < 8.0
     assert np.min(gains) >= 0.0  # what is known is among what is tried
-
-
-def test_where_nothing_is_seen_the_friction_stays(tire):
-    straight = np.tile([20.0, 0.0, 0.0, 0.0], (60, 1))
-    fit = fit_friction(Judge(0.01), without_offsets(tire), straight)
-    assert abs(np.log(fit.ratio)) < 0.05
-    known = fit_friction(Judge(0.01), without_offsets(tire), straight, known=0.5)
-    assert abs(np.log(known.ratio / 0.5)) < 0.05

@@ -7,7 +7,8 @@ from identifier.axle import AxleIdentifier
 from identifier.run import OnlineIdentifier
 from models.friction import Friction, FrictionChange
 from mpc.cars import DoubleTrackCar
-from mpc.handover.learner import Learner
+from mpc.handover import learner as learner_module
+from mpc.handover.learner import Learner, blended
 from mpc.handover.road import at_friction
 from mpc.handover.supervisor import Supervisor
 from mpc.loop.drive import drive
@@ -22,11 +23,19 @@ SPEED = 27.5  # m/s, 96 % of the limit at friction 0.5
 
 @pytest.fixture(scope="module")
 def drives(car, learnt):
-    """The lane change on the linear tire of the data sheet, and learning."""
+    """The lane change on the linear tire of the data sheet, and learning; jumps of the plan."""
     friction = Friction(changes=(FrictionChange(scale=0.5, at_place=PLACE),))
     identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(car), car, 0.01, learnt)
     learner = Learner(Supervisor(identifier, prediction_tire(learnt)))
-    found = []
+    found, jumps = [], []
+
+    def noted(now, target, share, *, planned, most):
+        tire = blended(now, target, share, planned=planned, most=most)
+        jumps.append(abs(planned(tire) - planned(now)))
+        return tire
+
+    patch = pytest.MonkeyPatch()
+    patch.setattr(learner_module, "blended", noted)
     for tire, beside in ((prediction_tire(car), None), (prediction_tire(learnt), learner)):
         tracker = Tracker(tire, period=0.01, delay=0.06)
         driven = drive(
@@ -40,7 +49,8 @@ def drives(car, learnt):
             learner=beside,
         )
         found.append(driven)
-    return (*found, learner)
+    patch.undo()
+    return (*found, jumps)
 
 
 def test_the_learning_car_stays_where_the_linear_one_leaves(drives):
@@ -58,11 +68,11 @@ def test_the_drop_is_noted_in_time(drives):
 
 
 def test_no_handover_makes_the_plan_jump_more_than_noise_does(drives):
-    _, learning, learner = drives
-    assert len(learner.moves) >= 5
+    _, learning, jumps = drives
+    assert len(jumps) >= 5
     rates = np.diff(learning.command) / learning.period
     usual = np.percentile(np.abs(np.diff(rates)), 99)
-    assert max(move.jump for move in learner.moves) <= min(0.2, usual)
+    assert max(jumps) <= min(0.2, usual)
 
 
 def test_a_preview_changes_nothing_and_tells_the_plan(car, learnt):
@@ -81,17 +91,3 @@ def test_a_preview_changes_nothing_and_tells_the_plan(car, learnt):
     assert asked.tire is tire
     with pytest.raises(ValueError, match="the tracker is built for"):
         asked.previewed_rate(prediction_tire(car))
-
-
-def test_a_preview_writes_no_memory_of_what_steers(learnt):
-    """Neither what is carried nor what was prepared for the next measurement."""
-    tire = prediction_tire(learnt)
-    tracker = Tracker(tire, period=0.01, delay=0.02)
-    kappa, v_x = (np.full(tracker.times.size, value) for value in (0.01, 20.0))
-    tracker.step(Measurement(0.1, 0.0, -0.1, 0.2, kappa, v_x))
-    tracker.prepare(kappa, v_x)
-    instance = tracker.instance
-    every = (*instance.numbers, instance._work, instance.start, instance.steering)
-    before = [one.tobytes() for one in every]
-    tracker.previewed_rate(at_friction(tire, 0.4))
-    assert [one.tobytes() for one in every] == before

@@ -92,12 +92,6 @@ def test_a_road_on_which_all_tires_fit_worse_is_judged_as_any_other(tire):
     assert min(map(len, found.values())) >= 3
 
 
-def test_chi_squares_at_their_baseline_are_no_drop_and_the_same_without_that_are(tire):
-    judge = Formula(tire, true=0.4, least=1.0, slope=6.0)
-    assert look(Road(tire), tire, judge, baseline=1.0).verdict is Verdict.FRICTION
-    assert look(Road(tire), tire, judge, baseline=8.0) is None
-
-
 def test_a_lower_friction_must_explain_well_and_not_only_better(tire):
     """As badly as before at every friction, or well at one: the usual size says what well is."""
     change = look(Road(tire), tire, Formula(tire, true=0.4, least=1.4, slope=9.0), baseline=1.0)
@@ -131,16 +125,6 @@ def test_a_new_friction_is_corrected_by_little_evidence_and_only_for_a_while(tir
     assert (back.verdict, back.road.changed_at) == (Verdict.RECOVERY, 9.0 + 2.1)
 
 
-def test_the_first_base_is_remembered_and_only_where_friction_was_lost(tire):
-    first, second, third = (tire._replace(weights=share * tire.weights) for share in (1, 0.9, 0.8))
-    assert Road(first).on(second) == Road(second)  # nothing was lost
-    lost = Road(first, ratio=0.5, changed_at=3.0).on(second)
-    assert lost.before is first
-    assert (lost.base, lost.ratio, lost.changed_at) == (second, 1.0, 3.0)
-    assert lost.on(third).before is first
-    assert lost._replace(ratio=0.7).on(third).before is first  # lost twice: the first road
-
-
 @pytest.mark.parametrize("size", [1.0, 3.0])
 def test_the_road_before_comes_back_where_it_explains_enough_more(tire, size):
     """16 more than the tire in use, in parts of what is usual; else it stays forgotten."""
@@ -155,23 +139,6 @@ def test_the_road_before_comes_back_where_it_explains_enough_more(tire, size):
     assert change.tire is tire
     assert change.road == Road(tire, changed_at=10.0)
     assert change.before - change.after == pytest.approx(17.0 * size)
-
-
-def test_the_road_before_does_not_come_back_where_chi_square_is_at_its_baseline(tire):
-    wet = at_friction(tire, 0.5)
-    judge = Formula(tire, true=1.0, least=0.1, slope=10.0, count=40.0)  # mean in use 4.9
-    assert look(Road(wet, before=tire), wet, judge, baseline=2.0).verdict is Verdict.RECOVERY
-    assert look(Road(wet, before=tire), wet, judge, baseline=5.0) is None
-
-
-def test_a_change_waits_until_enough_was_seen_for_it(tire):
-    wet = at_friction(tire, 0.5)
-    judge = Formula(tire, true=1.0, least=0.5, slope=20.0)
-    half = Road(tire, 0.5)
-    assert look(half, wet, judge, baseline=1.0, window=seen(0.4)) is None
-    assert look(half, wet, judge, baseline=1.0, window=seen(0.7)).verdict is Verdict.RECOVERY
-    fresh = half._replace(changed_at=9.5)
-    assert look(fresh, wet, judge, baseline=1.0, window=seen(0.4)).verdict is Verdict.CORRECTION
 
 
 def test_a_drop_is_sought_down_to_ice_and_in_the_last_moments_alone(tire):

@@ -45,17 +45,6 @@ def test_heading_is_the_direction_of_the_line_and_curvature_its_rate(path, rng):
     assert np.abs((psi_1 - psi_0) / (2 * h) - path.curvature(s)).max() < 3e-3 * path.peak_curvature
 
 
-def test_curvature_is_that_of_the_circle_through_three_points(path):
-    X, Y = path.X, path.Y
-    a, b = (
-        np.array([X[1:-1] - X[:-2], Y[1:-1] - Y[:-2]]),
-        np.array([X[2:] - X[1:-1], Y[2:] - Y[1:-1]]),
-    )
-    twice_area = a[0] * b[1] - a[1] * b[0]
-    sides = np.hypot(*a) * np.hypot(*b) * np.hypot(*(a + b))
-    assert np.abs(2 * twice_area / sides - path.kappa[1:-1]).max() < 4e-3 * path.peak_curvature
-
-
 def test_curvature_has_no_jump_not_even_where_a_lap_or_the_path_ends(path):
     s = np.linspace(-1.0, path.length + 1.0, 200_000)
     step = s[1] - s[0]
@@ -131,12 +120,6 @@ def test_samples_too_coarse_for_the_turns_are_refused():
     )
     with pytest.raises(PathError, match=r"turn by at most 0.3 rad.*finer than 4.2 m"):
         Path.from_line(line, name="coarse")
-
-
-def test_a_closed_path_must_close():
-    path = Path.from_waypoints(*WAYPOINTS)
-    with pytest.raises(PathError, match="must end as it starts"):
-        Path(**fields_of(path, closed=True))
 
 
 def test_examples_in_the_documentation_are_true():

@@ -2,9 +2,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from mpc.path import PathError
 from mpc.path.courses import Straight, Turn, line_along
-from mpc.path.line import line_from_heading
 
 RIGHT = Turn(radius=20.0, angle=-1.2, easing=8.0)
 
@@ -19,7 +17,7 @@ def test_a_turn_turns_by_its_angle_and_reaches_its_radius():
 
 
 def test_sections_end_where_quadrature_says():
-    line = line_along([Straight(length=10.0), RIGHT, Straight(length=5.0)], spacing=0.25)
+    line = line_along([Straight(length=10.0), RIGHT, Straight(length=5.0)])
 
     def heading(s):
         return (
@@ -32,17 +30,3 @@ def test_sections_end_where_quadrature_says():
     Y = quad(lambda s: np.sin(heading(s)), 10.0, 10.0 + RIGHT.length)[0] + 5.0 * np.sin(-1.2)
     assert (line.X[-1], line.Y[-1]) == pytest.approx((X, Y), abs=1e-7)
     assert line.s[-1] == pytest.approx(10.0 + RIGHT.length + 5.0)
-
-
-@pytest.mark.parametrize(
-    ("build", "message"),
-    [
-        (lambda: Straight(length=0.0), "length of a straight"),
-        (lambda: Straight(length=np.nan), "length of a straight"),
-        (lambda: line_along([Straight(length=5.0)], spacing=0.0), "every 0.0 m"),
-        (lambda: line_from_heading(np.zeros(7), np.zeros(7), 1.0), r"4 n \+ 1 samples"),
-    ],
-)
-def test_sections_that_are_none_are_refused(build, message):
-    with pytest.raises(PathError, match=message):
-        build()

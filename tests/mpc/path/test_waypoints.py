@@ -1,25 +1,13 @@
-from time import process_time
-
 import numpy as np
 import pytest
 
-from mpc.path import Path, PathError
-from mpc.path.waypoints import _smoothed
+from mpc.path import Path
 
 
 def circle(n, radius=30.0, gaps=None):
     gaps = np.ones(n) if gaps is None else gaps
     angle = 2 * np.pi * np.append(0.0, np.cumsum(gaps)[:-1]) / np.sum(gaps)
     return radius * np.cos(angle), radius * np.sin(angle)
-
-
-def test_points_on_a_circle_give_a_circle_however_they_are_spaced(rng):
-    for gaps in (np.ones(40), rng.uniform(0.5, 1.5, 40)):
-        path = Path.from_waypoints(*circle(40, gaps=gaps), closed=True)
-        assert np.hypot(path.X, path.Y) == pytest.approx(30.0, abs=2e-3)
-        assert path.kappa == pytest.approx(1 / 30.0, rel=0.02)
-        assert path.length == pytest.approx(60 * np.pi, rel=1e-4)
-        assert path.lap_turn == pytest.approx(2 * np.pi, abs=1e-9)
 
 
 def test_the_path_of_a_sine_has_its_curvature_and_converges_with_the_way_points():
@@ -43,107 +31,8 @@ def test_the_path_passes_through_every_way_point(rng):
     assert (path.X[-1], path.Y[-1]) == pytest.approx((X[-1], Y[-1]))
 
 
-def test_two_points_are_a_straight():
-    path = Path.from_waypoints([0.0, 30.0], [0.0, 40.0])
-    assert path.length == pytest.approx(50.0)
-    assert path.peak_curvature < 1e-12
-    assert path.psi == pytest.approx(np.arctan2(4.0, 3.0))
-
-
 def test_a_repeated_last_way_point_of_a_ring_is_the_same_ring():
     X, Y = circle(24)
     once = Path.from_waypoints(X, Y, closed=True)
     again = Path.from_waypoints(np.append(X, X[0]), np.append(Y, Y[0] + 1e-12), closed=True)
     np.testing.assert_allclose(again.X, once.X, atol=1e-9)
-
-
-def test_smoothing_takes_the_noise_of_a_survey_out_of_the_curvature(rng):
-    X, Y = circle(380)
-    noisy = X + rng.normal(0, 0.05, 380), Y + rng.normal(0, 0.05, 380)
-    with pytest.raises(PathError, match="smooth or move the way-points"):
-        Path.from_waypoints(*noisy, closed=True)
-    path = Path.from_waypoints(*noisy, closed=True, smoothing=0.05)
-    assert path.kappa == pytest.approx(1 / 30.0, rel=0.05)
-    moved = [path.project(x, y).e_y for x, y in zip(*noisy, strict=True)]
-    assert np.sqrt(np.mean(np.square(moved))) == pytest.approx(0.05, abs=0.01)
-
-
-def test_smoothing_leaves_an_open_path_without_noise_as_it_is(rng):
-    x = np.linspace(0.0, 60.0, 200)
-    y = 0.004 * x**2
-    plain = Path.from_waypoints(x, y)
-    smoothed = Path.from_waypoints(x, y, smoothing=0.01)
-    far = [
-        plain.project(a, b, near=s).e_y
-        for a, b, s in zip(smoothed.X, smoothed.Y, smoothed.s, strict=True)
-    ]
-    assert np.abs(far).max() < 0.05
-    noisy = Path.from_waypoints(x, y + rng.normal(0, 0.02, 200), smoothing=0.02)
-    inside = slice(40, -40)
-    assert noisy.kappa[inside] == pytest.approx(
-        np.interp(noisy.X, plain.X, plain.kappa)[inside], abs=3e-3
-    )
-
-
-@pytest.mark.parametrize("points", [5, 6, 8, 12])
-@pytest.mark.parametrize("distance", [0.05, 0.5, 5.0])
-def test_a_closed_line_of_few_points_keeps_the_distance_that_smoothing_allows(points, distance):
-    X, Y = circle(points)
-    path = Path.from_waypoints(X, Y, closed=True, smoothing=distance)
-    radius = np.hypot(path.X, path.Y)
-    assert radius.min() == pytest.approx(30.0 - distance, rel=0.03)
-    apart = [path.project(x, y).e_y for x, y in zip(X, Y, strict=True)]
-    assert np.sqrt(np.mean(np.square(apart))) == pytest.approx(distance, rel=1e-3)
-
-
-def test_a_closed_line_that_smoothing_would_shrink_to_a_point_is_refused():
-    X, Y = circle(40)
-    rule = r"^way-points: smoothing must be less than 30 m, at which .* a point, it is 31.0$"
-    with pytest.raises(PathError, match=rule):
-        Path.from_waypoints(X, Y, closed=True, smoothing=31.0)
-
-
-@pytest.mark.parametrize("points", [4, 6, 40])
-def test_an_open_line_that_may_move_far_becomes_one_of_constant_bending(points):
-    x = np.linspace(0.0, 90.0, points)
-    path = Path.from_waypoints(x, 5.0 * np.sin(x / 20.0), smoothing=1e3, minimum_radius=1.0)
-    apart = [path.project(a, 5.0 * np.sin(a / 20.0)).e_y for a in x]
-    assert np.abs(apart).max() < 5.0
-
-
-def test_smoothing_ten_thousand_noisy_way_points_takes_a_second(rng):
-    points = np.column_stack(circle(10_000, radius=800.0)) + rng.normal(0, 0.02, (10_000, 2))
-    ring, start = np.vstack((points, points[:1])), process_time()
-    moved = _smoothed(ring, closed=True, distance=0.005, name="way-points")
-    assert process_time() - start < 5.0
-    apart = np.sum((moved - ring)[:-1] ** 2, axis=1)
-    assert np.sqrt(apart.mean()) == pytest.approx(0.005, rel=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("X", "Y", "options", "message"),
-    [
-        ([0.0, 1.0], [0.0], {}, r"\(2,\) and \(1,\)"),
-        ([[0.0, 1.0]], [[0.0, 1.0]], {}, "alike"),
-        ([0.0, 10.0, np.nan], [0.0, 0.0, 0.0], {}, "number 3 is"),
-        (
-            [0.0, 10.0, 10.0, 20.0],
-            [0.0, 1.0, 1.0, 2.0],
-            {},
-            r"numbers 2 and 3 are both \[10.0, 1.0\]",
-        ),
-        ([0.0], [0.0], {}, "at least 2 different way-points, it has 1"),
-        ([], [], {}, "it has 0"),
-        ([0.0, 0.0], [0.0, 0.0], {}, "numbers 1 and 2"),
-        ([0.0, 10.0, 10.0, 0.0], [0.0, 0.0, 10.0, 0.0], {"closed": True}, "at least 4"),
-        ([0.0, 10.0, 0.0], [0.0, 0.0, 0.1], {}, r"tighter than 3.0 m, at s = "),
-        ([0.0, 20.0, 40.0], [0.0, 5.0, 0.0], {"minimum_radius": 500.0}, "tighter than 500"),
-        ([0.0, 20.0], [0.0, 5.0], {"minimum_radius": np.nan}, "minimum_radius must be positive"),
-        ([0.0, 20.0], [0.0, 5.0], {"smoothing": -1.0}, "smoothing must be"),
-        ([0.0, 20.0], [0.0, 5.0], {"spacing": 0.0}, "way-points: spacing must be"),
-        ([0.0, 20.0], [0.0, 5.0], {"spacing": 15.0}, "quarter of the length"),
-    ],
-)
-def test_bad_way_points_are_named(X, Y, options, message):
-    with pytest.raises(PathError, match=message):
-        Path.from_waypoints(X, Y, **options)

@@ -1,7 +1,5 @@
 """Sets of active limits before the interior point: what they find, and where none is tried."""
 
-import ctypes
-
 import numpy as np
 import pytest
 
@@ -58,22 +56,6 @@ def test_a_set_finds_what_a_dense_solver_finds(linear, problem, seed):
     np.testing.assert_allclose(command.plan_u, by_highs(tracker, *at), atol=1e-5)
 
 
-def test_a_set_finds_what_the_interior_point_finds(tire, problem):
-    by_sets = Tracker(tire, problem)
-    alone = Tracker(tire, problem, tolerance=1e-12, max_active_sets=0)
-    at_limit, few = [], 0
-    for seed in range(30):
-        at = near_a_plan(by_sets, seed)
-        alone.instance.state[...] = by_sets.instance.state
-        found, best = solved(by_sets, at), solved(alone, at)
-        assert (found.status, best.status) == (Status.OK, Status.OK)
-        np.testing.assert_allclose(found.plan_u, best.plan_u, atol=1e-5)
-        few += found.iterations <= 3 < best.iterations
-        at_limit.append(np.abs(found.plan_u).max() / problem.limits.steering_rate)
-    assert few > 20
-    assert np.mean(np.array(at_limit) > 0.999) > 0.5  # the cases press against a hard limit
-
-
 def test_angle_and_rate_are_reached_and_kept_at_once(tire, problem):
     tracker = Tracker(tire, problem)
     x0 = np.zeros(tracker.instance.start.size)
@@ -85,17 +67,6 @@ def test_angle_and_rate_are_reached_and_kept_at_once(tire, problem):
     assert np.sum(again.plan_u >= problem.limits.steering_rate * (1.0 - 1e-9)) > 2
 
 
-def test_a_step_says_how_many_rows_it_switched(tire, problem):
-    tracker = Tracker(tire, problem)
-    at = near_a_plan(tracker, 3)
-    iterated(tracker, *at)
-    assert tracker.instance.state["switched"] == 0
-    thrown = at[0].copy()
-    thrown[0] -= 3.0 * np.sign(thrown[0])
-    solve(tracker, thrown, *at[1:])
-    assert tracker.instance.state["switched"] > problem.horizon // 5
-
-
 def test_no_set_is_tried_after_many_rows_switched_or_without_a_plan(tire, problem):
     tracker = Tracker(tire, problem, tolerance=1e-12)
     at = near_a_plan(tracker, 2)
@@ -105,48 +76,7 @@ def test_no_set_is_tried_after_many_rows_switched_or_without_a_plan(tire, proble
     assert tracker.instance.state["switched"] == np.iinfo(np.uint32).max
 
 
-@pytest.fixture
-def counting(tire, problem, monkeypatch):
-    """Make trackers of a C that counts what it factorizes."""
-    source = instance.tracker_source(tire.structure, problem.horizon, single=False)
-    begins = "bool mpc_factorize(mpc_work *work, real R, uint32_t last)\n{"
-    assert source.count(begins) == 1
-    counted = source.replace(begins, f"unsigned factorized;\n{begins}\n    factorized++;")
-    monkeypatch.setattr(instance, "tracker_source", lambda *_, **__: counted)
-    return lambda **words: Tracker(tire, problem, **words)
-
-
-def factorized(tracker, at, *, switched=0):
-    """How often a step factorizes, and its command."""
-    count = ctypes.c_uint.in_dll(tracker.instance._library, "factorized")
-    count.value = 0
-    command = solved(tracker, at, switched=switched)
-    return count.value, command
-
-
-def test_the_interior_point_alone_factorizes_once_an_iteration(counting):
-    alone, by_sets = counting(max_active_sets=0), counting()
-    for seed in range(6):
-        at = near_a_plan(by_sets, seed)
-        alone.instance.state[...] = by_sets.instance.state
-        times, command = factorized(alone, at)
-        assert times == command.iterations > 1
-
-
-def test_no_set_is_tried_where_the_car_is_thrown_off_its_plan(counting):
-    tracker = counting()
-    x0 = np.zeros(tracker.instance.start.size)
-    at = (x0, np.zeros(tracker.problem.horizon), np.full(tracker.problem.horizon, 18.0))
-    iterated(tracker, *at)
-    near, thrown = x0.copy(), x0.copy()
-    near[0], thrown[0] = 0.001, 2.0
-    assert factorized(tracker, (near, *at[1:]))[0] == 1
-    quiet, first = factorized(tracker, (thrown, *at[1:]))
-    known, again = factorized(tracker, (thrown, *at[1:]), switched=MANY)
-    assert quiet == known  # nothing is factorized in vain before the interior point
-    np.testing.assert_array_equal(first.plan_u, again.plan_u)
-
-
+@pytest.mark.sweep("pull*")
 @pytest.mark.parametrize(
     ("pattern", "mistake"),
     [

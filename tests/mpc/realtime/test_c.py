@@ -1,12 +1,10 @@
-"""The C as it is exported: no warnings, and nothing undefined while it is driven hard."""
+"""The C as it is exported: no warnings, and nothing but what C99 has."""
 
 import re
 import subprocess
 
-import numpy as np
 import pytest
 
-from benchmarks.mpc_stress import stress
 from codegen import find_compiler
 from mpc.realtime.c_source import c_sources
 from mpc.realtime.instance import N_COMMANDS, Status
@@ -24,6 +22,7 @@ def lagging_files(lagging):
     return c_sources(lagging.structure, horizon=5, name=NAME, about=ABOUT)
 
 
+@pytest.mark.sweep("1")
 @needs_compiler
 @pytest.mark.parametrize("single", [0, 1])
 def test_it_compiles_without_a_warning_in_both_precisions(lagging_files, single, tmp_path):
@@ -57,10 +56,3 @@ def test_the_header_says_what_python_believes(lagging_files):
     assert {name: int(value) for name, value in told.items()} == {s.name: s.value for s in Status}
     assert f"ANY_NAME_COMMANDS {N_COMMANDS}U" in header
     assert f"ANY_NAME_STATUSES {len(Status)}U" in header
-
-
-def test_lagging_tires_do_not_fail_either(lagging):
-    came = stress([lagging], 200, np.random.default_rng(6))
-    assert came.statuses == {"OK": 200}
-    assert came.iterations.max() <= 30
-    assert max(came.beyond_angle, came.beyond_rate) <= 1e-6

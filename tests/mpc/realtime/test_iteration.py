@@ -131,6 +131,7 @@ def test_what_is_not_finite_fails_and_leaves_the_plan(tire, problem):
     assert solve(tracker, x0, 0.001, 20.0).status == Status.OK  # nothing of it stays
 
 
+@pytest.mark.sweep("linear")
 def test_float_finds_nearly_the_same(tire, problem):
     x0 = np.zeros(7 if tire.structure.lagged else 5)
     x0[:2] = 0.4, 0.05
@@ -140,24 +141,3 @@ def test_float_finds_nearly_the_same(tire, problem):
     )
     np.testing.assert_allclose(single.plan_u, double.plan_u, atol=0.02)
     assert not np.array_equal(single.plan_u, double.plan_u)
-
-
-def test_feedback_makes_one_iteration_answer_a_jump_nearly_as_convergence_does(lagging, problem):
-    tracker = Tracker(lagging, problem, tolerance=1e-12)
-    state, rng, kappa = tracker.instance.state, np.random.default_rng(2), 0.018
-    misses = []
-    for _ in range(20):
-        x0 = np.array([0.1, 0.0, 0.2, 0.3, 0.05, 0.05, 0.05])
-        before = iterated(tracker, x0, kappa, 20.0).plan_u
-        settled = state.copy()
-        x0[:4] += [0.02, 0.004, 0.05, 0.01] * rng.standard_normal(4)
-        with_feedback = solve(tracker, x0, kappa, 20.0).plan_u
-        state[...] = settled
-        state["feedback"], state["guessed"] = 0.0, 1  # the classical iteration, along the old plan
-        without = solve(tracker, x0, kappa, 20.0).plan_u
-        best = iterated(tracker, x0, kappa, 20.0).plan_u
-        asked = np.abs(best - before).max()
-        misses.append([np.abs(u - best).max() / asked for u in (with_feedback, without)])
-    with_feedback, without = np.median(misses, axis=0)
-    assert with_feedback < 0.1
-    assert with_feedback < 0.5 * without

@@ -43,30 +43,3 @@ def test_another_road_than_was_expected_is_planned_for_from_the_beginning(tire, 
     plain = driven(tire, problem, prepared=False, kick=0.01)
     surprised = driven(tire, problem, prepared=True, kick=0.01, hidden=0.005)
     assert [a.steering for a in plain] == [b.steering for b in surprised]
-
-
-def test_another_tire_is_planned_for_from_the_beginning(linear, problem, measure):
-    weaker = linear._replace(weights=0.8 * linear.weights)
-    told, commands = measure(e_y=0.3), []
-    for ahead in (False, True):
-        tracker = Tracker(linear, problem, period=PERIOD)
-        tracker.step(told)
-        if ahead:
-            tracker.prepare(told.kappa, told.v_x)
-        tracker.set_tire(weaker)
-        commands.append(tracker.step(told))
-    assert commands[0].steering == commands[1].steering
-    np.testing.assert_array_equal(commands[0].plan_x, commands[1].plan_x)
-
-
-def test_to_prepare_twice_or_without_a_plan_changes_nothing(linear, problem, measure):
-    told, commands = measure(e_y=0.3), []
-    for times in (1, 2):
-        tracker = Tracker(linear, problem, period=PERIOD)
-        for _ in range(3):
-            for _ in range(times):
-                tracker.prepare(told.kappa, told.v_x)
-            commands.append(tracker.step(told))
-    for one, other in zip(commands[:3], commands[3:], strict=True):
-        assert one.steering == other.steering
-        np.testing.assert_array_equal(one.plan_x, other.plan_x)

@@ -20,6 +20,7 @@ def test_a_second_start_generates_nothing_and_has_the_same_text(own_cache, linea
     assert [path.suffix for path in own_cache.iterdir()] == [".c"]
 
 
+@pytest.mark.heavy
 def test_whatever_the_text_depends_on_is_in_its_key(own_cache, monkeypatch):
     inputs = ("v_y", "r", "delta_f")
     small, large = (NetworkAxles(hidden=n, inputs=inputs) for n in (2, 3))

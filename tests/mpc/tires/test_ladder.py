@@ -115,6 +115,7 @@ def test_lagged_slip_follows_as_in_the_frozen_model(car):
     assert (np.abs(kinematic - expected).max(axis=0) > 0.1 * size).all()
 
 
+@pytest.mark.heavy
 def test_a_body_that_sways_slowly_is_a_softer_carcass(car):
     """Against the frozen model itself, whose body sways with its inertia, in steady rhythm."""
     sways, rests = (axle_model(car, sway=(k, k)) for k in (0.35, 0.0))
@@ -173,6 +174,7 @@ def test_of_a_car_with_downforce_forces_are_those_of_the_frozen_model(racer, for
     np.testing.assert_allclose(less[0], model.at_friction(0.5).predict(slid)[-1], rtol=1e-9)
 
 
+@pytest.mark.heavy
 def test_of_a_car_with_downforce_slip_lags_as_in_the_frozen_model(racer):
     model, drive = axle_model(racer), slalom()
     drive = replace(drive, v_x=np.linspace(15.0, 60.0, len(drive)))

@@ -20,6 +20,7 @@ def at_slip(forces, model, alpha):
     return forces(model, 20.0, none, none, none, lagged=np.column_stack([alpha, alpha]))[0]
 
 
+@pytest.mark.sweep("1.0")
 @pytest.mark.parametrize("mu", [1.0, 0.5])
 def test_curves_follow_the_true_forces_to_a_fifth_of_a_percent(car, forces, mu):
     alpha = np.linspace(0.001, 0.5 * mu, 77)
@@ -29,6 +30,7 @@ def test_curves_follow_the_true_forces_to_a_fifth_of_a_percent(car, forces, mu):
     assert (np.abs(fitted - true).max(axis=0) < 0.002 * true.max(axis=0)).all()
 
 
+@pytest.mark.sweep("0.5")
 @pytest.mark.parametrize("mu", [1.0, 0.5])
 def test_the_plant_in_steady_cornering_makes_these_forces(car, forces, mu):
     largest, duration = 0.2 * mu + 0.03, 30.0
@@ -61,6 +63,7 @@ def test_the_relaxation_lengths_are_those_of_the_chassis(car):
     np.testing.assert_allclose([float(length) for length in lengths], [0.60, 0.50])
 
 
+@pytest.mark.sweep("0.3-D*", "1.0-F*")
 @pytest.mark.parametrize("kind", [DugoffTire, FialaTire])
 @pytest.mark.parametrize("mu", [1.0, 0.3])
 def test_tires_with_a_kink_are_fitted_too(car, forces, kind, mu):

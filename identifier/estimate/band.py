@@ -1,0 +1,145 @@
+"""The band of a fit: by its covariance, and by its error on the identification drives."""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.band import LARGEST_SD, Band, BandSpread
+from identifier.estimate.chosen import CHOSEN
+from identifier.estimate.priors import Priors
+from identifier.motion.parameters import INDEX, curve_index
+from identifier.tire_model import brisk_speed
+from models.vehicle import Vehicle
+
+_OFFSETS = [INDEX["steering_zero"], INDEX["v_y_bias"], INDEX["v_y_angle"]]
+
+
+@lru_cache(maxsize=4)
+def _prior_covariance(vehicle: Vehicle) -> Array:
+    return Priors.of(vehicle).covariance
+
+
+@lru_cache(maxsize=4)
+def _known_slip(model: Any) -> Array:
+    """Return `FittedBand.known_slip`, for which a verdict asks many times."""
+    grid, driven = np.linspace(0.0, 1.0, 101)[1:], model.reach.slip
+    sd, prior = model.band.of_phi(np.outer(grid, driven))
+    sure = sd <= LARGEST_SD * np.maximum(prior, 1e-12)
+    known: Array = driven * np.max(grid[:, None] * sure, axis=0)
+    return known
+
+
+@dataclass(frozen=True, slots=True)
+class FittedBand(Band[Any]):
+    """How unsure a `FittedModel` is."""
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether its width is more than noise of the sensors: always."""
+        return True
+
+    @property
+    def origin(self) -> str:
+        front, rear = 100.0 * self._error_at(CHOSEN.typical)
+        return (
+            f"what the drives leave open, and an error of the model of {front:.0f} / {rear:.0f} % "
+            f"at {CHOSEN.typical:g} static loads, from its error on them and a mass known to "
+            f"{100.0 * CHOSEN.sure_mass:.0f} %"
+        )
+
+    @property
+    def speed(self) -> float:
+        return brisk_speed(self.model.vehicle, self.model.min_speed)
+
+    @property
+    def prior_covariance(self) -> Array:
+        """Covariance of what is believed of the car before any drive, (p, p)."""
+        return _prior_covariance(self.model.vehicle)
+
+    @property
+    def load_doubt(self) -> Array:
+        """Relative standard deviation of the static loads: mass and center of gravity, (2,)."""
+        car = self.model.vehicle
+        arms = np.array([car.l_r, car.l_f])
+        doubt: Array = np.hypot(CHOSEN.sure_mass, CHOSEN.sure_center * car.wheelbase / arms)
+        return doubt
+
+    @property
+    def error_share(self) -> Array:
+        """Standard deviation of the model's own error, the part that goes with the force, (2,)."""
+        return np.hypot(
+            self.load_doubt, CHOSEN.elsewhere * CHOSEN.error_size[1] * self.model.reach.unexplained
+        )
+
+    @property
+    def error_floor(self) -> Array:
+        """The part of it that is there without a force [static loads], (2,)."""
+        floor: Array = CHOSEN.elsewhere * CHOSEN.error_size[0] * self.model.reach.unexplained
+        return floor
+
+    def _error_at(self, force: float) -> Array:
+        """Return that error over a force [static loads], (2,)."""
+        return np.hypot(self.error_share, self.error_floor / force)
+
+    def spread(self, slip: Array, v_x: Array, pressed: Array) -> BandSpread:
+        """Return the variances of the steady forces, (n, 2): of curve, zeros and the own error."""
+        phi, slope, J = self.model.curve_at(slip)
+        variance = np.empty_like(phi)
+        for i, axle in enumerate("fr"):
+            index = [*curve_index(axle), *_OFFSETS]
+            steered = np.full(len(phi), 1.0 if i == 0 else 0.0)
+            zeros = np.column_stack([steered, 1.0 / v_x, np.ones(len(phi))])
+            h = np.hstack([J[i], slope[:, i, None] * zeros])
+            P = self.model.covariance[np.ix_(index, index)]
+            variance[:, i] = np.einsum("ki,ij,kj->k", h, P, h)
+        own = self.error_floor**2 + (self.error_share * phi) ** 2
+        total = (np.maximum(variance, 0.0) + own) * pressed**2
+        return BandSpread(total, np.zeros_like(total))
+
+    def of_phi(self, slip: Array) -> tuple[Array, Array]:
+        """Return the standard deviation of φ at slips (n, 2), and that before learning."""
+        _, _, J = self.model.curve_at(slip)
+        sd = []
+        for P in (self.model.covariance, self.prior_covariance):
+            found = [
+                np.einsum("ki,ij,kj->k", J[i], P[np.ix_(index, index)], J[i])
+                for i, index in enumerate(map(curve_index, "fr"))
+            ]
+            sd.append(np.sqrt(np.maximum(np.column_stack(found), 0.0)))
+        return sd[0], sd[1]
+
+    def known_slip(self) -> Array:
+        """Return the largest slip [rad] that was reached and where the doubt is small, (2,)."""
+        return _known_slip(self.model).copy()
+
+    def relative_sd(self, alpha: Array) -> Array:
+        sd, prior = self.of_phi(np.column_stack([alpha, alpha]))
+        ratio: Array = sd / np.maximum(prior, 1e-12)
+        return ratio
+
+    def calibrated_by(self, calibration: Any, force_missed: Array | None = None) -> Any:
+        """Return the model with what it misses of the drives that taught."""
+        del calibration
+        return replace(self.model, force_missed=force_missed)
+
+    def _opened(self, sd_friction: float) -> Any:
+        covariance, k = self.model.covariance.copy(), INDEX["ln_road"]
+        covariance[k, k] += sd_friction**2
+        return replace(self.model, covariance=covariance)
+
+    def _samples(self, n: int, rng: np.random.Generator) -> tuple[Any, ...]:
+        model, priors = self.model, Priors.of(self.model.vehicle)
+        share = self._error_at(CHOSEN.typical)
+        values, vectors = np.linalg.eigh(model.covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        drawn = []
+        for _ in range(n):
+            p = model.p + root @ rng.standard_normal(len(model.p))
+            for i, axle in enumerate("fr"):
+                p[INDEX[f"ln_stiffness_{axle}"]] += share[i] * rng.standard_normal()
+                p[INDEX[f"ln_grip_{axle}"]] += share[i] * rng.standard_normal()
+            drawn.append(replace(model, p=np.clip(p, priors.low, priors.high)))
+        return tuple(drawn)

@@ -1,0 +1,187 @@
+"""What a fit tells of itself: rows of a report, notes on its drives, and its file."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.estimate.chosen import CHOSEN
+from identifier.estimate.latent import TRUST
+from identifier.estimate.posterior import Reach, Segment
+from identifier.estimate.priors import Priors
+from identifier.frozen import FORMAT, vehicle_from, vehicle_numbers
+from identifier.motion.parameters import INDEX, NAMES, PARAMETERS
+from identifier.tire_model import AXLES, GRIP, RELAXATION, STIFFNESS, Axle, Estimate, Reached
+from models.schema import Table
+from models.vehicle import Vehicle
+
+BOUNDED = (("ln_stiffness", "cornering stiffness"), ("ln_grip", "grip"))
+
+
+def estimates(model: Any) -> tuple[Estimate, ...]:
+    """Return the numbers of the axles of a `FittedModel`, and which of them the drives decided."""
+    before = model.band.prior_covariance
+    given = model.vehicle.bicycle[4:]
+    band, loads, lag = model.band, np.array(model.vehicle.axle_loads), model.relaxation_length
+    stiff = [sd[0] / CHOSEN.slope_step for sd in band.of_phi(np.full((1, 2), CHOSEN.slope_step))]
+    stiffness = model.stiffness
+    C = stiffness / loads
+    slip = np.linspace(0.0, CHOSEN.widest, 201)
+    slip = np.column_stack([slip, slip])
+    phi = model.curve_at(slip)[0]
+    peak = np.take_along_axis(slip, phi.argmax(axis=0)[None], axis=0)
+    top, wide = phi.max(axis=0), [sd[0] for sd in band.of_phi(peak)]
+    sd_C, sd_top = (
+        np.hypot(sd[0], size * band.load_doubt) for sd, size in ((stiff, C), (wide, top))
+    )
+
+    def sd_of(name: str) -> tuple[float, float]:
+        """Return the standard deviation of a parameter, and the prior's."""
+        k = INDEX[name]
+        return math.sqrt(model.covariance[k, k]), math.sqrt(before[k, k])
+
+    rows: list[tuple[str, Axle, float, float, str, float | None, bool]] = []
+    for i, axle in enumerate(AXLES):
+        now, prior = sd_of(f"compliance_{axle[0]}")
+        known = [sd[0][i] <= CHOSEN.decided * sd[1][i] for sd in (stiff, wide)]
+        rows += [
+            (STIFFNESS, axle, stiffness[i], sd_C[i] * loads[i], "N/rad", given[i], known[0]),
+            (GRIP, axle, top[i], sd_top[i], "static load", None, known[1]),
+            (RELAXATION, axle, lag[i], C[i] * now, "m", None, now <= CHOSEN.decided * prior),
+        ]
+    zeros: tuple[tuple[str, Axle, str, str, float], ...] = (
+        ("zero of the steering", "front", "steering_zero", "deg", math.degrees(1.0)),
+        ("bias of v_y", "rear", "v_y_bias", "m/s", 1.0),
+    )
+    for title, axle, name, unit, scale in zeros:
+        now, prior = sd_of(name)
+        known_zero, value = now <= CHOSEN.decided * prior, scale * model[name]
+        rows.append((title, axle, value, scale * now, unit, 0.0, known_zero))
+    return tuple(
+        Estimate(title, axle, float(value), float(sd), unit, declared, bool(known))
+        for title, axle, value, sd, unit, declared, known in rows
+    )
+
+
+def notes(reach: Reach, p: Array, covariance: Array) -> tuple[tuple[str, str], ...]:
+    """Return what the identification drives had beside tires: code and one line of each.
+    p, covariance : parameters and their covariance (p,), (p, p).
+    """
+    listed = [
+        (
+            "another_road",
+            f"from {one.begin:.4g} to {one.end:.4g} s the friction was {one.ratio:.2f} ± "
+            f"{one.sd:.2f} times that of the rest of the drive, for which the curves are given",
+        )
+        for one in reach.segments
+    ]
+    k = INDEX["steering_gain"]
+    gain, sd = float(p[k]), float(np.sqrt(covariance[k, k]))
+    if abs(gain) > max(CHOSEN.surely * sd, CHOSEN.noted_gain):
+        listed.append(
+            (
+                "steering_gain",
+                f"the front wheels turn {1.0 + gain:.2f} ± {sd:.2f} times as far as the log "
+                "says: check the steering ratio; the curves allow for it",
+            )
+        )
+    if reach.a_y_late:
+        listed.append(
+            (
+                "a_y_late",
+                f"a_y is {1e3 * reach.a_y_late:.0f} ms late against the yaw rate, as behind a "
+                "filter: it is read so much earlier; log it without the filter",
+            )
+        )
+    if reach.parted > TRUST.parted:
+        listed.append(
+            (
+                "not_observable",
+                "side slip is not observable without v_y: soft and stiff tires explain the "
+                f"drive alike, {np.degrees(reach.parted):.2g} deg apart; the stiffness of the "
+                "rear axle decides it",
+            )
+        )
+    return tuple(listed)
+
+
+def at_bounds(vehicle: Vehicle, p: Array) -> tuple[Reached, ...]:
+    """Return the numbers of the tires that rest at the bounds of what tires have."""
+    priors, listed = Priors.of(vehicle), []
+    for i, axle in enumerate(AXLES):
+        for name, title in BOUNDED:
+            k = INDEX[f"{name}_{'fr'[i]}"]
+            if priors.low[k] + 1e-6 < p[k] < priors.high[k] - 1e-6:
+                continue
+            listed.append(
+                Reached(
+                    axle,
+                    title,
+                    float(np.exp(p[k])),
+                    "static loads" if name == "ln_grip" else "static loads per rad",
+                    "beyond what tires have: check signs, units and the vehicle file",
+                    True,
+                )
+            )
+    return tuple(listed)
+
+
+def to_dict(model: Any) -> dict[str, Any]:
+    """Return a `FittedModel` as plain numbers and words, ready for JSON."""
+    reach, missed, variances = model.reach, model.force_missed, np.diag(model.covariance)
+    return {
+        "format": FORMAT,
+        "kind": model.kind,
+        "vehicle": vehicle_numbers(model.vehicle.without_chassis()),
+        "parameters": {
+            one.name: {"value": float(value), "unit": one.unit, "sd": math.sqrt(max(variance, 0.0))}
+            for one, value, variance in zip(PARAMETERS, model.p, variances, strict=True)
+        },
+        "covariance": model.covariance.tolist(),
+        "driven_slip_rad": reach.slip.tolist(),
+        "speeds_m_s": reach.speeds.tolist(),
+        "a_x_m_s2": reach.a_x.tolist(),
+        "unexplained": reach.unexplained.tolist(),
+        **({} if missed is None else {"force_missed": missed.tolist()}),
+        "segments": [one._asdict() for one in reach.segments],
+        **({"parted_rad": reach.parted} if reach.parted else {}),
+        **({"a_y_late_s": reach.a_y_late} if reach.a_y_late else {}),
+        "cornering_stiffness_N_rad": model.stiffness.tolist(),
+        "relaxation_length_m": model.relaxation_length.tolist(),
+        "known_slip_rad": model.known_slip.tolist(),
+    }
+
+
+def read(table: Table) -> dict[str, Any]:
+    """Return the fields of the `FittedModel` that `to_dict` made."""
+    parameters = table.table("parameters")
+
+    def array(key: str, shape: tuple[int, ...] = (2,)) -> Array:
+        value = table.array(key)
+        if value.shape != shape:
+            table.refuse(key, f"must hold {shape} numbers, it has {value.shape}")
+        if np.abs(value).max(initial=0.0) > CHOSEN.largest:
+            table.refuse(key, f"must hold numbers below {CHOSEN.largest:g}")
+        return value
+
+    parted, late = (
+        table.number(key) if key in table else 0.0 for key in ("parted_rad", "a_y_late_s")
+    )
+    segments = table.tables("segments") if "segments" in table else []
+    return {
+        "vehicle": vehicle_from(table.value("vehicle")),
+        "p": np.array([parameters.table(name).number("value") for name in NAMES]),
+        "covariance": array("covariance", (len(NAMES), len(NAMES))),
+        "reach": Reach(
+            *(array(key) for key in ("driven_slip_rad", "speeds_m_s", "a_x_m_s2")),
+            alike=array("unexplained") ** 2,
+            pairs=1.0,
+            segments=tuple(
+                Segment(*(one.number(name) for name in Segment._fields)) for one in segments
+            ),
+            parted=parted,
+            a_y_late=late,
+        ),
+        "force_missed": array("force_missed") if "force_missed" in table else None,
+    }
