@@ -122,6 +122,7 @@ class InertialIdentifier(Method):
         dt : sampling interval [s].
         """
         usual, tires = cls.for_vehicle(vehicle, dt=dt), begun(model)
+        assert isinstance(tires, AxleModel)
         share = max(float(tires.sway_share.mean()), CHOSEN.least_share)
         return replace(
             usual,

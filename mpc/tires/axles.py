@@ -17,6 +17,7 @@ from identifier.axle.model import AxleModel
 from identifier.axle.slip import SHORTEST
 from identifier.estimate.model import FittedModel
 from identifier.motion.model import carcass_curve
+from identifier.motion.parameters import curve_index
 from models.vehicle import load_ratio
 from mpc.tires.chosen import CHOSEN
 from mpc.tires.tire import Pair, Point, PredictionTire, TireStructure
@@ -177,7 +178,7 @@ def fit_tire(model: FittedModel) -> PredictionTire:
         tracker is told no a_x.
     """
     names = ("steering_zero", "steering_gain", "v_y_bias", "v_y_angle")
-    curves = np.stack([model.curve_numbers(axle) for axle in "fr"])
+    curves = np.stack([model.p[curve_index(axle)] for axle in "fr"])
     return _tire(FitAxles(), model, tuple(model[name] for name in names), model.give, curves)
 
 
