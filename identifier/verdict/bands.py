@@ -120,8 +120,8 @@ def _errors_elsewhere(
     windows, shape = found.windows, found.measured.shape
     speeds = windows.mean(recording.v_x) / vehicle.froude_speed
     within = np.searchsorted(AXLE_CHOSEN.speeds, speeds, side="right")
-    ranges = np.zeros((3, len(AXLE_CHOSEN.centers), *shape))
-    errors = ModelErrors(np.full(shape, np.nan), *ranges, within)
+    share, scaled, fixed = np.zeros((3, len(AXLE_CHOSEN.centers), *shape))
+    errors = ModelErrors(np.full(shape, np.nan), share, scaled, fixed, within)
     power = np.cumsum(np.sum(found.measured**2, axis=1))
     part = np.minimum((PARTS * power / (power[-1] or 1.0)).astype(np.intp), PARTS - 1)
     for k in np.unique(part) if power[-1] > 0.0 else ():
