@@ -40,7 +40,7 @@ def state_index(recording: Recording, t: float) -> int:
     return int(np.searchsorted(times, t + tolerance, side="right")) - 1
 
 
-@dataclass(frozen=True, slots=True, weakref_slot=True, kw_only=True, repr=False, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
 class History:
     """An online run over n samples.
     recording : what it ran over, with the v_y that the method estimated where there was none.

@@ -7,6 +7,7 @@ band of 90 % would have held there (conformal prediction). Errors follow one ano
 stay alike says how many of them tell something new.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -18,16 +19,18 @@ from identifier.axle.band import BandCalibration, ranges_of, sensor_noise
 from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
 from identifier.axle.learning import Regression
 from identifier.band import LEVEL, Band, BandSpread, normal_quantile
-from identifier.run import History
+from identifier.run import History, learn, state_index
 from identifier.tire_model import TireModel
 from identifier.verdict.chosen import CHOSEN
 from identifier.verdict.judging import judge
 from identifier.verdict.motion import Evidence, evidence, modelled_force
-from identifier.verdict.parts import evaluated_run, taught_elsewhere
 from identifier.verdict.verdict import Verdict
 from models.recordings import Recording
 from models.recordings.evidence import Windows
-from models.recordings.portion import portion
+from models.recordings.portion import Portion, portion
+from models.vehicle import Vehicle
+
+PARTS = 4  # of the drive, each of which is left out once
 
 
 def within_band(model: TireModel, recording: Recording, level: float = LEVEL) -> Array | None:
@@ -77,27 +80,23 @@ def calibrated(
         return model
     if history.method.whole:
         share = (verdict or judge(history, t)).force_missed
-        whole: TireModel = band.calibrated_by(None, None if share is None else np.array(share))
-        return whole
-    run = evaluated_run(history, t)
-    recording = run.portion.recording
-    found = evidence(model, recording, run.road)
+        told: TireModel = band.calibrated_by(None, None if share is None else np.array(share))
+        return told
+    whole, start = history.recording, history.start
+    frozen = state_index(whole, float(whole.t[-1]) if t is None else t)
+    part = portion(whole, frozen)
+    recording, n = part.recording, part.place(frozen)
+    until = None if n == len(recording) else float(recording.t[n])
+    found = evidence(model, recording, _road_felt(history, part))
     if found is None:
         return model
 
-    speeds = found.windows.mean(recording.v_x)
-    speed = float(np.sqrt(np.mean(speeds**2)))
-    one, each = found.measured.shape, (len(AXLE_CHOSEN.centers), *found.measured.shape)
-    within = np.searchsorted(AXLE_CHOSEN.speeds, speeds / model.vehicle.froude_speed, side="right")
-    empty = np.zeros((3, *each))
-    errors = ModelErrors(np.full(one, np.nan), empty[0], empty[1], empty[2], within)
+    def teach(of_parts: Recording) -> TireModel:
+        return learn(of_parts, history.vehicle, history.design, start, until)
+
+    speed = float(np.sqrt(np.mean(found.windows.mean(recording.v_x) ** 2)))
     given = BandCalibration.declared(speed)
-    for mine, other in taught_elsewhere(run.taught, recording, found):
-        if other is None or other.band is None:
-            continue
-        evaluated = _model_errors(other.band.calibrated_by(given), recording, found)
-        for into, values in zip(errors[:-1], evaluated, strict=True):
-            into[..., mine, :] = values[..., mine, :]
+    errors = _errors_elsewhere(teach, model.vehicle, recording, found, given)
     given = replace(given, noise=sensor_noise(recording, model.vehicle))
     judged, _ = found.but_a_segment()
     found_of = calibration(errors, found.noise, found.windows, given)
@@ -105,11 +104,43 @@ def calibrated(
     return tires
 
 
-def _model_errors(model: TireModel, recording: Recording, found: Evidence) -> tuple[Array, ...]:
-    """Return what `ModelErrors` has of all windows but its `within`, of a model with a band."""
-    assert model.band is not None
-    spread = _spread_by_range(model.band, recording, found.windows)
-    return found.measured - modelled_force(model, recording, found.windows), *spread
+def _errors_elsewhere(
+    teach: Callable[[Recording], TireModel],
+    vehicle: Vehicle,
+    recording: Recording,
+    found: Evidence,
+    given: BandCalibration,
+) -> ModelErrors:
+    """Return the errors of models that are each taught without a part of the drive, in that part.
+
+    The parts follow one another and hold equal shares of the force (squared); in the one that is
+    left out the car is made to stand, so that learning rests. There is none where there is no
+    force.
+    """
+    windows, shape = found.windows, found.measured.shape
+    speeds = windows.mean(recording.v_x) / vehicle.froude_speed
+    within = np.searchsorted(AXLE_CHOSEN.speeds, speeds, side="right")
+    share, scaled, fixed = np.zeros((3, len(AXLE_CHOSEN.centers), *shape))
+    errors = ModelErrors(np.full(shape, np.nan), share, scaled, fixed, within)
+    power = np.cumsum(np.sum(found.measured**2, axis=1))
+    part = np.minimum((PARTS * power / (power[-1] or 1.0)).astype(np.intp), PARTS - 1)
+    for k in np.unique(part) if power[-1] > 0.0 else ():
+        mine = part == k
+        starts, halt = windows.starts[mine], np.array(recording.v_x)
+        halt[starts[0] : starts[-1] + windows.n + 1] = 0.0
+        try:
+            model = teach(replace(recording, v_x=halt))
+        except (ArithmeticError, ValueError):
+            continue
+        if model.band is None:
+            continue
+        model = model.band.calibrated_by(given)
+        assert model.band is not None
+        errors.error[mine] = (found.measured - modelled_force(model, recording, windows))[mine]
+        spread = _spread_by_range(model.band, recording, windows)
+        for into, values in zip(errors[1:-1], spread, strict=True):
+            into[:, mine] = values[:, mine]
+    return errors
 
 
 def _spread_by_range(
@@ -209,3 +240,17 @@ def color_of(error: Array, windows: Windows) -> float:
             total * windows.duration / Regression().correlation_time, 1.0, AXLE_CHOSEN.most_color
         )
     )
+
+
+def _road_felt(history: History, part: Portion) -> Array | None:
+    """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
+    method = history.design
+    without = part.recording.logged_v_y is None
+    if method.accelerometer is None or ("v_y" in method.needs) == without:
+        return None  # it was learnt of another motion than that which is asked
+    pushes = []
+    for block in history.blocks(part.samples):
+        first, last = np.searchsorted(part.samples, [block.part.start, block.part.stop])
+        mine = part.samples[first:last] - block.part.start
+        pushes.append(method.accelerometer.beside_force(block.state)[mine])
+    return np.concatenate(pushes)

@@ -105,7 +105,16 @@ def judge_identification(
         return _too_short(model, CHOSEN.fewest_taught)
     bounds = model.drives.at_bounds if reached is None else reached
     notes = [Objection(code, None, text, False) for code, text in model.drives.notes]
-    return _verdict(evaluated, [*_findings(evaluated), *map(_at_bound, bounds), *notes], recording)
+    at_bound = [
+        Objection(
+            "at_bound",
+            one.axle,
+            f"{one.title} is at its bound, {one.value:.3g} {one.unit}: {one.meaning}",
+            one.refuses,
+        )
+        for one in bounds
+    ]
+    return _verdict(evaluated, [*_findings(evaluated), *at_bound, *notes], recording)
 
 
 def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
@@ -290,11 +299,6 @@ def _unobserved(evaluated: _Evaluated) -> Iterator[Objection]:
             f"{np.degrees(RULES.side_slip):.2g} deg): measure v_y, or drive a slalom"
         )
         yield Objection("side_slip_unknown", None, text, True)
-
-
-def _at_bound(one: Reached) -> Objection:
-    text = f"{one.title} is at its bound, {one.value:.3g} {one.unit}: {one.meaning}"
-    return Objection("at_bound", one.axle, text, one.refuses)
 
 
 def _roads(found: RoadFriction | None) -> list[Objection]:

@@ -123,7 +123,12 @@ class Evidence:
         """
         if (self.model_error <= CHOSEN.rest_missed).all():
             return self, None
-        first, last = self._worst_segment()
+        n = max(1, int(CHOSEN.segment * len(self.windows)))
+        size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
+        residual = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
+        total = np.concatenate([[0.0], np.cumsum(residual)])
+        first = int(np.argmax(total[n:] - total[:-n]))
+        last = first + n
         place = np.arange(len(self.windows))
         rest = self.where((place < first) | (place >= last))
         most = min(CHOSEN.rest_missed, CHOSEN.confined * float(self.model_error.max()))
@@ -131,15 +136,6 @@ class Evidence:
         if len(rest.windows) >= CHOSEN.fewest and confined:
             return rest, (first, last)
         return self, None
-
-    def _worst_segment(self) -> tuple[int, int]:
-        """Return the segment in which most is missed: first window, past last."""
-        n = max(1, int(CHOSEN.segment * len(self.windows)))
-        size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
-        residual = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
-        total = np.concatenate([[0.0], np.cumsum(residual)])
-        first = int(np.argmax(total[n:] - total[:-n]))
-        return first, first + n
 
 
 def clean_rms(signal: Array, noise: Array) -> Array:

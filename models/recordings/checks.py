@@ -21,9 +21,9 @@ from models.recordings.evidence import (
     correlation,
     course_rate,
     least_squares,
-    onset,
     pair,
     proportional,
+    shortest_wheelbase,
     steering,
     turning,
     windows,
@@ -366,8 +366,7 @@ def _check_forces(w: Means, turn: Steering | None) -> str | None:
             f"vy contradicts Fyf + Fyr, which must be mass times v̇_y + v_x r, "
             f"the two slopes have the ratio {dot:.3g} instead of 1; change the sign of vy"
         )
-    small = onset(w)
-    L = turn.wheelbase if small is None else min(turn.wheelbase, small.wheelbase)
+    L = shortest_wheelbase(w, turn)
     mass = float(total @ a) / float(a @ a)
     if mass < CHOSEN.lightest * min(L, CHOSEN.longest_wheelbase) ** 3:
         return (
@@ -410,10 +409,9 @@ def vehicle_contradiction(recording: Recording, vehicle: Vehicle) -> str | None:
                 f"vy and r must be in m/s and rad/s, the median rear slip angle is "
                 f"{typical:.3g} rad, above {CHOSEN.largest_slip}; check units, and l_r = {l_r:g} m"
             )
-    turn, small = steering(w), onset(w)
-    other = ""
+    turn, other = steering(w), ""
     if turn is not None and turn.correlation > 0.7:
-        L = turn.wheelbase if small is None else min(turn.wheelbase, small.wheelbase)
+        L = shortest_wheelbase(w, turn)
         v = float(np.sqrt(np.mean(w.v_x**2)))
         lowest, highest = (l_f + l_r) / 3.0, 3.0 * (l_f + l_r) + 0.03 * v**2
         if not lowest < L < highest:

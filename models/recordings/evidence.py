@@ -277,13 +277,15 @@ def proportional(w: Means) -> bool:
     return turned > 0.75 * steered
 
 
-def onset(w: Means) -> Steering | None:
-    """Return the same from the windows with less than half the usual peak steering, or None.
+def shortest_wheelbase(w: Means, turn: Steering) -> float:
+    """Return the shorter of the effective wheelbases of all windows and of small steering [m].
 
-    A car that slides over its front wheels reads long at large steering and normal here.
+    A car that slides over its front wheels reads long at large steering, and normal where it is
+    steered by less than half the usual peak.
     """
     size = np.abs(w.delta)
-    return _wheelbase(w, size < 0.5 * np.percentile(size, 95))
+    small = _wheelbase(w, size < 0.5 * np.percentile(size, 95))
+    return turn.wheelbase if small is None else min(turn.wheelbase, small.wheelbase)
 
 
 def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
