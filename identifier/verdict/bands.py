@@ -8,7 +8,7 @@ stay alike says how many of them tell something new.
 """
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +112,7 @@ def _missed(model: TireModel, recording: Recording, found: Evidence) -> tuple[Ar
 
 
 def _spread_by_range(
-    band: Band[Any], recording: Recording, windows: Windows
+    band: Band, recording: Recording, windows: Windows
 ) -> tuple[Array, Array, Array]:
     """Return share, scaled and fixed of `Missed`, (6, m, 2) each."""
     size, count = np.abs(band.model.lagged_slip(recording)), len(AXLE_CHOSEN.centers)
