@@ -7,14 +7,13 @@ the body. What a band is made of depends on how its model was learnt: variances 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import Any, Generic, Literal, NamedTuple, Protocol, TypeVar, overload
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
 from models.recordings import Recording
-from models.vehicle import Vehicle
 
 Axle = Literal["front", "rear"]
 AXLES: tuple[Axle, ...] = ("front", "rear")
@@ -60,33 +59,16 @@ class BandSpread(NamedTuple):
         return np.maximum(np.where(large < 1.0, small, large), 0.0)
 
 
-class _Curves(Protocol):
-    """A model whose forces are curves of a slip that lags."""
-
-    @property
-    def vehicle(self) -> Vehicle: ...
-    @property
-    def min_speed(self) -> float: ...
-    def force(
-        self, alpha: ArrayLike, axle: Axle | None = None, *, v_x: float | None = None
-    ) -> Any: ...
-    def lagged_slip(self, recording: Recording) -> Array: ...
-    def slope_at(self, slip: Array) -> Array: ...
-
-
-Model = TypeVar("Model", bound=_Curves)
-
-
 @dataclass(frozen=True, slots=True)
-class Band(ABC, Generic[Model]):
+class Band(ABC):
     """What is not known of the forces of a model, as a band around its curves.
 
     Parameters
     ----------
-    model : whose band it is.
+    model : whose band it is: forces are curves of a slip that lags.
     """
 
-    model: Model
+    model: Any
 
     @property
     @abstractmethod
@@ -140,7 +122,7 @@ class Band(ABC, Generic[Model]):
         """
 
     @abstractmethod
-    def calibrated_by(self, calibration: Any, force_missed: Array | None = None) -> Model:
+    def calibrated_by(self, calibration: Any, force_missed: Array | None = None) -> Any:
         """Return the model, its band calibrated.
 
         Parameters
@@ -150,7 +132,7 @@ class Band(ABC, Generic[Model]):
             None where not computed.
         """
 
-    def samples(self, n: int, rng: np.random.Generator) -> tuple[Model, ...]:
+    def samples(self, n: int, rng: np.random.Generator) -> tuple[Any, ...]:
         """Return models drawn from what is not known of the tires.
 
         Parameters
@@ -168,9 +150,9 @@ class Band(ABC, Generic[Model]):
         return self._samples(n, rng)
 
     @abstractmethod
-    def _samples(self, n: int, rng: np.random.Generator) -> tuple[Model, ...]: ...
+    def _samples(self, n: int, rng: np.random.Generator) -> tuple[Any, ...]: ...
 
-    def on_another_road(self, sd_friction: float = SD_FRICTION) -> Model:
+    def on_another_road(self, sd_friction: float = SD_FRICTION) -> Any:
         """Return the model for a road whose friction is not that of the identification drive.
 
         Its curve stays, its band opens along φ = μ φ₀(α/μ), the change that friction makes.
@@ -184,7 +166,7 @@ class Band(ABC, Generic[Model]):
         return self._opened(sd_friction)
 
     @abstractmethod
-    def _opened(self, sd_friction: float) -> Model: ...
+    def _opened(self, sd_friction: float) -> Any: ...
 
     @overload
     def at(
@@ -225,7 +207,9 @@ class Band(ABC, Generic[Model]):
         slip = np.asarray(alpha, dtype=np.float64)
         center = np.asarray(self.model.force(slip, axle, v_x=v_x))
         half = self.half(slip.ravel(), level, v_x=v_x).reshape(*slip.shape, 2)
-        return ends(center - of_axle(half, axle), center + of_axle(half, axle))
+        half = of_axle(half, axle)
+        low, high = center - half, center + half
+        return (float(low), float(high)) if low.ndim == 0 else (low, high)
 
     def half(
         self, alpha: Array, level: float = LEVEL, *, v_x: float | Array | None = None
@@ -285,7 +269,8 @@ class Band(ABC, Generic[Model]):
     def slope_over(self, recording: Recording) -> Array:
         """Return the slope of the curves over the slip of a drive [static loads/rad], (n, 2)."""
         slope = self.model.slope_at(self.model.lagged_slip(recording))
-        return slope * self.model.vehicle.load_ratio(recording.v_x)
+        pressed: Array = slope * self.model.vehicle.load_ratio(recording.v_x)
+        return pressed
 
 
 def of_axle(both: Array, axle: Axle | None) -> Array:
@@ -296,8 +281,3 @@ def of_axle(both: Array, axle: Axle | None) -> Array:
         raise ValueError(f"axle must be front or rear, it is {axle!r}")
     one: Array = both[..., AXLES.index(axle)]
     return one
-
-
-def ends(low: Array, high: Array) -> tuple[float, float] | tuple[Array, Array]:
-    """Return both ends of a band, of a single slip as numbers."""
-    return (float(low), float(high)) if low.ndim == 0 else (low, high)

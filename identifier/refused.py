@@ -68,7 +68,7 @@ class SampleLimits(NamedTuple):
             and abs(delta_r) <= self.steering
         )
 
-    def possible(self, v_y: float) -> float:
+    def plausible(self, v_y: float) -> float:
         """Return a lateral velocity that a car may have [m/s], NaN in place of any other number.
         v_y : as it was measured [m/s].
         """

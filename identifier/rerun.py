@@ -113,7 +113,8 @@ def holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
 
 
 def _last(state: Mapping[str, Array], port: str) -> Array:
-    return state[port][-1]
+    last: Array = state[port][-1]
+    return last
 
 
 class Recalled(OnDemand):

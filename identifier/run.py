@@ -71,8 +71,8 @@ class History:
     def diverged_at(self) -> float | None:
         """Time [s] from which a force is not finite or a hundred times the weight, or None."""
         for part in blocks(len(self.recording)):
-            possible = np.abs(self.axle_force[part]) < _IMPOSSIBLE_FORCE * self.vehicle.weight
-            sane = possible.all(axis=1)
+            plausible = np.abs(self.axle_force[part]) < _IMPOSSIBLE_FORCE * self.vehicle.weight
+            sane = plausible.all(axis=1)
             if not sane.all():
                 return float(self.recording.t[part][np.argmin(sane)])
         return None
@@ -125,7 +125,7 @@ class History:
             raise DivergedError(f"the method diverged at {diverged_at:g} s, before {t:g} s")
         return self.method.frozen(self.vehicle, state)
 
-    def asked(self, recording: Recording, t: float | None = None) -> "History":
+    def evaluated(self, recording: Recording, t: float | None = None) -> "History":
         """Return what the model frozen at a time says of another recording, which teaches nothing.
         t : time of the freeze in this recording's own clock [s]; None is the end.
         """
@@ -360,7 +360,7 @@ class OnlineIdentifier:
         needs_v_y = "v_y" in self.method.needs
         if not self.limits.accept(v_x, v_y, r, delta_f, delta_r, needs_v_y=needs_v_y):
             return self._refused()
-        v_y = self.limits.possible(v_y)
+        v_y = self.limits.plausible(v_y)
         if self._stepper is None:
             self._begun(np.array([v_y, r]))
         elif self.counts.missed and not self._judges:

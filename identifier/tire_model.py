@@ -334,7 +334,7 @@ class TireModel(ABC):
         return None
 
     @property
-    def band(self) -> Band[Any] | None:
+    def band(self) -> Band | None:
         """How unsure the forces are; None where the model does not know."""
         return None
 
@@ -471,7 +471,7 @@ class StaticModel(TireModel):
         return self.static_force(x, delta, v_x), ca.MX(0, 1)
 
 
-def require_band(model: TireModel) -> Band[Any]:
+def require_band(model: TireModel) -> Band:
     """Return the band of a model; refuse one that has none."""
     if model.band is None:
         raise ValueError(f"a {type(model).__name__} cannot tell how sure it is: it has no band")

@@ -377,8 +377,10 @@ _declared = lru_cache(maxsize=8)(BandCalibration.declared)  # asked thrice for e
 
 
 @dataclass(frozen=True, slots=True)
-class _AxleBand(Band[AxleModel]):
+class _AxleBand(Band):
     """How unsure an axle model is: by its covariance, and errors that no curve can explain."""
+
+    model: AxleModel
 
     @property
     def calibrated(self) -> bool:

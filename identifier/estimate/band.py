@@ -33,7 +33,7 @@ def _known_slip(model: Any) -> Array:
 
 
 @dataclass(frozen=True, slots=True)
-class FittedBand(Band[Any]):
+class FittedBand(Band):
     """How unsure a `FittedModel` is."""
 
     @property
@@ -70,9 +70,9 @@ class FittedBand(Band[Any]):
     @property
     def error_share(self) -> Array:
         """Standard deviation of the model's own error, the part that goes with the force, (2,)."""
-        return np.hypot(
-            self.load_doubt, CHOSEN.elsewhere * CHOSEN.error_size[1] * self.model.reach.unexplained
-        )
+        own = CHOSEN.elsewhere * CHOSEN.error_size[1] * self.model.reach.unexplained
+        share: Array = np.hypot(self.load_doubt, own)
+        return share
 
     @property
     def error_floor(self) -> Array:

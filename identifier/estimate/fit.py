@@ -61,7 +61,9 @@ def fit(
         Where a log has neither v_y nor a_y.
     """
     before = Priors.of(vehicle) if priors is None else priors
-    parts, reach, found = [], Reach(), None
+    parts: list[tuple[float, Information]] = []
+    found: Posterior | None = None
+    reach = Reach()
     known, sd = Information.nothing(), Priors.of(vehicle).sd
     total, done = sum(one.duration for one in recordings), 0.0
     coarse = coarse or total > CHOSEN.long
@@ -165,14 +167,10 @@ def _reach(
         e = np.nan_to_num(driven["missed"] / error_size(force)[:, None])
         n = max(round(max(later, CHOSEN.stride) / one.dt), 1)
         together = on[n:] & on[:-n]
-        found = found.with_(
-            Reach(
-                _lasting(np.abs(driven["slip"][on]), one.dt),
-                *_most(one.signals[on][:, [0, 5]]),
-                alike=(e[n:] * e[:-n])[together].sum(axis=0),
-                pairs=float(np.count_nonzero(together)),
-            )
-        )
+        slip, (speeds, a_x) = np.abs(driven["slip"][on]), _most(one.signals[on][:, [0, 5]])
+        alike = (e[n:] * e[:-n])[together].sum(axis=0)
+        pairs = float(np.count_nonzero(together))
+        found = found.with_(Reach(_lasting(slip, one.dt), speeds, a_x, alike, pairs))
     return found
 
 
@@ -181,9 +179,11 @@ def _reach_of_states(learnt: Learnt) -> Reach:
     nodes, on = learnt.nodes, learnt.nodes.counts
     given, z = nodes.given[on], learnt.z[on]
     turning = np.abs(given[:, 0] * z[:, 1]) / GRAVITY
+    speeds, a_x = _most(given[:, [0, 3]])
     return Reach(
-        _lasting(np.abs(z[:, 2:4]), nodes.dt),
-        *_most(given[:, [0, 3]]),
+        slip=_lasting(np.abs(z[:, 2:4]), nodes.dt),
+        speeds=speeds,
+        a_x=a_x,
         alike=np.sum((z[:, 4:6] / error_size(turning)[:, None]) ** 2, axis=0),
         pairs=float(len(z)),
         parted=learnt.parted,

@@ -152,7 +152,7 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Prio
 
 class _Latent:
     """The problem of a drive: its cost, and how it is minimized.
-    priors : of `latent_priors`; what is to be held does not move.
+    priors : of `latent_priors`; what is fixed does not move.
     columns : which parameters slopes are taken over, (m,): those that move, and others whose doubt
         is to be given.
     """
@@ -238,7 +238,7 @@ class _Latent:
         }
 
     def cost(self, z: Array, p: Array, weights: dict[str, Array]) -> float:
-        """Return J with weights that are held [nats]."""
+        """Return J with weights that are fixed [nats]."""
         total = self.misfit(z, p, weights) + beliefs_cost(self.priors, p)
         return float(np.nan_to_num(total, nan=np.inf))
 
@@ -335,36 +335,30 @@ class _Latent:
         index = self.index[self.free]
         sd = np.diag(self.priors.information)[index] ** -0.5
         low, high = self.priors.low[index], self.priors.high[index]
+        most_z = np.full(z.shape, np.inf)
+        most_z[:, 0], most_z[:, 2:4] = CHOSEN.most_slip * v_x, CHOSEN.most_lagged
         for _ in range(most):
             weights = self.weights(z, p, R)
             cost = self.cost(z, p, weights)
             at, _ = self.around(z, p, weights)
-            better = None
             for _ in range(8):
                 try:
                     dz, dp = self._step(at, p, damping)
                 except np.linalg.LinAlgError:
                     damping = max(8.0 * damping, 1e-6)
                     continue
-                z_then, p_then = z + dz, p.copy()
-                z_then[:, 0] = np.clip(
-                    z_then[:, 0], -CHOSEN.most_slip * v_x, CHOSEN.most_slip * v_x
-                )
-                z_then[:, 2:4] = np.clip(z_then[:, 2:4], -CHOSEN.most_lagged, CHOSEN.most_lagged)
+                z_then, p_then = np.clip(z + dz, -most_z, most_z), p.copy()
                 p_then[index] = np.clip(p[index] + dp, low, high)
                 reached = self.cost(z_then, p_then, weights)
                 if reached < cost:
-                    better = z_then, p_then, reached
                     break
                 damping = max(8.0 * damping, 1e-6)
-            if better is None:
+            else:
                 break
-            moved = float(np.abs((better[0] - z)[:, 0] / v_x).max())
-            turned = float(np.abs((better[1] - p)[index] / sd).max(initial=0.0))
-            gained = cost - better[2]
-            z, p, _ = better
-            damping = max(damping / 6.0, 1e-9)
-            if (moved < 3e-4 and turned < 0.05) or gained < 0.02:
+            moved = float(np.abs((z_then - z)[:, 0] / v_x).max())
+            turned = float(np.abs((p_then - p)[index] / sd).max(initial=0.0))
+            z, p, damping = z_then, p_then, max(damping / 6.0, 1e-9)
+            if (moved < 3e-4 and turned < 0.05) or cost - reached < 0.02:
                 break
         return z, p, self.value(z, p, R)
 
@@ -378,10 +372,10 @@ class _Latent:
         shown = at.C - believed - at.B.reshape(len(X), -1).T @ X
         S = believed + shown / self.trust.lasting
         slopes, free = -X.reshape(len(z), N, -1)[:, 0], self.free
-        held = np.setdiff1d(np.arange(len(self.index)), free)
+        fixed = np.setdiff1d(np.arange(len(self.index)), free)
         inverse: Array = np.asarray(np.linalg.inv(S[np.ix_(free, free)]), np.float64)
-        if held.size:  # what moves makes up for a part of what is held
-            slopes[:, held] -= slopes[:, free] @ inverse @ S[np.ix_(free, held)]
+        if fixed.size:  # what moves makes up for a part of what is fixed
+            slopes[:, fixed] -= slopes[:, free] @ inverse @ S[np.ix_(free, fixed)]
         n = len(z)
         M = at.A.copy()
         for k in range(n - 1):
@@ -536,7 +530,7 @@ def estimate_v_y(
     again = np.array([LATENT_NAMES.index(name) for name in AGAIN])
     moves = np.isin(np.arange(len(LATENT_NAMES)), again)
 
-    def held(late: bool) -> Priors:
+    def fixed(late: bool) -> Priors:
         believed = latent_priors(vehicle, replace(Priors.of(vehicle), mean=p), late)
         information = np.zeros_like(believed.information)
         information[again, again] = believed.information[again, again]
@@ -549,12 +543,12 @@ def estimate_v_y(
         np.zeros(len(recording), dtype=bool),
         np.zeros(len(recording)),
     )
-    late = lateness(recording, vehicle, held(late=False))
+    late = lateness(recording, vehicle, fixed(late=False))
     for outer, inner in _blocks(recording):
         nodes = Nodes.of(recording, vehicle, outer, a_y_late=late)
         if not nodes.counts.any():
             continue
-        problem = _Latent(nodes, vehicle, held(late != 0.0), columns)
+        problem = _Latent(nodes, vehicle, fixed(late != 0.0), columns)
         found = problem.smoothed(*problem.begin(), rounds=1)
         known = np.flatnonzero(~moves[columns])
         tires, free = found.slopes[:, known], found.slopes[:, problem.free]

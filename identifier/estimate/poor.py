@@ -27,7 +27,7 @@ PUSHES = 10.0 ** np.arange(-5.0, 0.1, 0.5)  # [(m/s²)² s], variance of w
 BANKS = CHOSEN.wanders * 10.0 ** np.arange(-3.0, 1.1, 1.0)
 
 
-class _Shown(NamedTuple):
+class _Sensor(NamedTuple):
     """How a sensor shows v_y.
     interval : between new values [s].   late : [s].   noise : [m/s].
     push, wanders : variances of w [(m/s²)² s] and of b' [(m/s²)²/s].
@@ -52,33 +52,33 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
     new = _new_values(v_y)
     rare = len(new) < len(v_y) and _interval(new) * recording.dt > CHOSEN.rare * scale
     new = new if rare else np.arange(len(v_y))
-    shown = _Shown(_interval(new) * recording.dt, noise=float(NOISE[0]) * scale)
+    sensor = _Sensor(_interval(new) * recording.dt, noise=float(NOISE[0]) * scale)
     if len(new) < CHOSEN.fewest_values or (recording.a_y is None and not rare):
         return recording
     if recording.a_y is None:
-        shown = shown._replace(push=float(PUSHES[-1]))
+        sensor = sensor._replace(push=float(PUSHES[-1]))
     else:
         part = hardest(recording, min(CHOSEN.poor_asked, CHOSEN.most * recording.dt))
         inside = new[(new >= part.start) & (new < part.stop)] - part.start
         problem = _Kinematics(recording.taken(part), inside)
-        white = white_noise(problem.shown) if problem.shown.size > CHOSEN.fewest_values else 0.0
+        white = white_noise(problem.values) if problem.values.size > CHOSEN.fewest_values else 0.0
         if (
             not rare
-            and not white * np.sqrt(shown.interval / CHOSEN.smoothed) > CHOSEN.noisy * scale
+            and not white * np.sqrt(sensor.interval / CHOSEN.smoothed) > CHOSEN.noisy * scale
         ):
             return recording
-        shown = _likeliest(problem, shown._replace(noise=max(white, shown.noise)), scale)
-        if not rare and not shown.push < PUSHES[-1]:
+        sensor = _likeliest(problem, sensor._replace(noise=max(white, sensor.noise)), scale)
+        if not rare and not sensor.push < PUSHES[-1]:
             return recording  # a_y does not show this motion
     weights, whole = np.ones(len(new)), _Kinematics(recording, new)
     for _ in range(CHOSEN.again):
-        found, missed, _ = whole.solved(shown, weights)
-        weights = np.minimum(1.0, CHOSEN.clip * shown.noise / np.maximum(np.abs(missed), 1e-12))
+        found, missed, _ = whole.solved(sensor, weights)
+        weights = np.minimum(1.0, CHOSEN.clip * sensor.noise / np.maximum(np.abs(missed), 1e-12))
     found.setflags(write=False)
     by = "straight lines" if recording.a_y is None else "ay, vx and r"
     note = (
-        f"vy: a new value every {1e3 * shown.interval:.0f} ms, {1e3 * shown.late:.0f} ms late, "
-        f"noise {shown.noise:.2g} m/s: brought on time and smoothed by {by}"
+        f"vy: a new value every {1e3 * sensor.interval:.0f} ms, {1e3 * sensor.late:.0f} ms late, "
+        f"noise {sensor.noise:.2g} m/s: brought on time and smoothed by {by}"
     )
     return replace(recording, v_y=found, notes=(*recording.notes, note))
 
@@ -114,7 +114,7 @@ class _Kinematics:
     def __init__(self, recording: Recording, new: NDArray[np.intp]) -> None:
         self.recording, self.new = recording, new
         self.dt, self.n = recording.dt, len(recording)
-        self.shown = recording.needed("v_y")[new]
+        self.values = recording.needed("v_y")[new]
         self.goes = np.ones(self.n - 1, dtype=bool)
         self.goes[np.array(recording.breaks, dtype=np.intp) - 1] = False
         a_y = recording.a_y
@@ -131,7 +131,7 @@ class _Kinematics:
         return np.searchsorted(np.array(self.recording.breaks), np.arange(self.n), side="right")
 
     def solved(
-        self, s: _Shown, weights: Array | float, late: float | None = None
+        self, s: _Sensor, weights: Array | float, late: float | None = None
     ) -> tuple[Array, Array, float]:
         """Return v_y (n,) and what it misses of the values (m,) [m/s], and -ln of the likelihood
         but for a constant [nats].
@@ -172,8 +172,8 @@ class _Kinematics:
             ((2, 2 * i), w * share * (1.0 - share)),
         ):
             np.add.at(band, place, value)
-        np.add.at(g[:, 0], 2 * i, w * (1.0 - share) * self.shown)
-        np.add.at(g[:, 0], 2 * i + 2, w * share * self.shown)
+        np.add.at(g[:, 0], 2 * i, w * (1.0 - share) * self.values)
+        np.add.at(g[:, 0], 2 * i + 2, w * share * self.values)
         factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
         x, X = cho_solve_banded((factor, True), g, check_finite=False).T
         # ρ is a border of the matrix: eliminated by Schur's complement.
@@ -185,7 +185,7 @@ class _Kinematics:
         ) / S
         x = x - roll * X
         v, b = x[::2], x[1::2]
-        missed = (1.0 - share) * v[i] + share * v[i + 1] - self.shown
+        missed = (1.0 - share) * v[i] + share * v[i + 1] - self.values
         moves = np.diff(v) + 0.5 * dt * (b[1:] + b[:-1]) - self.moved + roll * self.felt
         squares = w @ missed**2 + push @ moves**2 + wander @ np.diff(b) ** 2
         squares += ((roll - CHOSEN.poor_roll) / CHOSEN.roll_sd) ** 2 + np.sum(
@@ -197,11 +197,11 @@ class _Kinematics:
         return v, np.where(there, missed, 0.0), 0.5 * float(squares + logs)
 
 
-def _likeliest(problem: _Kinematics, best: _Shown, scale: float) -> _Shown:
+def _likeliest(problem: _Kinematics, best: _Sensor, scale: float) -> _Sensor:
     """Return how v_y is shown, by the largest likelihood, from a beginning on."""
 
-    def cost(shown: _Shown) -> float:  # the same values count for each delay
-        return problem.solved(shown, 1.0, float(DELAYS[-1]))[2]
+    def cost(sensor: _Sensor) -> float:  # the same values count for each delay
+        return problem.solved(sensor, 1.0, float(DELAYS[-1]))[2]
 
     least = cost(best)
 

@@ -23,7 +23,7 @@ SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go wi
 
 
 class _Belief(NamedTuple):
-    """A prior: mean, standard deviation, bounds, and why.
+    """A prior: mean, standard deviation and bounds.
     per : what mean, sd and bounds are multiples of: "" for SI, "L" for the wheelbase, "v" for the
     speed sqrt(L/2.7 m).
     """
@@ -33,34 +33,32 @@ class _Belief(NamedTuple):
     low: float
     high: float
     per: str
-    reason: str
 
 
 INF = float("inf")
 OF_AXLES: dict[str, _Belief] = {
-    "ln_stiffness": _Belief(
-        np.log(14.0), 0.5, np.log(2.0), np.log(60.0), "", "road tires 8-25 loads/rad, 1:10 4-20"
-    ),
-    "ln_grip": _Belief(np.log(0.85), 0.25, np.log(0.1), np.log(3.0), "", "wet asphalt to slicks"),
-    "shape": _Belief(1.35, 0.15, 1.0, 1.9, "", "Magic Formula fits of lateral forces"),
-    "curvature": _Belief(0.0, 0.6, -4.0, 0.95, "", "beyond 0.95 the curve has no peak"),
+    # road tires 8-25 loads/rad, 1:10 4-20
+    "ln_stiffness": _Belief(np.log(14.0), 0.5, np.log(2.0), np.log(60.0), ""),
+    "ln_grip": _Belief(np.log(0.85), 0.25, np.log(0.1), np.log(3.0), ""),  # wet asphalt to slicks
+    "shape": _Belief(1.35, 0.15, 1.0, 1.9, ""),  # Magic Formula fits of lateral forces
+    "curvature": _Belief(0.0, 0.6, -4.0, 0.95, ""),  # beyond 0.95 the curve has no peak
     **{
-        f"residual{j}": _Belief(0.0, 0.08, -INF, INF, "", "what tires of one formula differ by")
+        f"residual{j}": _Belief(0.0, 0.08, -INF, INF, "")  # what tires of one formula differ by
         for j in range(len(SLIPS))
     },
-    "compliance": _Belief(0.008, 0.008, 0.0, 0.1, "L", "relaxation of about a tenth wheelbase"),
-    "sway_share": _Belief(0.2, 0.3, 0.0, 1.0, "", "roll center low to high"),
-    "braking": _Belief(0.65, 0.3, 0.0, 2.0, "", "all four wheels brake"),
-    "driving": _Belief(0.35, 0.4, 0.0, 3.0, "", "which axle drives is not known"),
+    "compliance": _Belief(0.008, 0.008, 0.0, 0.1, "L"),  # relaxation of about a tenth wheelbase
+    "sway_share": _Belief(0.2, 0.3, 0.0, 1.0, ""),  # roll center low to high
+    "braking": _Belief(0.65, 0.3, 0.0, 2.0, ""),  # all four wheels brake
+    "driving": _Belief(0.35, 0.4, 0.0, 3.0, ""),  # which axle drives is not known
 }
 OF_CAR: dict[str, _Belief] = {
-    "load_transfer": _Belief(0.18, 0.08, 0.0, 0.5, "", "height 0.5 m, less what tires lose"),
-    "ln_sway": _Belief(0.0, 0.25, -INF, INF, "", "1.5 Hz for a sedan, 5 sqrt(g/L)"),
-    "steering_zero": _Belief(0.0, 0.007, -0.2, 0.2, "", "a toe or a zero of 0.4 degrees"),
-    "steering_gain": _Belief(0.0, 0.04, -0.6, 1.5, "", "a steering ratio that somebody typed"),
-    "v_y_bias": _Belief(0.0, 0.07, -INF, INF, "v", "of optical and satellite sensors"),
-    "v_y_angle": _Belief(0.0, 0.007, -INF, INF, "", "mounted to 0.4 degrees"),
-    "v_y_lever": _Belief(0.0, 0.015, -INF, INF, "L", "place measured to 4 cm"),
+    "load_transfer": _Belief(0.18, 0.08, 0.0, 0.5, ""),  # height 0.5 m, less what tires lose
+    "ln_sway": _Belief(0.0, 0.25, -INF, INF, ""),  # 1.5 Hz for a sedan, 5 sqrt(g/L)
+    "steering_zero": _Belief(0.0, 0.007, -0.2, 0.2, ""),  # a toe or a zero of 0.4 degrees
+    "steering_gain": _Belief(0.0, 0.04, -0.6, 1.5, ""),  # a steering ratio that somebody typed
+    "v_y_bias": _Belief(0.0, 0.07, -INF, INF, "v"),  # of optical and satellite sensors
+    "v_y_angle": _Belief(0.0, 0.007, -INF, INF, ""),  # mounted to 0.4 degrees
+    "v_y_lever": _Belief(0.0, 0.015, -INF, INF, "L"),  # place measured to 4 cm
 }
 ALIKE = {  # standard deviation of front less rear
     "ln_stiffness": (0.35, ""),

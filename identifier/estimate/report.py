@@ -11,7 +11,7 @@ from identifier.estimate.latent import TRUST
 from identifier.estimate.posterior import Reach, Segment
 from identifier.estimate.priors import Priors
 from identifier.frozen import FORMAT, vehicle_from, vehicle_numbers
-from identifier.motion.parameters import INDEX, NAMES, PARAMETERS
+from identifier.motion.parameters import INDEX, NAMES, UNITS
 from identifier.tire_model import AXLES, GRIP, RELAXATION, STIFFNESS, Axle, Estimate, Reached
 from models.schema import Table
 from models.vehicle import Vehicle
@@ -135,8 +135,8 @@ def to_dict(model: Any) -> dict[str, Any]:
         "kind": model.kind,
         "vehicle": vehicle_numbers(model.vehicle.without_chassis()),
         "parameters": {
-            one.name: {"value": float(value), "unit": one.unit, "sd": math.sqrt(max(variance, 0.0))}
-            for one, value, variance in zip(PARAMETERS, model.p, variances, strict=True)
+            name: {"value": float(value), "unit": unit, "sd": math.sqrt(max(variance, 0.0))}
+            for (name, unit), value, variance in zip(UNITS.items(), model.p, variances, strict=True)
         },
         "covariance": model.covariance.tolist(),
         "driven_slip_rad": reach.slip.tolist(),
@@ -174,7 +174,9 @@ def read(table: Table) -> dict[str, Any]:
         "p": np.array([parameters.table(name).number("value") for name in NAMES]),
         "covariance": array("covariance", (len(NAMES), len(NAMES))),
         "reach": Reach(
-            *(array(key) for key in ("driven_slip_rad", "speeds_m_s", "a_x_m_s2")),
+            slip=array("driven_slip_rad"),
+            speeds=array("speeds_m_s"),
+            a_x=array("a_x_m_s2"),
             alike=array("unexplained") ** 2,
             pairs=1.0,
             segments=tuple(

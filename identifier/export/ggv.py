@@ -11,7 +11,7 @@ which that diamond lies within the diagram: min over f of g f/(1 - a_y(f)/a_y(0)
 ends of theirs that leave less. Each is right or too low in 95 % of cases.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,7 +62,7 @@ def limits(model: TireModel) -> Limits:
     return Limits(v_x, *(GRAVITY * np.array([a_y, *sides])))
 
 
-def _lowest_grip(band: Band[Any], i: int, known: float) -> float:
+def _lowest_grip(band: Band, i: int, known: float) -> float:
     """Return the largest force of the lower end of an axle's band, in static loads."""
     alpha = np.linspace(0.0, known, CHOSEN.slips + 1)[1:]
     half, model = band.half(alpha), band.model

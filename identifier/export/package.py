@@ -189,7 +189,7 @@ def run_in_virtual_machine(
 
     def step(sample: Array) -> Array:
         v_x, v_y, r, delta_f, delta_r, *a_y = sample
-        x, delta = (limits.possible(v_y), r), (delta_f, delta_r)
+        x, delta = (limits.plausible(v_y), r), (delta_f, delta_r)
         results = [np.array(one) for one in specialized.function(*state, x, delta, v_x, *a_y)]
         state[:], outputs = results[: len(state)], results[len(state) :]
         return np.concatenate([one.ravel(order="F") for one in outputs])

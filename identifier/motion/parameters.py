@@ -4,60 +4,49 @@ Axles are `_f` and `_r`. Forces are in static axle loads, so that one prior serv
 """
 
 from functools import cache
-from typing import NamedTuple
 
 SLIPS = (0.01, 0.02, 0.05, 0.12)  # a_j [rad], of what the Magic Formula misses
 
 
-class Parameter(NamedTuple):
-    """A number of the model: its name, its unit, what it is."""
-
-    name: str
-    unit: str
-    meaning: str
+def _of_axles(name: str, unit: str) -> dict[str, str]:
+    return {f"{name}_{axle}": unit for axle in "fr"}
 
 
-def _of_axles(name: str, unit: str, meaning: str) -> tuple[Parameter, Parameter]:
-    return tuple(Parameter(f"{name}_{axle}", unit, meaning) for axle in "fr")  # type: ignore[return-value]
-
-
-PARAMETERS: tuple[Parameter, ...] = (
-    *_of_axles("ln_stiffness", "ln(loads/rad)", "C, slope of the curve at zero"),
-    *_of_axles("ln_grip", "ln(loads)", "μ, largest force of the Magic Formula"),
-    *_of_axles("shape", "-", "c of the Magic Formula"),
-    *_of_axles("curvature", "-", "E of the Magic Formula"),
-    *(
-        Parameter(f"residual{j}_{axle}", "loads", f"q of tanh(x/{slip})")
-        for axle in "fr"
-        for j, slip in enumerate(SLIPS)
-    ),
-    *_of_axles("compliance", "m/load", "s, sideways deflection of the carcass"),
-    *_of_axles("sway_share", "-", "k, share of the body's sway at the contact patch"),
-    *_of_axles("braking", "1/g", "c of the friction ellipse where the car brakes"),
-    *_of_axles("driving", "1/g", "c of the friction ellipse where it is driven"),
-    Parameter("load_transfer", "-", "h, effective height of the load transfer over the wheelbase"),
-    Parameter("ln_sway", "-", "ln of the sway's frequency over the usual one"),
-    Parameter("steering_zero", "rad", "δ0, added to the front steering angle"),
-    Parameter("steering_gain", "-", "g, relative error of the front steering angle"),
-    Parameter("v_y_bias", "m/s", "b, in the measured v_y"),
-    Parameter("v_y_angle", "rad", "β, mounting angle of the sensor of v_y"),
-    Parameter("v_y_lever", "m", "x_s, place of that sensor ahead of the center of gravity"),
-    Parameter("v_y_delay", "s", "τ, by which v_y is late"),
-    Parameter("v_y_lag", "s", "low pass of first order that v_y is behind"),
-    Parameter("steering_delay", "s", "by which the steering angle is late"),
-    Parameter("steering_lag", "s", "low pass of first order that the steering angle is behind"),
-    Parameter("r_bias", "rad/s", "in the measured yaw rate"),
-    Parameter("r_delay", "s", "by which the yaw rate is late"),
-    Parameter("r_lag", "s", "low pass of first order that the yaw rate is behind"),
-    Parameter("r_gain", "-", "relative error of the yaw rate"),
-    Parameter("v_x_factor", "-", "relative error of v_x"),
-    Parameter("cg_shift", "m", "center of gravity ahead of the given one"),
-    Parameter("ln_inertia", "-", "ln of the yaw inertia over the given one"),
-    *_of_axles("downforce", "s²/m²", "of the load per v_x², beside the given one"),
-    Parameter("bank", "g", "side force of a road that is banked throughout"),
-    Parameter("ln_road", "-", "ln of the road's friction over that of the curves"),
-)
-NAMES = tuple(parameter.name for parameter in PARAMETERS)
+UNITS = {
+    **_of_axles("ln_stiffness", "ln(loads/rad)"),  # C, slope of the curve at zero
+    **_of_axles("ln_grip", "ln(loads)"),  # μ, largest force of the Magic Formula
+    **_of_axles("shape", "-"),  # c of the Magic Formula
+    **_of_axles("curvature", "-"),  # E of the Magic Formula
+    **{  # q of tanh(x/a_j)
+        f"residual{j}_{axle}": "loads" for axle in "fr" for j in range(len(SLIPS))
+    },
+    **_of_axles("compliance", "m/load"),  # s, sideways deflection of the carcass
+    **_of_axles("sway_share", "-"),  # k, share of the body's sway at the contact patch
+    **_of_axles("braking", "1/g"),  # c of the friction ellipse where the car brakes
+    **_of_axles("driving", "1/g"),  # c of the friction ellipse where it is driven
+    "load_transfer": "-",  # h, effective height of the load transfer over the wheelbase
+    "ln_sway": "-",  # ln of the sway's frequency over the usual one
+    "steering_zero": "rad",  # δ0, added to the front steering angle
+    "steering_gain": "-",  # g, relative error of the front steering angle
+    "v_y_bias": "m/s",  # b, in the measured v_y
+    "v_y_angle": "rad",  # β, mounting angle of the sensor of v_y
+    "v_y_lever": "m",  # x_s, place of that sensor ahead of the center of gravity
+    "v_y_delay": "s",  # τ, by which v_y is late
+    "v_y_lag": "s",  # low pass of first order that v_y is behind
+    "steering_delay": "s",  # by which the steering angle is late
+    "steering_lag": "s",  # low pass of first order that the steering angle is behind
+    "r_bias": "rad/s",  # in the measured yaw rate
+    "r_delay": "s",  # by which the yaw rate is late
+    "r_lag": "s",  # low pass of first order that the yaw rate is behind
+    "r_gain": "-",  # relative error of the yaw rate
+    "v_x_factor": "-",  # relative error of v_x
+    "cg_shift": "m",  # center of gravity ahead of the given one
+    "ln_inertia": "-",  # ln of the yaw inertia over the given one
+    **_of_axles("downforce", "s²/m²"),  # of the load per v_x², beside the given one
+    "bank": "g",  # side force of a road that is banked throughout
+    "ln_road": "-",  # ln of the road's friction over that of the curves
+}
+NAMES = tuple(UNITS)
 INDEX = {name: i for i, name in enumerate(NAMES)}
 
 

@@ -9,7 +9,7 @@ stay alike says how many of them tell something new.
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +144,7 @@ def _errors_elsewhere(
 
 
 def _spread_by_range(
-    band: Band[Any], recording: Recording, windows: Windows
+    band: Band, recording: Recording, windows: Windows
 ) -> tuple[Array, Array, Array]:
     """Return share, scaled and fixed of `ModelErrors`, (6, m, 2) each."""
     size, count = np.abs(band.model.lagged_slip(recording)), len(AXLE_CHOSEN.centers)

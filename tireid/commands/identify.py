@@ -103,7 +103,7 @@ def run(options: argparse.Namespace) -> int:
         runs: list[History] = []
         for k, one in enumerate((recording, *others)):
             if design.whole and runs:
-                runs.append(runs[0].asked(one, freeze_times[-1]))
+                runs.append(runs[0].evaluated(one, freeze_times[-1]))
                 continue
             share = progress.within(k / count, (k + 1) / count)
             runs.append(  # checked when they were read

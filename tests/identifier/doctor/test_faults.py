@@ -12,7 +12,7 @@ from benchmarks.faults import Late, Misaligned
 from identifier.doctor import Finding, examine
 from identifier.doctor.faults import Candidate, Search, prepared
 from identifier.doctor.suspects import NOTES, SUSPECTS
-from identifier.estimate import Drive
+from identifier.estimate.drive import Drive
 from identifier.estimate.solve import descend
 from identifier.motion.parameters import INDEX
 from models.vehicle import GRAVITY

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from codegen.arrays import Array
-from identifier.estimate import Drive
+from identifier.estimate.drive import Drive
 from identifier.estimate.priors import OF_CAR, Priors
 from identifier.estimate.solve import simulate
 from identifier.motion.model import SIGNALS
