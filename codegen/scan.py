@@ -7,7 +7,7 @@ import ctypes
 import logging
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -249,7 +249,8 @@ class Scan:
         """Return what does the same as the compiled loop, statement by statement of `LOOP`."""
         step = self.step
         packed, now, following, spare, record = memory
-        buffer, evaluate = step.buffer()
+        made: Any = step.buffer()
+        buffer, evaluate = made
 
         def run() -> None:
             nonlocal now, following
@@ -257,15 +258,15 @@ class Scan:
                 row, skipped = divmod(k, every)
                 for port in (*self.over, *self.constants):
                     value = packed[port][k] if port in self.over else packed[port]
-                    buffer.set_arg(step.index_in(port), memoryview(value))
+                    buffer.set_arg(step.index_in(port), value.data)
                 for port, before, after in zip(self.carry, now, following, strict=True):
-                    buffer.set_arg(step.index_in(port), memoryview(before))
-                    buffer.set_res(step.index_out(f"{port}_next"), memoryview(after))
+                    buffer.set_arg(step.index_in(port), before.data)
+                    buffer.set_res(step.index_out(f"{port}_next"), after.data)
                     if not skipped and port in record:
                         record[port][row] = before
                 for port, other in zip(self.outputs, spare, strict=True):
                     here = record[port][row] if not skipped and port in record else other
-                    buffer.set_res(step.index_out(port), memoryview(here))
+                    buffer.set_res(step.index_out(port), here.data)
                 evaluate()
                 now, following = following, now
 
@@ -320,8 +321,8 @@ class Stepper:
         self.outputs = {port: np.zeros(step.numel_out(port)) for port in scan.outputs}
         self._now = {port: packed[port].copy() for port in scan.carry}
         self._before = {port: np.empty_like(array) for port, array in self._now.items()}
-        arrays = (list(one.values()) for one in (self._now, self._before, self.outputs))
-        self._run = scan.runner(samples, _Memory(packed, *arrays, record={}))
+        now, before, spare = (list(a.values()) for a in (self._now, self._before, self.outputs))
+        self._run = scan.runner(samples, _Memory(packed, now, before, spare, {}))
 
     def advance(self) -> None:
         """Take the samples that `inputs` holds; leave what the last one tells in `outputs`."""
