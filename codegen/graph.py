@@ -215,17 +215,9 @@ def assumed(graph: Graph, condition: int, holds: bool) -> Graph:
         if node.op == "and" and holds:
             known |= dict.fromkeys(node.args, True)
             waiting += node.args
-    at_least = {graph.nodes[p].args for p in known if known[p] and graph.nodes[p].op == "le"}
 
-    def change(result: Graph, place: int, node: Node, place_of: Mapping[int, int]) -> int:
-        if place in known:
-            return result.constant(float(known[place]))
-        if node.op == "fmax":
-            one, other = graph.nodes[place].args
-            for smaller, larger in ((one, other), (other, one)):
-                if (smaller, larger) in at_least:
-                    return place_of[larger]
-        return result.add(node)
+    def change(result: Graph, place: int, node: Node, _: Mapping[int, int]) -> int:
+        return result.constant(float(known[place])) if place in known else result.add(node)
 
     return rebuilt(graph, change)
 

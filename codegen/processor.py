@@ -149,11 +149,11 @@ def _build(folder: Path, program: Program, words: Sequence[str], *, single: bool
 
 def _write(folder: Path, files: Mapping[str, str]) -> list[str]:
     """Write headers and sources of a package; return the paths of its library's C files."""
-    for path, text in files.items():
-        if path.endswith((".c", ".h")):
-            (folder / path).parent.mkdir(exist_ok=True)
-            write_file(folder / path, text)
-    return sorted(path for path in files if path.startswith("src/") and path.endswith(".c"))
+    wanted = [path for path in files if path.endswith((".c", ".h"))]
+    for path in wanted:
+        (folder / path).parent.mkdir(exist_ok=True)
+        write_file(folder / path, files[path])
+    return sorted(path for path in wanted if path.endswith(".c") and path.startswith("src/"))
 
 
 def _compile_in(folder: Path, command: Sequence[str]) -> None:
@@ -185,9 +185,7 @@ class _Size(NamedTuple):
     static_ram: int
 
 
-def _size_on(
-    processor: _Processor, name: str, files: Mapping[str, str], *, single: bool, level: str = "-O2"
-) -> _Size:
+def _size_on(processor: _Processor, name: str, files: Mapping[str, str], *, single: bool) -> _Size:
     """Return the memory that a package takes on a processor, instances not included.
     single : whether to compute in float.
     """
@@ -196,7 +194,7 @@ def _size_on(
         sources = _write(folder, files)
         define = f"-D{name.upper()}_SINGLE={int(single)}"
         for source in sources:
-            words = [*processor.flags, *FLAGS, level, define, "-Iinclude", "-Isrc", "-c", source]
+            words = [*processor.flags, *FLAGS, define, "-Iinclude", "-Isrc", "-c", source]
             _compile_in(folder, [CROSS_COMPILER, *words])
         objects = [Path(source).with_suffix(".o").name for source in sources]
         answer = subprocess.run(
@@ -205,13 +203,6 @@ def _size_on(
         rows = [line.split() for line in answer.stdout.splitlines()[1:]]
         text, data, bss = (sum(int(row[i]) for row in rows) for i in range(3))
         return _Size(flash=text + data, static_ram=data + bss)
-
-
-@cache
-def compiler_version(command: str) -> str:
-    """Return the first line of what a compiler says about itself."""
-    answer = subprocess.run([command, "--version"], capture_output=True, text=True, check=True)
-    return answer.stdout.splitlines()[0]
 
 
 # Flash, RAM, stack and instructions of a package, measured where the tools for Arm are there.
@@ -257,8 +248,9 @@ def cost_on(program: Program, processor: _Processor, *, single: bool) -> Cost:
     """
     size = _size_on(processor, program.name, program.files, single=single)
     run = replay(program, processor, single=single)
-    version = compiler_version(CROSS_COMPILER)
-    return Cost(processor.name, version, single, size.flash, run, size.static_ram)
+    words = [CROSS_COMPILER, "--version"]
+    told = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    return Cost(processor.name, told.splitlines()[0], single, size.flash, run, size.static_ram)
 
 
 def cost_table(costs: Sequence[Cost], about: str) -> str:

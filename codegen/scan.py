@@ -7,6 +7,7 @@ import ctypes
 import logging
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -54,6 +55,20 @@ int {name}_scan(long n, long every, const double** arg, const long* arg_step,
   return 0;
 }}
 """
+
+
+class _Memory(NamedTuple):
+    """Where a run reads and writes, flat arrays by columns.
+    packed : of each input.   now, following : of carried ports, before and after a sample; they
+        change places at each.
+    spare : of the outputs, where they are not recorded.   record : of ports that are recorded.
+    """
+
+    packed: Mapping[str, Array]
+    now: Sequence[Array]
+    following: Sequence[Array]
+    spare: Sequence[Array]
+    record: Mapping[str, Array]
 
 
 class Scan:
@@ -152,7 +167,7 @@ class Scan:
         now = [packed[p].copy() for p in self.carry]
         following = [np.empty_like(a) for a in now]
         spare = [np.empty(step.numel_out(p)) for p in self.outputs]
-        self.runner(n, packed, now, following, spare, record, every)()
+        self.runner(n, _Memory(packed, now, following, spare, record), every)()
         last = dict(zip(self.carry, following if n % 2 else now, strict=True))
         return self._shape_all(record, last)
 
@@ -193,24 +208,12 @@ class Scan:
                 found[port] = _shaped(flat, self._size_out[port])
         return found
 
-    def runner(
-        self,
-        n: int,
-        packed: Mapping[str, Array],
-        now: Sequence[Array],
-        following: Sequence[Array],
-        spare: Sequence[Array],
-        record: Mapping[str, Array],
-        every: int = 1,
-    ) -> Callable[[], None]:
-        """Return what runs samples in this memory; the next call goes on where one ended.
-        now, following : of carried ports, before and after a sample; they change places at each.
-        spare : of the outputs, where they are not recorded.
-        record : of ports that are recorded.
-        """
+    def runner(self, n: int, memory: _Memory, every: int = 1) -> Callable[[], None]:
+        """Return what runs samples in this memory; the next call goes on where one ended."""
         step, loop = self.step, self.loop
         if loop is None:
-            return self._virtual_machine(n, packed, now, following, spare, record, every)
+            return self._virtual_machine(n, memory, every)
+        packed, now, following, spare, record = memory
         carry, outputs = self.carry, self.outputs
         work = np.empty(max(step.sz_iw(), 1), dtype=np.int64), np.empty(max(step.sz_w(), 1))
         strides = [step.numel_in(p) if p in self.over else 0 for p in self._size_in]
@@ -235,27 +238,19 @@ class Scan:
             (ctypes.c_void_p * max(step.sz_res(), step.n_out()))(),
             *(one.ctypes.data_as(ctypes.c_void_p) for one in work),
         ]
-        memory = (packed, now, following, spare, record, work)  # alive as long as the pointers
 
-        def run(_memory: object = memory) -> None:
+        def run(_alive: object = (memory, work)) -> None:  # as long as the pointers
             if loop(*arguments):
                 raise RuntimeError(f"{step.name()} reported a failure")
 
         return run
 
-    def _virtual_machine(
-        self,
-        n: int,
-        packed: Mapping[str, Array],
-        now: Sequence[Array],
-        following: Sequence[Array],
-        spare: Sequence[Array],
-        record: Mapping[str, Array],
-        every: int,
-    ) -> Callable[[], None]:
+    def _virtual_machine(self, n: int, memory: _Memory, every: int) -> Callable[[], None]:
         """Return what does the same as the compiled loop, statement by statement of `LOOP`."""
         step = self.step
-        memory, evaluate = step.buffer()
+        packed, now, following, spare, record = memory
+        made: Any = step.buffer()
+        buffer, evaluate = made
 
         def run() -> None:
             nonlocal now, following
@@ -263,15 +258,15 @@ class Scan:
                 row, skipped = divmod(k, every)
                 for port in (*self.over, *self.constants):
                     value = packed[port][k] if port in self.over else packed[port]
-                    memory.set_arg(step.index_in(port), memoryview(value))
+                    buffer.set_arg(step.index_in(port), value.data)
                 for port, before, after in zip(self.carry, now, following, strict=True):
-                    memory.set_arg(step.index_in(port), memoryview(before))
-                    memory.set_res(step.index_out(f"{port}_next"), memoryview(after))
+                    buffer.set_arg(step.index_in(port), before.data)
+                    buffer.set_res(step.index_out(f"{port}_next"), after.data)
                     if not skipped and port in record:
                         record[port][row] = before
                 for port, other in zip(self.outputs, spare, strict=True):
                     here = record[port][row] if not skipped and port in record else other
-                    memory.set_res(step.index_out(port), memoryview(here))
+                    buffer.set_res(step.index_out(port), here.data)
                 evaluate()
                 now, following = following, now
 
@@ -326,8 +321,8 @@ class Stepper:
         self.outputs = {port: np.zeros(step.numel_out(port)) for port in scan.outputs}
         self._now = {port: packed[port].copy() for port in scan.carry}
         self._before = {port: np.empty_like(array) for port, array in self._now.items()}
-        memory = (list(one.values()) for one in (self._now, self._before, self.outputs))
-        self._run = scan.runner(samples, packed, *memory, record={})
+        now, before, spare = (list(a.values()) for a in (self._now, self._before, self.outputs))
+        self._run = scan.runner(samples, _Memory(packed, now, before, spare, {}))
 
     def advance(self) -> None:
         """Take the samples that `inputs` holds; leave what the last one tells in `outputs`."""

@@ -153,8 +153,6 @@ class _Simplifier:
         values = [self._constant(a) for a in args]
         if node.op == "and" and 1.0 in values:
             return {args[1 - values.index(1.0)]: 1.0}
-        if node.op == "if_else_zero" and values[1] == 0.0:
-            return {}
         return {self.result.add(Node(node.op, args)): 1.0}
 
     # a form as operations
@@ -209,14 +207,12 @@ class _Simplifier:
         return node.args
 
     def _common_factor(self, form: Form) -> int | None:
-        """Return a factor of at least two terms, the one with most; of equals the least read."""
+        """Return a factor of at least two terms, the one with most; of equals the first."""
         count: Counter[int] = Counter()
         for place in form:
             count.update({place, *self._factors(place)} - {self.one})
         often = [place for place, n in count.items() if n > 1]
-        if not often:
-            return None
-        return min(often, key=lambda place: (-count[place], self.uses[place], place))
+        return min(often, key=lambda place: (-count[place], place), default=None)
 
 
 def _merged(one: Form, other: Form) -> Form:

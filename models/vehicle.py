@@ -84,14 +84,12 @@ class Chassis:
     tire: Path | None = None
 
     def __post_init__(self) -> None:
-        for (low, high), names in _RANGES.items():
+        centers = ("roll_center_height_front", "roll_center_height_rear")
+        for (low, high), names in (*_RANGES.items(), ((0.0, self.cg_height), centers)):
             values = {name: getattr(self, name) for name in names}
             if low > 0.0:
                 require_positive(VehicleError, **values)
             require_within(VehicleError, low, high, **values)
-        centers = ("roll_center_height_front", "roll_center_height_rear")
-        values = {name: getattr(self, name) for name in centers}
-        require_within(VehicleError, 0.0, self.cg_height, **values)
 
 
 def _from_folder(value: Any, folder: Path) -> Any:
@@ -235,11 +233,7 @@ class Vehicle:
         for name in self.estimated:
             if name not in _RULES:
                 raise VehicleError(f"estimated must be of {', '.join(_RULES)}, not {shown(name)}")
-        require_positive(
-            VehicleError, mass=self.mass, yaw_inertia=self.yaw_inertia, l_f=self.l_f, l_r=self.l_r,
-            cornering_stiffness_front=self.cornering_stiffness_front,
-            cornering_stiffness_rear=self.cornering_stiffness_rear,
-        )  # fmt: skip
+        require_positive(VehicleError, **{name: getattr(self, name) for name in BICYCLE})
         self._require_plausible()
         if self.chassis is not None:
             tipping = self.weight * self.roll_arm

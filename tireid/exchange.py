@@ -5,9 +5,7 @@ import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 from codegen.errors import TireidError
 
@@ -31,25 +29,15 @@ class ClaimedError(TireidError, OSError):
         )
 
 
-@cache
-def _renameat2() -> Any:
-    """Return the function of the C library; None where it has none, as on other than Linux."""
-    try:
-        function = ctypes.CDLL(None, use_errno=True).renameat2
-    except (OSError, AttributeError, TypeError):
-        return None
-    kinds = (ctypes.c_int, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_uint)
-    function.argtypes = list(kinds)
-    return function
-
-
 def exchange(one: Path, other: Path) -> bool:
     """Let two folders change places in one step; return whether the system could."""
-    function = _renameat2()
-    if function is None:
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except (OSError, AttributeError, TypeError):  # on other than Linux
         return False
     names = os.fsencode(one), os.fsencode(other)
-    if function(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _RENAME_EXCHANGE) == 0:
+    flag = ctypes.c_uint(_RENAME_EXCHANGE)
+    if rename(_AT_FDCWD, names[0], _AT_FDCWD, names[1], flag) == 0:
         return True
     number = ctypes.get_errno()
     if number in _CANNOT:

@@ -133,7 +133,13 @@ def export(
         )
         if onnx:  # what cannot be made is refused before costs are measured
             progress.begin(_NETWORK)
-            _write_onnx(scratch, method, car, package, start, band=band)
+            from identifier.export.onnx import onnx_bytes
+
+            try:
+                model = start or method.frozen(car, package.specialized.carry)
+            except CannotFreezeError as error:
+                raise ValueError(f"--onnx: {error}") from error
+            write_file(scratch / f"{name}.onnx", onnx_bytes(model, with_band=band))
         if mpc:
             frozen_start(package)  # likewise
         costs = measure(package, progress.begin(_COSTS))
@@ -148,11 +154,8 @@ def export(
             from identifier.export.fmu import export_fmu
 
             for version in (2, 3):
-                export_fmu(
-                    package.specialized,
-                    scratch / f"{package.specialized.name}_fmi{version}.fmu",
-                    version,
-                )
+                path = scratch / f"{name}_fmi{version}.fmu"
+                export_fmu(package.specialized, path, version)
                 progress.step(2)
     return Exported(folder=target, package=package, costs=tuple(costs), notes=tuple(notes))
 
@@ -167,25 +170,6 @@ def _write_texts(folder: Path, texts: Mapping[str, str]) -> None:
     for path, text in texts.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         write_file(folder / path, text)
-
-
-def _write_onnx(
-    folder: Path,
-    method: Method,
-    vehicle: Vehicle,
-    package: Package,
-    start: TireModel | None,
-    *,
-    band: bool,
-) -> None:
-    from identifier.export.onnx import onnx_bytes
-
-    try:
-        model = start or method.frozen(vehicle, package.specialized.carry)
-    except CannotFreezeError as error:
-        raise ValueError(f"--onnx: {error}") from error
-    content = onnx_bytes(model, with_band=band)
-    write_file(folder / f"{package.specialized.name}.onnx", content)
 
 
 _TRACKER = "mpc"  # folder of the package; that of the identifier is `identifier`

@@ -4,7 +4,6 @@ Generated are `<name>_config.h` (switches, numbers, structures), `<name>_tables.
 starts, what weights must keep) and `<name>_equations.c`.
 """
 
-import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -58,8 +57,8 @@ def c_sources(specialized: SpecializedStep, *, single: bool, about: Values) -> d
     if not specialized.carry:
         kind = type(specialized.method).__name__
         raise ValueError(f"{kind} is a formula without state: nothing to export")
-    for number in (number for value in specialized.carry.values() for number in value.ravel()):
-        if not math.isfinite(number):
+    for value in specialized.carry.values():
+        for number in value[~np.isfinite(value)]:
             raise ValueError(f"a carried value must be finite to be exported, it is {number}")
     name = specialized.name
     return {
@@ -77,6 +76,7 @@ def _config(specialized: SpecializedStep, *, single: bool, about: Values) -> str
     name, learnt, others = specialized.name, *_weights_and_others(specialized)
     title = f"{in_comment(about['title'])} ({about['method']}): switches, numbers, structures."
     stale = f"{name.upper()}_STALE_TIME"
+    inputs = [Member(port, (1, 1), False) for port in specialized.inputs]
     return header(
         f"{name}_config.h",
         f"{title}\n\n{generated(about)}",
@@ -87,7 +87,7 @@ def _config(specialized: SpecializedStep, *, single: bool, about: Values) -> str
             "/* Time [s] without a sample that could be taken after which no force is output any\n"
             f" * more; may be set when the library is compiled. */\n#ifndef {stale}\n"
             f"#define {stale} ({_number(STALE_TIME)})\n#endif\n",
-            _structure(f"{name}_input", _inputs(specialized)),
+            _structure(f"{name}_input", _declarations(inputs, name)),
             _structure(f"{name}_output", _declarations(output_members(specialized), name)),
             _structure(f"{name}_weights", _declarations(learnt, name), "What is identified."),
             _structure(f"{name}_signals", _declarations(others, name), "Other states."),
@@ -162,20 +162,12 @@ def _number(value: float) -> str:
 
 def _sums(specialized: SpecializedStep) -> bool:
     """Return whether the equations sum up what they tell, while it is at hand."""
-    return (
-        sum(map(specialized.function.numel_out, range(specialized.function.n_out())))
-        > MOST_UNSUMMED
-    )
+    return specialized.function.nnz_out() > MOST_UNSUMMED
 
 
 def _weights_and_others(specialized: SpecializedStep) -> tuple[list[Member], list[Member]]:
     members = carried_members(specialized)
     return [m for m in members if m.learnt], [m for m in members if not m.learnt]
-
-
-def _inputs(specialized: SpecializedStep) -> str:
-    members = [Member(port, (1, 1), False) for port in specialized.inputs]
-    return _declarations(members, specialized.name)
 
 
 def _declarations(members: Sequence[Member], name: str) -> str:

@@ -71,7 +71,10 @@ class CompiledPackage:
         self._outputs = {one.text("name"): one.whole("size") for one in table.tables("outputs")}
         learnt = [one for one in table.tables("carried") if one.value("learnt")]
         self._weights = {one.text("name"): one.wholes("shape") for one in learnt}
-        library = load_library(self._source(files), f"{self.name}_package")
+        texts = [files[path.format(self.name)] for path in ORDER]
+        texts += c_files(C, {"glue.c": "."}, {PREFIX: self.name}).values()
+        source = one_file(texts, defines={f"{self.name.upper()}_SINGLE": int(self.single)})
+        library = load_library(source, f"{self.name}_package")
         if library is None:
             raise NoCompilerError("no C compiler found: the package cannot be built")
         self._library = library
@@ -105,11 +108,6 @@ class CompiledPackage:
                 }
                 return cls(manifest, files, single=single)
         raise PackageFileError(f"{folder}: no package, a JSON file of format {FORMAT!r} is missing")
-
-    def _source(self, files: Mapping[str, str]) -> str:
-        texts = [files[path.format(self.name)] for path in ORDER]
-        (glue,) = c_files(C, {"glue.c": "."}, {PREFIX: self.name}).values()
-        return one_file([*texts, glue], defines={f"{self.name.upper()}_SINGLE": int(self.single)})
 
     def _call(self, function: str) -> Any:
         return getattr(self._library, f"{self.name}_{function}")  # which keeps it
@@ -194,15 +192,11 @@ class CompiledPackage:
         """What is learnt, by name; empty for a method that estimates a signal."""
         if not self._weights:
             return {}
-        flat = np.empty(self._weights_size)
+        ends = np.cumsum([math.prod(shape) for shape in self._weights.values()])
+        flat = np.empty(ends[-1])
         self._call("instance_weights")(self._instance, ctypes.c_void_p(flat.ctypes.data))
-        ends = np.cumsum([int(np.prod(shape)) for shape in self._weights.values()])[:-1]
-        parts = zip(self._weights.items(), np.split(flat, ends), strict=True)
+        parts = zip(self._weights.items(), np.split(flat, ends[:-1]), strict=True)
         return {name: part.reshape(shape) for (name, shape), part in parts}
-
-    @property
-    def _weights_size(self) -> int:
-        return sum(int(np.prod(shape)) for shape in self._weights.values())
 
     def set_weights(self, weights: Mapping[str, Array]) -> None:
         """Go on with other weights.   weights : by name, in the shapes of `weights`."""

@@ -8,11 +8,10 @@ import shutil
 import subprocess
 import tempfile
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from functools import lru_cache
+from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePosixPath
 from typing import Literal, NamedTuple
+from uuid import UUID
 from xml.etree.ElementTree import Element, indent, tostring
 
 from codegen import CompilationError, find_compiler
@@ -59,53 +58,20 @@ def targets() -> tuple[_Target, ...]:
     return tuple(found)
 
 
-_Files = tuple[tuple[str, bytes], ...]  # content by name
-
-
-def _build_binary(
-    target: _Target, name: str, model: Mapping[str, bytes], around: Mapping[str, bytes]
-) -> bytes:
-    """Compile sources to a shared library and return its content.
-    model : content by name of C files and headers that need no other: compiled once for both
-        versions of FMI, since the equations take longest.
-    """
-    built = _objects(target, tuple(sorted(model.items())))
-    with _folder_of({**model, **around, **dict(built)}) as folder:
-        library = f"{name}{target.ending}"
-        words = [*_c_files(around), *(file for file, _ in built), "-o", library]
-        _compile(target, words, folder)
+def _build_binary(target: _Target, name: str, sources: Mapping[str, bytes]) -> bytes:
+    """Compile sources, by name, to a shared library and return its content."""
+    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
+        folder, library = Path(scratch), f"{name}{target.ending}"
+        for file, content in sources.items():
+            write_file(folder / file, content)
+        words = [*(file for file in sources if file.endswith(".c")), "-o", library]
+        command = [*target.compiler, *KEEP_GUARDS, *_FLAGS, *words, *target.flags]
+        answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+        if answer.returncode != 0:
+            lines = "\n".join(answer.stderr.splitlines()[:5])
+            raise CompilationError(f"{target.compiler[0]} refused the FMU's sources:\n{lines}")
         log.info("compiled %s for %s", library, target.folder_2)
         return (folder / library).read_bytes()
-
-
-@lru_cache(maxsize=4)
-def _objects(target: _Target, model: _Files) -> _Files:
-    with _folder_of(dict(model)) as folder:
-        sources = _c_files(dict(model))
-        _compile(target, ["-c", *sources], folder)
-        built = [Path(source).with_suffix(".o").name for source in sources]
-        return tuple((file, (folder / file).read_bytes()) for file in built)
-
-
-def _c_files(files: Iterable[str]) -> list[str]:
-    return [file for file in files if file.endswith(".c")]
-
-
-@contextmanager
-def _folder_of(files: Mapping[str, bytes]) -> Iterator[Path]:
-    """A folder that holds the files until the block ends."""
-    with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
-        for file, content in files.items():
-            write_file(Path(scratch) / file, content)
-        yield Path(scratch)
-
-
-def _compile(target: _Target, words: Sequence[str], folder: Path) -> None:
-    command = [*target.compiler, *KEEP_GUARDS, *_FLAGS, *words, *target.flags]
-    answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    if answer.returncode != 0:
-        first_lines = "\n".join(answer.stderr.splitlines()[:5])
-        raise CompilationError(f"{target.compiler[0]} refused the FMU's sources:\n{first_lines}")
 
 
 # C source of a step for the FMU: the files of the C package, and those of c_fmu/ around them.
@@ -155,19 +121,6 @@ class _Variable(NamedTuple):
     causality: Literal["input", "output", "parameter", "local"] = "output"
     variability: Literal["continuous", "discrete", "tunable", "constant"] = "discrete"
     start: str = ""
-
-    @property
-    def about(self) -> dict[str, object]:
-        """What the standard wants to be said; of the initial value of an input, nothing."""
-        initial = "exact" if self.start else "calculated"
-        return {
-            "name": self.name,
-            "valueReference": self.reference,
-            "description": self.description,
-            "causality": self.causality,
-            "variability": self.variability,
-            "initial": "" if self.causality == "input" else initial,
-        }
 
 
 def _variables(step: SpecializedStep) -> tuple[_Variable, ...]:
@@ -252,9 +205,10 @@ def _description(
     """Return modelDescription.xml."""
     table = _variables(step)
     outputs = [(i, one) for i, one in enumerate(table, start=1) if one.causality == "output"]
+    listed = [_described(one, version) for one in table]
     simulation = {"modelIdentifier": step.name}
     if version == 2:
-        key, can, listed = "guid", _CAN_2, list(map(_variable_2, table))
+        key, can = "guid", _CAN_2
         names = (_element("File", {"name": name}) for name in sources)
         files = [_element("SourceFiles", {}, *names)]
         known = [_element("Unknown", {"index": i}) for i, _ in outputs]
@@ -262,7 +216,7 @@ def _description(
     else:
         time = {"name": "time", "valueReference": 0, "causality": "independent", "unit": "s"}
         time |= {"variability": "continuous", "description": "simulation time"}
-        listed = [_element("Float64", time), *map(_variable_3, table)]
+        listed.insert(0, _element("Float64", time))
         key, can, files = "instantiationToken", _CAN_3, []
         structure = [
             _element(tag, {"valueReference": one.reference})
@@ -326,15 +280,22 @@ def _units(table: Sequence[_Variable]) -> Element:
     return _element("UnitDefinitions", {}, *units)
 
 
-def _variable_2(variable: _Variable) -> Element:
-    tag = {"real": "Real", "integer": "Integer", "boolean": "Boolean"}[variable.kind]
-    kind = _element(tag, {"unit": variable.unit, "start": variable.start})
-    return _element("ScalarVariable", variable.about, kind)
-
-
-def _variable_3(variable: _Variable) -> Element:
-    tag = {"real": "Float64", "integer": "Int32", "boolean": "Boolean"}[variable.kind]
-    return _element(tag, {**variable.about, "unit": variable.unit, "start": variable.start})
+def _described(variable: _Variable, version: "Version") -> Element:
+    kinds = {"real": ("Real", "Float64"), "integer": ("Integer", "Int32")}
+    tag = kinds.get(variable.kind, ("Boolean", "Boolean"))[version - 2]
+    initial = "exact" if variable.start else "calculated"
+    about = {
+        "name": variable.name,
+        "valueReference": variable.reference,
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
+        "initial": "" if variable.causality == "input" else initial,  # as the standard wants it
+    }
+    value = {"unit": variable.unit, "start": variable.start}
+    if version == 2:
+        return _element("ScalarVariable", about, _element(tag, value))
+    return _element(tag, about | value)
 
 
 Version = Literal[2, 3]
@@ -367,13 +328,10 @@ def export_fmu(specialized: SpecializedStep, path: Path, version: Version = 2) -
         for name, content in members.items()
         if name.endswith((".c", ".h"))
     }
-    of_fmu = {*SHARED, *OF_VERSION[version], TOKEN}
-    around = {name: content for name, content in sources.items() if name in of_fmu}
-    model = {name: content for name, content in sources.items() if name not in of_fmu}
     for target in built:
         folder = target.folder_2 if version == 2 else target.folder_3
         library = f"binaries/{folder}/{specialized.name}{target.ending}"
-        members[library] = _build_binary(target, specialized.name, model, around)
+        members[library] = _build_binary(target, specialized.name, sources)
     write_atomically(path, _archive(members))
 
 
@@ -404,7 +362,7 @@ def _text_with(
 def _token(content: str) -> str:
     """Return a GUID made of the content: another model has another."""
     digest = hashlib.sha256(content.encode("utf-8")).hexdigest()
-    return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
+    return f"{{{UUID(digest[:32])}}}"
 
 
 def _archive(members: Mapping[str, bytes]) -> bytes:

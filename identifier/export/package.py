@@ -21,7 +21,7 @@ from codegen.package import (
 from codegen.template import Values, Words, filled
 from identifier.export.c_source import PREFIX, PROGRAMS, C, c_sources
 from identifier.export.chosen import CHOSEN
-from identifier.export.layout import Member, carried_members, output_members, rules
+from identifier.export.layout import carried_members, rules
 from identifier.export.specialize import (
     ACCELERATION,
     SIDE_SLIP,
@@ -46,9 +46,7 @@ def ingredients(specialized: SpecializedStep, *, single: bool) -> dict[str, Any]
     single : whether float is the default precision.
     """
     method = specialized.method
-    numbers: dict[str, Any] = (
-        asdict(method) if is_dataclass(method) and not isinstance(method, type) else {}
-    )
+    numbers: Any = asdict(method) if is_dataclass(method) else {}
     return {
         **content_head(FORMAT, specialized.name, single=single),
         "method": {"kind": type(method).__name__, **plain(numbers)},
@@ -132,12 +130,7 @@ def _number(value: float | None) -> str:
 
 
 def _described(signal: Signal) -> dict[str, Any]:
-    return {
-        "name": signal.name,
-        "size": signal.size,
-        "unit": signal.unit,
-        "description": signal.description,
-    }
+    return {key: value for key, value in signal._asdict().items() if key != "rule"}
 
 
 # Samples for the self-test of a package, and the forces that CasADi gives for them.
@@ -269,16 +262,12 @@ def build_package(
     content = ingredients(specialized, single=single)
     about = summary(specialized, content)
     files = c_sources(specialized, single=single, about=about)
-    files |= _programs(specialized)
+    files |= {
+        **c_files(C, PROGRAMS, {PREFIX: name}),
+        f"tests/{name}_vectors.h": vectors_header(specialized, vectors(specialized)),
+    }
     files |= cmake(files, about, flags=FLAGS, so_that="square roots without a call")
     return Package(specialized, files | {f"{name}.json": manifest_text(content, files)}, about)
-
-
-def _programs(specialized: SpecializedStep) -> dict[str, str]:
-    return {
-        **c_files(C, PROGRAMS, {PREFIX: specialized.name}),
-        f"tests/{specialized.name}_vectors.h": vectors_header(specialized, vectors(specialized)),
-    }
 
 
 def _tolerances(specialized: SpecializedStep) -> tuple[str, str]:
@@ -290,20 +279,21 @@ def _tolerances(specialized: SpecializedStep) -> tuple[str, str]:
 def readme(package: Package, about_figures: str) -> str:
     specialized = package.specialized
     state = carried_members(specialized)
-    carry_table = "".join(
-        f"| `{m.path}` | {_shape(m)} | {m.signal.unit} | {m.signal.description} |\n" for m in state
-    )
-    modes = _modes(specialized)
+    shapes = [" x ".join(map(str, m.dimensions)) or "1" for m in state]
+    carried = [
+        f"| `{m.path}` | {shape} | {m.signal.unit} | {m.signal.description} |\n"
+        for m, shape in zip(state, shapes, strict=True)
+    ]
     double, single = _tolerances(specialized)
     equations = package.files[f"src/{specialized.name}_equations.c"]
     called = [f"`{word}`" for word in ("sqrt", "fabs", "floor") if f" {word}(x)" in equations]
     return filled(
         C / "README.md",
         {
-            "input_table": _table([Member(s, (1, 1), False) for s in specialized.inputs]),
-            "output_table": _table(output_members(specialized)),
-            "carry_table": carry_table,
-            "modes": modes,
+            "input_table": _table(specialized.inputs),
+            "output_table": _table(specialized.outputs),
+            "carry_table": "".join(carried),
+            "modes": _modes(specialized),
             "implausible_row": _implausible_row(specialized),
             "stale_time": f"{STALE_TIME:g}",
             **_about_signals(specialized),
@@ -384,11 +374,5 @@ def _about_gaps(specialized: SpecializedStep) -> dict[str, str]:
     }
 
 
-def _table(members: Sequence[Member]) -> str:
-    return "".join(
-        f"| `{m.signal.name}` | {m.signal.unit} | {m.signal.description} |\n" for m in members
-    )
-
-
-def _shape(member: Member) -> str:
-    return " x ".join(str(size) for size in member.dimensions) or "1"
+def _table(signals: Sequence[Signal]) -> str:
+    return "".join(f"| `{s.name}` | {s.unit} | {s.description} |\n" for s in signals)

@@ -17,7 +17,7 @@ from codegen.arrays import Array
 from codegen.tuned import Tuned, tuned
 from identifier.method import Method
 from identifier.refused import GATE, SampleLimits, judges_samples
-from identifier.setup import HALF_BAND, Port, Setup
+from identifier.setup import AXLE_FORCE, HALF_BAND, Setup
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
 
@@ -104,10 +104,6 @@ class SpecializedStep(NamedTuple):
         return tuple(takewhile(given.__contains__, SIDE_SLIP))
 
 
-def _described(port: Port, size: int) -> Signal:
-    return Signal(port.name, port.unit, port.words, size, port.rule)
-
-
 def specialize(
     method: Method,
     vehicle: Vehicle,
@@ -136,7 +132,17 @@ def specialize(
     with_a_y = with_a_y or "a_y" in method.needs
     step, left_out = setup.scan.step, () if with_a_y else setup.only_with_a_y
     carry = {port: one for port, one in setup.carry.items() if port not in left_out}
-    parts = _specialized(setup, list(carry), name, with_a_y=with_a_y)
+    outputs = sorted(setup.scan.outputs, key=lambda port: port != AXLE_FORCE.name)
+    parts = _specialized(setup, list(carry), outputs, name, with_a_y=with_a_y)
+    inputs = list(INPUTS)
+    if "v_y" not in method.needs:
+        missing = f"{INPUTS[1].description}; NaN where there is none"
+        inputs[1] = INPUTS[1]._replace(description=missing)
+
+    def described(name: str, size: int) -> Signal:
+        port = method.port(name)
+        return Signal(port.name, port.unit, port.words, size, port.rule)
+
     return SpecializedStep(
         name=name,
         method=method,
@@ -145,11 +151,9 @@ def specialize(
         parts=parts,
         carry={port: _matrix(value, step.size_in(port)) for port, value in carry.items()},
         learnt=tuple(port for port in carry if method.port(port).learnt),
-        inputs=(*_measured(method), *[ACCELERATION] * with_a_y),
-        outputs=tuple(
-            _described(method.port(port), step.numel_out(port)) for port in _outputs(setup)
-        ),
-        state=tuple(_described(method.port(port), value.size) for port, value in carry.items()),
+        inputs=(*inputs, *[ACCELERATION] * with_a_y),
+        outputs=tuple(described(port, step.numel_out(port)) for port in outputs),
+        state=tuple(described(port, value.size) for port, value in carry.items()),
         dt=method.dt,
         min_speed=method.min_speed,
         rests_first=setup.observe is not None,
@@ -159,23 +163,9 @@ def specialize(
     )
 
 
-def _measured(method: Method) -> tuple[Signal, ...]:
-    """Return the inputs that every step has; v_y may be missing where the method tells it."""
-    if "v_y" in method.needs:
-        return INPUTS
-    absent = "; NaN where there is none"
-    return tuple(
-        port._replace(description=port.description + absent) if port.name == "v_y" else port
-        for port in INPUTS
-    )
-
-
-def _outputs(setup: Setup) -> list[str]:
-    """Return the outputs of a step beside its state, forces first."""
-    return sorted(setup.scan.outputs, key=lambda port: port != "axle_force")
-
-
-def _specialized(setup: Setup, carry: list[str], name: str, *, with_a_y: bool) -> Tuned:
+def _specialized(
+    setup: Setup, carry: list[str], outputs: list[str], name: str, *, with_a_y: bool
+) -> Tuned:
     step = setup.scan.step
     sampled_ports = SAMPLED if with_a_y else SAMPLED[:-1]
     ports = {port: ca.SX.sym(port, *step.size_in(port)) for port in carry}
@@ -188,7 +178,7 @@ def _specialized(setup: Setup, carry: list[str], name: str, *, with_a_y: bool) -
         for port, value in (*setup.constants.items(), *rest.items())
     }
     results = step(**sampled, **constants)
-    wanted = [*(f"{port}_next" for port in carry), *_outputs(setup)]
+    wanted = [*(f"{port}_next" for port in carry), *outputs]
     literal = ca.Function(
         name,
         list(ports.values()),

@@ -207,7 +207,7 @@ def test_known_conditions_decide():
     place = decision(graph, {3})
     driving, resting = (simplified(assumed(graph, place, holds)) for holds in (True, False))
     for part in (driving, resting):
-        assert not {"select", "if_else_zero", "and", "le", "fmax"} & set(operations(part))
+        assert not {"select", "if_else_zero", "and", "le"} & set(operations(part))
     assert set(operations(resting)) <= {"input", "const"}  # W as it is, no force
 
 
