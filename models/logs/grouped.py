@@ -14,8 +14,18 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.foreign import one_line
-from models.logs.log import Channel, Heading, Listed, RecordingError, chosen, few, one_run, some
-from models.logs.stamps import Stamps, risen
+from models.logs.log import (
+    Channel,
+    Clock,
+    Heading,
+    Listed,
+    RecordingError,
+    chosen,
+    few,
+    one_run,
+    some,
+)
+from models.logs.stamps import Stamps, seconds
 from models.logs.units import TIME, to_si
 
 _MOST_NOTED = 5  # names that a note lists
@@ -123,8 +133,8 @@ class GroupedLog(Generic[_P]):
         found: dict[str, tuple[Array, Array, NDArray[np.int64]]] = {}
         with one_line(self.path, self.what):
             for clock, t, values in self.samples(asked):
-                rows, what = np.arange(1, t.size + 1), f"the clock of {clock}"
-                stamps = risen(
+                rows, what = np.arange(1, t.size + 1), Clock(0, f"the clock of {clock}", "s", "")
+                stamps = seconds(
                     str(self.path), what, t, rows, self.place, mend=self.mend, restarts=False
                 )
                 self._mended.extend(stamps.notes)
@@ -147,7 +157,8 @@ class GroupedLog(Generic[_P]):
         t = clock.values * to_si(self.clock_unit or clock.unit, TIME, label)
         stamps = Stamps(t, ())
         if self.mend:
-            stamps = risen(str(self.path), "t", t, clock.rows, clock.place, mend=True)
+            what = Clock(0, "t", "s", "")
+            stamps = seconds(str(self.path), what, t, clock.rows, clock.place, mend=True)
             self._mended.extend(stamps.notes)
         for one in found:
             if one.values.size != clock.values.size:
