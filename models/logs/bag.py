@@ -270,10 +270,10 @@ def _topics(
             topic = topic._replace(stamp=None)
         found.append((topic._replace(zero=first if stamped is None else stamped), first))
     # The clocks count from the first message of any topic; apart where stamps are not near.
-    stamped = [(topic.zero, first) for topic, first in found if topic.stamp is not None]
+    both = [(topic.zero, first) for topic, first in found if topic.stamp is not None]
     zero = min((first for _, first in found), default=0)
-    of_stamps = min((one for one, _ in stamped), default=zero)
-    if not any(abs(one - first) > CHOSEN.other_clock * CHOSEN.ns for one, first in stamped):
+    of_stamps = min((one for one, _ in both), default=zero)
+    if not any(abs(one - first) > CHOSEN.other_clock * CHOSEN.ns for one, first in both):
         zero = of_stamps = min(zero, of_stamps)
     topics = [one._replace(zero=zero if one.stamp is None else of_stamps) for one, _ in found]
     return topics, rates, skipped

@@ -285,19 +285,14 @@ def propose(
         ranked = sorted((one for one in found if one.confidence > 0.0), key=_rank)
         if not ranked:
             continue
-        guesses[name] = ranked[0]
-        equal = [
-            one
-            for one in ranked
-            if one.confidence > ranked[0].confidence - CHOSEN.apart
-            and _rank(one)[0] == _rank(ranked[0])[0]
-        ]
+        hand, least = _rank(ranked[0])[0], ranked[0].confidence - CHOSEN.apart
+        equal = [one for one in ranked if one.confidence > least and _rank(one)[0] == hand]
         if len(equal) > 1:
             equal.sort(key=lambda one: -_rate(seen[one.channel[0]]))
-            guesses[name] = equal[0]
-            others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
-            if others:
-                rivals[name] = (equal[0], *others)
+        guesses[name] = equal[0]
+        others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
+        if others:
+            rivals[name] = (equal[0], *others)
     return Proposal(guesses={**guesses, **posed}, rivals=rivals)
 
 
@@ -392,15 +387,11 @@ def _along_axes(
         for name, some in candidates.items()
     }
     for one in found.axes:
-        near = CHOSEN.known if is_given(units[one.name]) else CHOSEN.known - CHOSEN.no_unit_loss
-        guess = Guess(
-            channel=(one.name,),
-            confidence=near,
-            unit=units[one.name].strip(),
-            factor=one.factor,
-            why=one.why,
+        unit = units[one.name].strip()
+        sure = CHOSEN.known - (0.0 if is_given(unit) else CHOSEN.no_unit_loss)
+        mended[one.signal].append(
+            Guess(channel=(one.name,), confidence=sure, unit=unit, factor=one.factor, why=one.why)
         )
-        mended[one.signal].append(guess)
     return mended
 
 
@@ -641,8 +632,7 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
         return abs(math.log(in_si["a_y"] / (in_si["v_x"] * in_si["r"])))
 
     choices = [(one.unit,) if _is_given(one) else _ASSUMED[key] for key, one in there.items()]
-    nearest = min(itertools.product(*choices), key=far)
-    unit = nearest[list(there).index(name)]
+    unit = min(itertools.product(*choices), key=far)[list(there).index(name)]
     return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess
 
 
