@@ -124,7 +124,7 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
     way = _way(filled[-CHOSEN.tail :])
     if way is None:
-        return _no_data(path, lines, encoding)
+        raise RecordingError(f"{path}: there is a header but no row of data with numbers")
     few(path, way.width, "columns", "columns")
     table = [_Line(k, line, way.delimiter) for k, line in enumerate(lines, start=1)]
     return _table(path, table, way, encoding)
@@ -418,22 +418,6 @@ def _encoding_word(encoding: str) -> str:
 def _maker(lines: Sequence[_Line]) -> str:
     start = " ".join(line.text for line in lines[:8]).lower()
     return next((maker for words, maker in _MAKERS.items() if words in start), "")
-
-
-def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
-    number, text = next((k, line) for k, line in enumerate(lines, start=1) if line.strip())
-    delimiter = max(_DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
-    names = cells_of(text, delimiter)
-    few(path, len(names), "columns", "columns")
-    after = cells_of(lines[number], delimiter) if number < len(lines) else ()
-    under = len(after) == len(names) and is_units_row(after)
-    words = (_encoding_word(encoding), f"names in line {number}")
-    units = tuple(unit_in_name(name) for name in names)
-    columns = Columns(names, units, (True,) * len(names), words)
-    first = number + 1 + under
-    return Layout(
-        encoding=encoding, delimiter=delimiter, columns=columns, first=first, again=(text,)
-    )
 
 
 # Racelogic VBOX: [header], [channel units], [column names], [data], each a section.
