@@ -92,7 +92,7 @@ def calibrated(
         return model
 
     def teach(of_parts: Recording) -> TireModel:
-        return learn(of_parts, history.vehicle, history.design, start, until)
+        return learn(of_parts, history.vehicle, history.method, start, until)
 
     speed = float(np.sqrt(np.mean(found.windows.mean(recording.v_x) ** 2)))
     given = BandCalibration.declared(speed)
@@ -244,7 +244,7 @@ def color_of(error: Array, windows: Windows) -> float:
 
 def _road_felt(history: History, part: Portion) -> Array | None:
     """Return what a banked road pushed over a portion of a run (k,) [weights]; None unknown."""
-    method = history.design
+    method = history.method
     without = part.recording.logged_v_y is None
     if method.accelerometer is None or ("v_y" in method.needs) == without:
         return None  # it was learnt of another motion than that which is asked

@@ -39,17 +39,6 @@ def is_used(path: Path) -> bool:
     return "pyarrow" in sys.modules or path.stat().st_size > _WORTH
 
 
-def _of_arrow(block: bytes) -> Any:
-    """Return bytes in memory of pyarrow's own.
-    Its threads may drop them last, while Python ends: of what is Python's that aborts the program.
-    """
-    import pyarrow
-
-    held = pyarrow.allocate_buffer(len(block))
-    np.frombuffer(held, dtype=np.uint8)[:] = np.frombuffer(block, dtype=np.uint8)
-    return held
-
-
 def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict[int, Any] | None:
     """Return columns of a text; None where anything in it is not plain, which Python decides on.
     block : whole lines in UTF-8.   wanted : column from 0 -> how its cells are read.
@@ -63,9 +52,13 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
         str(column): pyarrow.float64() if kind is Kind.NUMBER else pyarrow.string()
         for column, kind in wanted.items()
     }
+    # In memory of pyarrow's own, whose threads may drop it last, while Python ends: of what is
+    # Python's that aborts the program.
+    held = pyarrow.allocate_buffer(len(block))
+    np.frombuffer(held, dtype=np.uint8)[:] = np.frombuffer(block, dtype=np.uint8)
     try:
         table = pyarrow.csv.read_csv(
-            pyarrow.BufferReader(_of_arrow(block)),
+            pyarrow.BufferReader(held),
             pyarrow.csv.ReadOptions(
                 column_names=[str(k) for k in range(len(layout.columns.names))],
                 block_size=len(block) + 1,

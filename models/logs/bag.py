@@ -8,7 +8,7 @@ counts from the first message that is read of any topic.
 import re
 import struct
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
@@ -97,13 +97,17 @@ def open_(path: Path) -> GroupedLog[_Place]:
                 name=name, unit=_unit(field), samples=topic.messages, rate=rates[topic.name]
             )
             found.append((topic.kind, listed, (topic, field)))
+    received = [topic.name for topic in topics if topic.stamp is None]
     return GroupedLog.of(
         path,
         "ROS 2 bag" if _plugin(path) != ".mcap" else "MCAP",
         "a ROS 2 bag",
         "message",
         found,
-        _said(topics, {**undefined, **skipped}),
+        (
+            *noted("no stamp in the message, its clock is when the bag received it", received),
+            *noted("not read", [f"{name} ({why})" for name, why in (undefined | skipped).items()]),
+        ),
         partial(_samples, path, definitions, zero),
         missing="message with numbers",
     )
@@ -265,27 +269,14 @@ def _topics(
         if stamped is None:
             topic = topic._replace(stamp=None)
         found.append((topic._replace(zero=first if stamped is None else stamped), first))
-    return _with_zero(found), rates, skipped
-
-
-def _with_zero(found: list[tuple[_Topic, int]]) -> list[_Topic]:
-    """Let the clocks count from the first message of any topic; apart where stamps are not near."""
-    stamped = [topic.zero for topic, _ in found if topic.stamp is not None]
-    received = [first for _, first in found]
-    apart = any(
-        abs(topic.zero - first) > CHOSEN.other_clock * CHOSEN.ns
-        for topic, first in found
-        if topic.stamp is not None
-    )
-    first_stamp = min(stamped, default=0)
-    first_received = min(received, default=0)
-    both = min(first_stamp, first_received) if stamped else first_received
-    return [
-        topic._replace(
-            zero=both if not apart else first_received if topic.stamp is None else first_stamp
-        )
-        for topic, _ in found
-    ]
+    # The clocks count from the first message of any topic; apart where stamps are not near.
+    both = [(topic.zero, first) for topic, first in found if topic.stamp is not None]
+    zero = min((first for _, first in found), default=0)
+    of_stamps = min((one for one, _ in both), default=zero)
+    if not any(abs(one - first) > CHOSEN.other_clock * CHOSEN.ns for one, first in both):
+        zero = of_stamps = min(zero, of_stamps)
+    topics = [one._replace(zero=zero if one.stamp is None else of_stamps) for one, _ in found]
+    return topics, rates, skipped
 
 
 def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int | None, float]:
@@ -412,20 +403,11 @@ def _unit(field: Field) -> str:
     return ""
 
 
-def _said(topics: Sequence[_Topic], skipped: Mapping[str, str]) -> tuple[str, ...]:
-    received = [topic.name for topic in topics if topic.stamp is None]
-    return (
-        *noted("no stamp in the message, its clock is when the bag received it", received),
-        *noted("not read", [f"{name} ({why})" for name, why in skipped.items()]),
-    )
-
-
 # Limits on what rosbags does with a bag, whatever the bag says of itself.
 #
 # Its compressed parts unpack to no more than is allowed. Its metadata, which are YAML, may not be
 # deep: the parser takes the square of it; what they say of the quality of service is not parsed.
 
-_Unpack = Callable[[bytes, int], bytes]
 _DEEP = re.compile(r"(?:[-?:]\s+){16}")  # lists in lists on one line
 
 
@@ -443,13 +425,9 @@ def _bounded(path: Path) -> Iterator[None]:
         for one in sorted(path.glob("*.zstd")):
             _require_small(one, zstd)
 
-    def of_zstd(data: bytes, size: int) -> bytes:
+    def unpacked(decompressor: Any, data: bytes, size: int) -> bytes:
         _require_allowed(path, size, len(data))
-        return bytes(zstd.ZstdDecompressor().decompress(data, max_length=size + 1))
-
-    def of_lz4(data: bytes, size: int) -> bytes:
-        _require_allowed(path, size, len(data))
-        return bytes(lz4.LZ4FrameDecompressor().decompress(data, max_length=size + 1))
+        return bytes(decompressor().decompress(data, max_length=size + 1))
 
     def of_message(data: bytes) -> bytes:
         most = most_unpacked(len(data))
@@ -457,9 +435,12 @@ def _bounded(path: Path) -> Iterator[None]:
         _require_allowed(path, len(message), len(data))
         return message
 
-    table: dict[str, _Unpack] = mcap.DECOMPRESSORS
+    table = mcap.DECOMPRESSORS
     before = dict(table)
-    table.update(zstd=of_zstd, lz4=of_lz4)
+    table.update(
+        zstd=partial(unpacked, zstd.ZstdDecompressor),
+        lz4=partial(unpacked, lz4.LZ4FrameDecompressor),
+    )
     reader.zstd = SimpleNamespace(open=zstd.open, decompress=of_message)
     parse = reader.parse_qos
     for module in (reader, mcap, sqlite):

@@ -15,7 +15,7 @@ import struct
 import zlib
 from array import array
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
@@ -51,21 +51,21 @@ def _group_of(identifier: int) -> int:
     return group if (group >> 8) & 0xFF >= 240 else group & 0x3FF00  # else it has a receiver
 
 
-@dataclass(frozen=True)
-class _Known:
-    """The frames of a database.
-    widths : how many bytes they have, by identifier with `_EXTENDED`.
-    groups : parameter group of J1939 -> identifier of it in the database.
+class _Dbc(NamedTuple):
+    """What a DBC tells.
+    messages: by identifier, with `_EXTENDED`; groups: of J1939 -> identifier in the DBC; faults: by
+    names of frame and signal what is wrong with it, a line each.
     """
 
-    widths: Mapping[int, int]
-    groups: Mapping[int, int]
+    messages: dict[int, Any]
+    groups: dict[int, int]
+    faults: dict[tuple[str, str], str]
 
-    def named(self, identifier: int) -> int | None:
-        """Return the identifier by which the database knows a frame; None where it does not."""
-        if identifier in self.widths:
-            return identifier
-        return self.groups.get(_group_of(identifier)) if identifier & _EXTENDED else None
+    def message(self, identifier: int) -> Any:
+        """Return the message of a frame; None where the DBC does not know it."""
+        if identifier not in self.messages and identifier & _EXTENDED:
+            identifier = self.groups.get(_group_of(identifier), identifier)
+        return self.messages.get(identifier)
 
 
 class _Frames(NamedTuple):
@@ -108,25 +108,12 @@ class _Gathered:
         return _Frames(self._t.finished(), self._data.finished().reshape(-1, self.width))
 
 
-def _in_order(frames: _Frames) -> _Frames:
-    """Return frames in the order of their times: groups of a file follow one another."""
-    if np.all(frames.t[1:] >= frames.t[:-1]):
-        return frames
-    order = np.argsort(frames.t, kind="stable")
-    return _Frames(frames.t[order], frames.data[order])
+_Log = tuple[dict[_Key, _Frames], Counter[str]]  # and how many others it has, by what they are
 
 
-class _Log(NamedTuple):
-    """Frames of a log by bus and identifier; how many others it has, by what they are."""
-
-    format: str
-    frames: dict[_Key, _Frames]
-    others: Counter[str]
-
-
-def _gather(path: Path, kind: str, known: _Known) -> _Log:
+def _gather(path: Path, kind: str, given: _Dbc) -> _Log:
     if kind == "MDF4":
-        return _of_mdf(path, known)
+        return _of_mdf(path, given)
     found: dict[_Key, _Gathered] = {}
     others: Counter[str] = Counter()
     count = 0
@@ -134,14 +121,14 @@ def _gather(path: Path, kind: str, known: _Known) -> _Log:
         identifier = message.arbitration_id | (_EXTENDED if message.is_extended_id else 0)
         if message.is_error_frame or message.is_remote_frame:
             others["error and remote"] += 1
-        elif (named := known.named(identifier)) is None:
+        elif (known := given.message(identifier)) is None:
             others["unknown"] += 1
-        elif len(message.data) < (width := known.widths[named]):
+        elif len(message.data) < known.length:
             others["cut short"] += 1
         else:
             key = str(message.channel), identifier
             if key not in found:
-                found[key] = _Gathered(width)
+                found[key] = _Gathered(known.length)
             found[key].add(message.timestamp, message.data)
             count += 1
             if count % CHOSEN.frames_at_once == 0:
@@ -151,7 +138,7 @@ def _gather(path: Path, kind: str, known: _Known) -> _Log:
     if first > CHOSEN.calendar:
         for key, kept in frames.items():
             frames[key] = kept._replace(t=since(kept.t, first))
-    return _Log(f"CAN {kind}", frames, others)
+    return frames, others
 
 
 def _messages(path: Path, kind: str) -> Iterator[Any]:
@@ -289,7 +276,7 @@ def _require_whole_blf(path: Path) -> None:
             file.seek(body + length % 4, 1)
 
 
-def _of_mdf(path: Path, known: _Known) -> _Log:
+def _of_mdf(path: Path, given: _Dbc) -> _Log:
     """Read the frames of the buses that an MDF4 file logs."""
     found: dict[_Key, _Gathered] = {}
     others: Counter[str] = Counter()
@@ -308,28 +295,33 @@ def _of_mdf(path: Path, known: _Known) -> _Log:
                 continue
             for first in range(0, samples, CHOSEN.frames_at_once):
                 count = min(CHOSEN.frames_at_once, samples - first)
-                part = _of_group(file, names, number, first, count)
-                _sort(part, known, found, others)
-    return _Log("CAN MDF4", {key: _in_order(one.finished()) for key, one in found.items()}, others)
+                _add_part(file, names, number, slice(first, first + count), given, found, others)
+    frames = {key: one.finished() for key, one in found.items()}
+    for key, (t, data) in frames.items():
+        if np.any(t[1:] < t[:-1]):  # groups of a file follow one another
+            order = np.argsort(t, kind="stable")
+            frames[key] = _Frames(t[order], data[order])
+    return frames, others
 
 
-class _Part(NamedTuple):
-    """Some frames of a group: all of (n,), but for the data (n, bytes)."""
+def _add_part(
+    file: Any,
+    names: set[str],
+    number: int,
+    part: slice,
+    given: _Dbc,
+    found: dict[_Key, _Gathered],
+    others: Counter[str],
+) -> None:
+    """Add some frames of a group to those of their bus and identifier."""
+    count = part.stop - part.start
 
-    t: Array
-    ids: NDArray[np.int64]
-    buses: NDArray[np.int64]
-    sizes: NDArray[np.int64]
-    data: NDArray[np.uint8]
-
-
-def _of_group(file: Any, names: set[str], number: int, first: int, count: int) -> _Part:
     def signal(name: str) -> Any:
         full = f"{_FRAME}.{name}"
         if full not in names:
             return None
         return file.get(
-            full, group=number, raw=True, ignore_invalidation_bits=True, record_offset=first,
+            full, group=number, raw=True, ignore_invalidation_bits=True, record_offset=part.start,
             record_count=count,
         )  # fmt: skip
 
@@ -337,35 +329,26 @@ def _of_group(file: Any, names: set[str], number: int, first: int, count: int) -
         found = signal(name)
         return np.broadcast_to(otherwise, count) if found is None else found.samples.astype(int)
 
-    identifiers, data = signal("ID"), signal("DataBytes")
-    bytes_ = np.asarray(data.samples, dtype=np.uint8).reshape(count, -1)
+    identifiers = signal("ID")
+    data = np.asarray(signal("DataBytes").samples, dtype=np.uint8).reshape(count, -1)
     raw = identifiers.samples.astype(np.int64)
     ids = raw & CHOSEN.identifier
     is_long = whole("IDE", (raw & _EXTENDED != 0) | (ids > CHOSEN.short)) != 0
-    return _Part(
-        np.asarray(identifiers.timestamps, dtype=np.float64),
-        np.where(is_long, ids | _EXTENDED, ids),
-        whole("BusChannel", 0),
-        np.minimum(whole("DataLength", bytes_.shape[1]), bytes_.shape[1]),
-        bytes_,
-    )
-
-
-def _sort(part: _Part, known: _Known, found: dict[_Key, _Gathered], others: Counter[str]) -> None:
-    """Add frames to those of their bus and identifier."""
-    for identifier in np.unique(part.ids).tolist():
-        mine = part.ids == identifier
-        named = known.named(identifier)
-        if named is None:
+    ids, buses = np.where(is_long, ids | _EXTENDED, ids), whole("BusChannel", 0)
+    sizes = np.minimum(whole("DataLength", data.shape[1]), data.shape[1])
+    t = np.asarray(identifiers.timestamps, dtype=np.float64)
+    for identifier in np.unique(ids).tolist():
+        mine = ids == identifier
+        message = given.message(identifier)
+        if message is None:
             others["unknown"] += int(mine.sum())
             continue
-        width = known.widths[named]
-        whole = mine & (part.sizes >= width)
-        others["cut short"] += int(mine.sum() - whole.sum())
-        for bus in np.unique(part.buses[whole]).tolist():
-            which = whole & (part.buses == bus)
-            frames = found.setdefault((str(bus), identifier), _Gathered(width))
-            frames.extend(part.t[which], part.data[which])
+        complete = mine & (sizes >= message.length)
+        others["cut short"] += int(mine.sum() - complete.sum())
+        for bus in np.unique(buses[complete]).tolist():
+            which = complete & (buses == bus)
+            frames = found.setdefault((str(bus), identifier), _Gathered(message.length))
+            frames.extend(t[which], data[which])
 
 
 # Signals of frames, by a DBC.
@@ -402,32 +385,17 @@ class _Group:
         )
 
 
-class _Place(NamedTuple):
-    """Where a channel is: with which others it is sent, and the signal of the DBC.
-    fault: why it cannot be read as the DBC tells it, "" where it can.
-    """
-
-    group: _Group
-    signal: Any
-    fault: str
-
-
-class _Dbc(NamedTuple):
-    """What a DBC tells: messages by identifier, with `_EXTENDED`; what is wrong, by their signals.
-    faults: by names of frame and signal, a line each.
-    """
-
-    messages: dict[int, Any]
-    known: _Known
-    faults: dict[tuple[str, str], str]
+# Where a channel is: with which others it is sent, the signal of the DBC, and why it cannot be read
+# as the DBC tells it, "" where it can.
+_Place = tuple[_Group, Any, str]
 
 
 def _samples(asked: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
     groups: dict[_Group, dict[str, Any]] = {}
-    for listed, place in asked:
-        if place.fault:
-            raise RecordingError(place.fault)
-        groups.setdefault(place.group, {})[listed.name] = place.signal
+    for listed, (group, signal, fault) in asked:
+        if fault:
+            raise RecordingError(fault)
+        groups.setdefault(group, {})[listed.name] = signal
     return [
         Samples(group.name, group.t, {name: group.values(one) for name, one in signals.items()})
         for group, signals in groups.items()
@@ -449,19 +417,18 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
             raise RecordingError(
                 f"{path}: is no CAN log: neither ASC, BLF, candump, TRC, a table of frames nor MDF4"
             )
-        log = _gather(path, kind, given.known)
-        senders = Counter((bus, given.known.named(one)) for bus, one in log.frames)
+        gathered, others = _gather(path, kind, given)
+        senders = Counter((bus, given.message(one).name) for bus, one in gathered)
         found = []
-        for (bus, identifier), frames in log.frames.items():
-            several = senders[bus, given.known.named(identifier)] > 1  # of J1939: which
+        for (bus, identifier), frames in gathered.items():
+            message = given.message(identifier)
+            several = senders[bus, message.name] > 1  # of J1939: which
             group = f"bus {bus}" + f" from {identifier & 0xFF:02X}" * several
-            found += [(group, *one) for one in _channels(given, identifier, frames)]
-    said = tuple(
-        f"{count} {what} frames are not read" for what, count in log.others.items() if count
-    )
+            found += [(group, *one) for one in _channels(given, message, frames)]
+    said = tuple(f"{count} {what} frames are not read" for what, count in others.items() if count)
     return GroupedLog.of(
         path,
-        log.format,
+        f"CAN {kind}",
         "a CAN log",
         "message",
         found,
@@ -471,11 +438,8 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
     )
 
 
-def _channels(given: _Dbc, identifier: int, frames: _Frames) -> Iterator[tuple[Listed, _Place]]:
+def _channels(given: _Dbc, message: Any, frames: _Frames) -> Iterator[tuple[Listed, _Place]]:
     """Yield the signals that are sent in the frames of a message."""
-    named = given.known.named(identifier)
-    assert named is not None
-    message = given.messages[named]
     groups: dict[tuple[tuple[str, tuple[int, ...]], ...], _Group] = {}
     for signal in message.signals:
         selectors = _selectors(message, signal)
@@ -495,7 +459,7 @@ def _channels(given: _Dbc, identifier: int, frames: _Frames) -> Iterator[tuple[L
                 samples=group.t.size,
                 rate=typical_rate(group.t),
             )
-            yield listed, _Place(group, signal, given.faults.get((message.name, signal.name), ""))
+            yield listed, (group, signal, given.faults.get((message.name, signal.name), ""))
 
 
 def _read_dbc(path: Path) -> _Dbc:
@@ -528,8 +492,7 @@ def _read_dbc(path: Path) -> _Dbc:
         for key, one in messages.items()
         if key & _EXTENDED and (j1939 or one.protocol == "j1939" or key & 0xFF == CHOSEN.from_all)
     }
-    widths = {key: one.length for key, one in messages.items()}
-    return _Dbc(messages, _Known(widths, groups), faults)
+    return _Dbc(messages, groups, faults)
 
 
 def _fault(message: Any, signal: Any) -> str:

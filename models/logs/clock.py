@@ -11,7 +11,7 @@ A gap is where a channel has no sample for longer than 0.1 s, or than 2.5 of its
 car can build up or lose all its lateral force meanwhile. It ends a segment.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -68,7 +68,10 @@ def gaps(t: Array, longest: float) -> NDArray[np.intp]:
     t : rising time stamps [s], (n,).   longest : time without a sample that is none yet [s].
     """
     limit = max(longest * (1.0 + 1e-6), CHOSEN.gap_intervals * typical_step(t))
-    found = [part.start + 1 + np.flatnonzero(steps > limit) for part, steps in _steps(t)]
+    found = [
+        part.start + 1 + np.flatnonzero(np.diff(t[part.start : part.stop + 1]) > limit)
+        for part in blocks(max(t.size - 1, 0))
+    ]
     return np.concatenate([np.zeros(0, dtype=np.intp), *found])
 
 
@@ -76,20 +79,14 @@ def typical_step(t: Array) -> float:
     """Return the median time between samples [s], of all of them; NaN of one.
     t : rising time stamps [s], (n,).
     """
-    steps = large((max(t.size - 1, 0),))
-    for part, some in _steps(t):
-        steps[part] = some
-    if not steps.size:
+    if t.size < 2:
         return np.nan
+    steps = large((t.size - 1,))
+    for part in blocks(steps.size):
+        steps[part] = np.diff(t[part.start : part.stop + 1])
     middle = [(steps.size - 1) // 2, steps.size // 2]
     steps.partition(middle)  # where it lies, which of a long log is on disk
     return float(np.mean(steps[middle]))
-
-
-def _steps(t: Array) -> Iterator[tuple[slice, Array]]:
-    """Yield the times between samples, block by block."""
-    for part in blocks(max(t.size - 1, 0)):
-        yield part, np.diff(t[part.start : part.stop + 1])
 
 
 def are_one_clock(raws: Sequence[Raw]) -> bool:
@@ -109,7 +106,10 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Seg
     if zero > CHOSEN.calendar:
         times = {id(raw.t): since(raw.t, zero) for raw in raws.values()}
         near = {name: raw._replace(t=times[id(raw.t)]) for name, raw in raws.items()}
-        return [_later(one, zero) for one in on_one_clock(near, dt, longest)]
+        return [
+            one._replace(t=filled(one.t.size, lambda part, t=one.t: t[part] + zero))
+            for one in on_one_clock(near, dt, longest)
+        ]
     base = min(raws.values(), key=lambda raw: abs(np.log(_interval(raw.t) / dt)))
     found = []
     for begin, end in _covered([raw.t for raw in raws.values()], longest):
@@ -122,11 +122,6 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Seg
             grid = own  # its very numbers, where they are the clock
         found.append(Segment(grid, {name: sampled(raw, grid, dt) for name, raw in raws.items()}))
     return found
-
-
-def _later(segment: Segment, zero: float) -> Segment:
-    t = segment.t
-    return segment._replace(t=filled(t.size, lambda part: t[part] + zero))
 
 
 def _interval(t: Array) -> float:
@@ -172,20 +167,15 @@ def _sampled(raw: Raw, grid: Array, dt: float, interval: float) -> Array:
     last = np.searchsorted(raw.t, grid + CHOSEN.on_step * dt, side="right") - 1
     if interval < dt / 1.5:
         first = np.searchsorted(raw.t, grid - dt + CHOSEN.on_step * dt, side="right")
-        return _mean_since(raw.values, last, np.minimum(first, last))
+        first, begin = np.minimum(first, last), min(int(first[0]), int(last[0]))
+        total = np.concatenate([[0.0], np.cumsum(raw.values[begin : int(last[-1]) + 1])])
+        return np.asarray((total[last + 1 - begin] - total[first - begin]) / (last + 1 - first))
     before = np.maximum(last - 1, 0)
     now, step = raw.values[last], raw.t[last] - raw.t[before]
     ahead = np.maximum(grid - raw.t[last], 0.0)
     goes_on = (last > 0) & (step <= CHOSEN.gap_intervals * interval) & (ahead > CHOSEN.on_step * dt)
     share = np.minimum(ahead, step) / np.where(step > 0.0, step, 1.0)
     return np.where(goes_on, now + share * (now - raw.values[before]), now)
-
-
-def _mean_since(values: Array, last: NDArray[np.intp], first: NDArray[np.intp]) -> Array:
-    begin = int(first[0])
-    total = np.concatenate([[0.0], np.cumsum(values[begin : int(last[-1]) + 1])])
-    means: Array = (total[last + 1 - begin] - total[first - begin]) / (last + 1 - first)
-    return means
 
 
 def require_rising(label: str, raw: Raw) -> None:

@@ -5,6 +5,7 @@ that the libraries it needs stay optional. How its first bytes look is given in 
 """
 
 import zlib
+from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
@@ -48,9 +49,15 @@ def open_log(
     if not path.exists():
         raise RecordingError(f"{path}: there is no such file")
     try:
-        head = _head(path)
+        head = b""
+        if path.is_file():
+            with path.open("rb") as file:
+                head = file.read(HEAD)
         packed = head.startswith(GZIP)
-        format = format_of(path, _unpacked(head) if packed else head)
+        if packed:
+            with suppress(zlib.error):  # of what is damaged it is said later
+                head = zlib.decompressobj(wbits=31).decompress(head, HEAD)
+        format = format_of(path, head)
         given: tuple[Any, ...] = () if dbc is None else (Path(dbc),)
         if packed and (given or format != "text"):
             raise RecordingError(
@@ -94,19 +101,3 @@ def _of_folder(
         return log
     except RecordingError as error:
         return error
-
-
-def _head(path: Path) -> bytes:
-    """Return the first bytes of a regular file, of anything else nothing."""
-    if not path.is_file():
-        return b""
-    with path.open("rb") as file:
-        return file.read(HEAD)
-
-
-def _unpacked(head: bytes) -> bytes:
-    """Return the first bytes of what is packed; nothing of what is damaged, which is said later."""
-    try:
-        return zlib.decompressobj(wbits=31).decompress(head, HEAD)
-    except zlib.error:
-        return b""

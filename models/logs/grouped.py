@@ -4,18 +4,28 @@ A format lists its channels with where each is in the file, and reads those that
 group by group; the clock of a group is judged and mended once, and its channels share it.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from models.logs.foreign import one_line
-from models.logs.log import Channel, Heading, Listed, RecordingError, chosen, few, one_run, some
-from models.logs.stamps import Stamps, risen
+from models.logs.log import (
+    Channel,
+    Clock,
+    Heading,
+    Listed,
+    RecordingError,
+    chosen,
+    few,
+    one_run,
+    some,
+)
+from models.logs.stamps import Stamps, seconds
 from models.logs.units import TIME, to_si
 
 _MOST_NOTED = 5  # names that a note lists
@@ -120,26 +130,22 @@ class GroupedLog(Generic[_P]):
         if self.clock_name:
             return self._timed(names)
         asked = chosen(self.path, names, {one[0].name: one for one in self.channels})
-        found: dict[str, tuple[Array, Array, NDArray[np.int64]]] = {}
+        found: dict[str, tuple[Array, Array, Any]] = {}
         with one_line(self.path, self.what):
             for clock, t, values in self.samples(asked):
-                rows, what = np.arange(1, t.size + 1), f"the clock of {clock}"
-                stamps = risen(
+                rows, what = np.arange(1, t.size + 1), Clock(0, f"the clock of {clock}", "s", "")
+                stamps = seconds(
                     str(self.path), what, t, rows, self.place, mend=self.mend, restarts=False
                 )
                 self._mended.extend(stamps.notes)
                 rows = stamps.of(rows)
                 found |= {n: (stamps.t, stamps.of(one), rows) for n, one in values.items()}
-        result = []
-        for listed, _ in asked:
-            t, values_of, rows = found[listed.name]
-            result.append(
-                Channel(
-                    name=listed.name, unit=listed.unit, t=t, values=values_of, place=self.place,
-                    rows=rows,
-                )
-            )  # fmt: skip
-        return tuple(result)
+        place = self.place
+        return tuple(
+            Channel(name=one.name, unit=one.unit, t=t, values=values_of, place=place, rows=rows)
+            for one, _ in asked
+            for t, values_of, rows in [found[one.name]]
+        )
 
     def _timed(self, names: Sequence[str]) -> tuple[Channel, ...]:
         clock, *found = replace(self, clock_name="").read([self.clock_name, *names])
@@ -147,7 +153,8 @@ class GroupedLog(Generic[_P]):
         t = clock.values * to_si(self.clock_unit or clock.unit, TIME, label)
         stamps = Stamps(t, ())
         if self.mend:
-            stamps = risen(str(self.path), "t", t, clock.rows, clock.place, mend=True)
+            what = Clock(0, "t", "s", "")
+            stamps = seconds(str(self.path), what, t, clock.rows, clock.place, mend=True)
             self._mended.extend(stamps.notes)
         for one in found:
             if one.values.size != clock.values.size:
@@ -166,9 +173,7 @@ def _unique(names: Iterable[tuple[str, str]]) -> list[str]:
     behind.
     """
     pairs = list(names)
-    count: dict[str, int] = {}
-    for _, name in pairs:
-        count[name] = count.get(name, 0) + 1
+    count = Counter(name for _, name in pairs)
     result: list[str] = []
     taken: set[str] = set()
     last: dict[str, int] = {}

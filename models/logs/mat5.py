@@ -29,6 +29,9 @@ _NUMBERS = {
 }  # fmt: skip
 _TEXTS = {1: "latin-1", 2: "latin-1", 4: "utf-16", 16: "utf-8", 17: "utf-16", 18: "utf-32"}
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _OPAQUE = 1, 2, 3, 4, 5, 17  # classes of a variable
+_OTHERS = {
+    _OPAQUE: "a table, timeseries or other object", _OBJECT: "an object", _SPARSE: "sparse",
+}  # fmt: skip
 _NUMERIC = range(6, 16)
 _COMPLEX = 0x0800  # flag
 _BEGINNING = 4096  # bytes that hold what a variable of numbers says of itself
@@ -57,6 +60,16 @@ class _Beginning(NamedTuple):
     name: str
     rest: memoryview
 
+    @property
+    def is_own(self) -> bool:
+        """Whether MATLAB keeps it for itself."""
+        return not self.name or self.name.startswith("__")
+
+    @property
+    def is_read(self) -> bool:
+        """Whether it is a vector or matrix of real numbers."""
+        return self.kind in _NUMERIC and not self.is_complex and self.dimensions == 2
+
 
 def read_tree(path: Path) -> dict[str, Tree]:
     """Return the variables of a file; numbers are read when they are asked for."""
@@ -67,7 +80,7 @@ def read_tree(path: Path) -> dict[str, Tree]:
             raise _DamagedError("its header has no byte order")
         size = path.stat().st_size
         result: dict[str, Tree] = {}
-        place, held, packed = _HEADER, 0, 0
+        place, held, packed = _HEADER, 0, 0  # bytes that stay in memory, and of the file for them
         while place < size:
             file.seek(place)
             tag = file.read(8)
@@ -79,9 +92,19 @@ def read_tree(path: Path) -> dict[str, Tree]:
                 raise _DamagedError(f"the variable at byte {place - 8} is cut off")
             if kind in (_MATRIX, _COMPRESSED):
                 variable = _Variable(path, place, length, kind == _COMPRESSED, order)
-                if (found := variable.tree()) is not None:
-                    result[found.name] = found.tree
-                    held, packed = held + found.held, packed + (length if found.held else 0)
+                begin = _beginning(variable.data(_BEGINNING), order)
+                count = math.prod(begin.shape)
+                tree: Tree = _unread(begin)
+                if begin.is_read:
+                    tree = Leaf(shape=begin.shape, load=variable.load)
+                    if swells(8 * count, length):
+                        tree = Unread(f"{count} numbers in {length} bytes")
+                elif begin.kind in (_CELL, _STRUCT, _CHAR) and not begin.is_own:
+                    data = variable.data()
+                    tree = _tree(path, data, order, 0)
+                    held, packed = held + len(data), packed + length
+                if not begin.is_own:
+                    result[begin.name] = tree
                 dense(path, held, packed, "structs and cells")
                 few(path, len(result), "columns", "variables")
             place += length + (0 if kind == _COMPRESSED else -length % 8)
@@ -109,38 +132,13 @@ class _Variable(NamedTuple):
         size = len(inflated)
         few(self.path, size / 1e6, "block", "megabytes of a variable")
         dense(self.path, size, self.length, "variables")
-        if len(inflated) < 8:
-            raise _DamagedError(f"the variable at byte {self.place} is cut off")
-        kind, length = struct.unpack(self.order + "II", inflated[:8])
-        if kind != _MATRIX or (most is None and length > len(inflated) - 8):
+        kind, length = struct.unpack(self.order + "II", inflated[:8].ljust(8, b"\0"))
+        if kind != _MATRIX or (most is None and length > size - 8):
             raise _DamagedError(f"the variable at byte {self.place} is cut off")
         return memoryview(inflated)[8 : 8 + length]
 
-    def tree(self) -> "_Read | None":
-        """Return its name and what it holds, None of what MATLAB keeps for itself."""
-        begin = _beginning(self.data(_BEGINNING), self.order)
-        if not begin.name or begin.name.startswith("__"):
-            return None
-        if begin.kind in _NUMERIC and not begin.is_complex and begin.dimensions == 2:
-            count = math.prod(begin.shape)
-            if swells(8 * count, self.length):
-                return _Read(begin.name, Unread(f"{count} numbers in {self.length} bytes"), 0)
-            return _Read(begin.name, Leaf(shape=begin.shape, load=self._load), 0)
-        if begin.kind not in (_CELL, _STRUCT, _CHAR):
-            return _Read(begin.name, _unread(begin), 0)
-        data = self.data()
-        return _Read(begin.name, _tree(self.path, data, self.order, 0), len(data))
-
-    def _load(self) -> Array:
+    def load(self) -> Array:
         return _load(self.path, _beginning(self.data(), self.order), self.order)
-
-
-class _Read(NamedTuple):
-    """A variable: its name, what it holds, and how many bytes stay in memory for it."""
-
-    name: str
-    tree: Tree
-    held: int
 
 
 def _elements(data: memoryview, order: str) -> Iterator[_Element]:
@@ -192,21 +190,18 @@ def _load(path: Path, begin: _Beginning, order: str) -> Array:
     require_room(path, max(begin.shape), 8 * min(begin.shape))
     element = next(_elements(begin.rest, order), None)
     count = begin.shape[0] * begin.shape[1]
+    if not count:
+        return np.zeros(begin.shape)
     if element is None or element.kind not in _NUMBERS:
-        if not count:
-            return np.zeros(begin.shape)
         raise _DamagedError("a variable has no numbers")
-    stored = np.dtype(order + _NUMBERS[element.kind])
-    if len(element.data) < count * stored.itemsize:
-        raise _DamagedError("the numbers of a variable are cut off")
-    flat = np.frombuffer(element.data, stored, count)
+    flat = np.frombuffer(element.data, order + _NUMBERS[element.kind], count)
     return flat.astype(np.float64).reshape(begin.shape, order="F")
 
 
 def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
     few(path, depth, "depth", "levels of structs and cells")
     begin = _beginning(data, order)
-    if begin.kind in _NUMERIC and not begin.is_complex and begin.dimensions == 2:
+    if begin.is_read:
         return Leaf(shape=begin.shape, load=lambda: _load(path, begin, order))
     if begin.kind == _CHAR:
         return _words(begin, order)
@@ -220,13 +215,11 @@ def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
         return cells
     if begin.kind != _STRUCT:
         return _unread(begin)
-    head = [next(elements, None), next(elements, None)]
-    if head[0] is None or head[1] is None or len(head[0].data) < 4:
-        raise _DamagedError("a struct has no fields")
-    longest = struct.unpack(order + "i", head[0].data[:4])[0]
+    head = [bytes(one.data) for one in islice(elements, 2)]
+    longest = struct.unpack(order + "i", head[0][:4])[0] if len(head) == 2 else 0
     if longest < 1:
         raise _DamagedError("a struct has no fields")
-    raw = bytes(head[1].data)
+    raw = head[1]
     names = [
         raw[k : k + longest].split(b"\0")[0].decode("latin-1") for k in range(0, len(raw), longest)
     ]
@@ -269,8 +262,6 @@ def _words(begin: _Beginning, order: str) -> Tree:
 def _unread(begin: _Beginning) -> Unread:
     if begin.is_complex:
         return Unread("complex numbers")
-    objects = {_OPAQUE: "a table, timeseries or other object", _OBJECT: "an object"}
-    kinds = objects | {_SPARSE: "sparse"}
     if begin.kind in _NUMERIC:
         return Unread(f"an array of {begin.dimensions} dimensions")
-    return Unread(kinds.get(begin.kind, f"class {begin.kind}"))
+    return Unread(_OTHERS.get(begin.kind, f"class {begin.kind}"))

@@ -53,116 +53,80 @@ def _samples(path: Path, asked: Sequence[_Asked]) -> list[Samples]:
     groups: dict[int, list[_Asked]] = {}
     for one in asked:
         groups.setdefault(one[1].group, []).append(one)
+    found = []
     with opened(path, "MDF") as file:
-        return [_of_group(path, file, mine) for mine in groups.values()]
+        for mine in groups.values():  # as many channels at a time as the memory takes
+            several = max(1, CHOSEN.numbers_at_once // max(mine[0][0].samples, 1))
+            values: dict[str, Array] = {}
+            for k in range(0, len(mine), several):
+                t = _read(path, file, mine[k : k + several], values)
+            found.append(Samples(mine[0][0].name, t, values))
+    return found
 
 
-def _of_group(path: Path, file: Any, mine: Sequence[_Asked]) -> Samples:
-    """Read channels of one group, as many at a time as the memory takes."""
-    several = max(1, CHOSEN.numbers_at_once // max(mine[0][0].samples, 1))
-    t: Array | None = None
-    values: dict[str, Array] = {}
-    for k in range(0, len(mine), several):
-        some = mine[k : k + several]
-        for (listed, _), (times, numbers) in zip(some, _read(path, file, some), strict=True):
-            t = times if t is None else t
-            values[listed.name] = _kept(numbers)
-    assert t is not None
-    return Samples(mine[0][0].name, _kept(t), values)
-
-
-def _read(path: Path, file: Any, some: Sequence[_Asked]) -> list[tuple[Array, Array]]:
-    """Return times and values of channels of one group."""
+def _read(path: Path, file: Any, some: Sequence[_Asked], values: dict[str, Array]) -> Array:
+    """Add the values of channels of one group to others, and return their times."""
     samples = some[0][0].samples
     require_room(path, samples, 8)
     places = [(None, place.group, place.channel) for _, place in some]
     signals = file.select(places, copy_master=False)
-    result = []
     for (listed, _), signal in zip(some, signals, strict=True):
-        values = _numbers(path, listed.name, signal.samples)
+        read = _numbers(path, listed.name, signal.samples)
         if signal.invalidation_bits is not None:
-            values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
+            read[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
         t = np.array(signal.timestamps, dtype=np.float64)
-        if not t.size == values.size == samples:
+        if not t.size == read.size == samples:
             raise RecordingError(
                 f"{path}: {listed.name} must have {samples} samples, it has "
-                f"{min(t.size, values.size)}; was the file cut off?"
+                f"{min(t.size, read.size)}; was the file cut off?"
             )
-        result.append((t, values))
-    return result
-
-
-def _kept(values: Array) -> Array:
-    return filled(values.size, lambda part: values[part])
+        values[listed.name] = filled(samples, read.__getitem__)
+    return filled(samples, t.__getitem__)
 
 
 def open_(path: Path) -> GroupedLog[_Place]:
+    found: list[tuple[str, Listed, _Place]] = []
+    others: dict[str, list[str]] = {reason: [] for reason in _REASONS}
     with one_line(path, "an MDF file"), opened(path, "MDF") as file:
-        return _list(path, file)
-
-
-class _Found:
-    """What the groups of a file hold: numeric channels, and the names of others by the reason."""
-
-    def __init__(self) -> None:
-        self.channels: list[tuple[str, Listed, _Place]] = []
-        self.others: dict[str, list[str]] = {reason: [] for reason in _REASONS}
-
-    def group(self, file: Any, number: int, is_4: bool) -> None:
-        group = file.groups[number]
-        about = group.channel_group
-        samples, master = int(about.cycles_nr), file.masters_db.get(number)
-        name = _group_name(group, number)
-        if is_4 and is_bus(group):
-            self.others["frames"].append(name)
-            return
-        # Other masters are angles, distances or counts.
-        clock = master is not None and (
-            not is_4 or int(group.channels[master].sync_type) in (0, CHOSEN.time)
+        is_4 = str(file.version) >= "4"
+        for number, group in enumerate(file.groups):
+            about = group.channel_group
+            titles = (getattr(about, "acq_name", None), getattr(about, "comment", None))
+            named = (x for x in titles if isinstance(x, str) and x.strip() and x.isprintable())
+            name = next(named, f"group {number + 1}").strip()[:LONGEST_NAME]
+            if is_4 and is_bus(group):
+                others["frames"].append(name)
+                continue
+            samples, master = int(about.cycles_nr), file.masters_db.get(number)
+            # Other masters are angles, distances or counts.
+            clock = master is not None and (
+                not is_4 or int(group.channels[master].sync_type) in (0, CHOSEN.time)
+            )
+            rate = float("nan")
+            if clock and samples:
+                probed = min(samples, CHOSEN.probed_samples)
+                t = file.get_master(number, record_offset=0, record_count=probed)
+                rate = typical_rate(np.asarray(t, dtype=np.float64))
+            for index, channel in enumerate(group.channels):
+                if index == master or not samples:
+                    continue
+                kind = _kind(group, index, is_4) if clock else "clockless"
+                if kind != "number":
+                    others[kind].append(str(channel.name))
+                    continue
+                unit = str(file.get_channel_unit(group=number, index=index) or "").strip()
+                listed = Listed(name=str(channel.name), unit=unit, samples=samples, rate=rate)
+                found.append((name, listed, _Place(number, index)))
+        return GroupedLog.of(
+            path,
+            "MDF4" if is_4 else "MDF3",
+            "an MDF file",
+            "sample",
+            found,
+            tuple(note for kind, why in _REASONS.items() for note in noted(why, others[kind])),
+            partial(_samples, path),
+            missing="numeric channel with a time",
         )
-        rate = float("nan")
-        if clock and samples:
-            probed = min(samples, CHOSEN.probed_samples)
-            t = file.get_master(number, record_offset=0, record_count=probed)
-            rate = typical_rate(np.asarray(t, dtype=np.float64))
-        for index, channel in enumerate(group.channels):
-            if index == master or not samples:
-                continue
-            kind = _kind(group, index, is_4) if clock else "clockless"
-            if kind != "number":
-                self.others[kind].append(str(channel.name))
-                continue
-            unit = str(file.get_channel_unit(group=number, index=index) or "").strip()
-            listed = Listed(name=str(channel.name), unit=unit, samples=samples, rate=rate)
-            self.channels.append((name, listed, _Place(number, index)))
-
-
-def _list(path: Path, file: Any) -> GroupedLog[_Place]:
-    is_4 = str(file.version) >= "4"
-    found = _Found()
-    for number in range(len(file.groups)):
-        found.group(file, number, is_4)
-    said = tuple(
-        note for kind, reason in _REASONS.items() for note in noted(reason, found.others[kind])
-    )
-    return GroupedLog.of(
-        path,
-        "MDF4" if is_4 else "MDF3",
-        "an MDF file",
-        "sample",
-        found.channels,
-        said,
-        partial(_samples, path),
-        missing="numeric channel with a time",
-    )
-
-
-def _group_name(group: Any, number: int) -> str:
-    about = group.channel_group
-    for name in (getattr(about, "acq_name", None), getattr(about, "comment", None)):
-        if isinstance(name, str) and name.strip() and name.isprintable():
-            return name.strip()[:LONGEST_NAME]
-    return f"group {number + 1}"
 
 
 def _kind(group: Any, index: int, is_4: bool) -> str:
@@ -170,9 +134,9 @@ def _kind(group: Any, index: int, is_4: bool) -> str:
     channel = group.channels[index]
     if group.channel_dependencies[index]:
         return "array"
-    if is_4 and int(channel.channel_type) not in CHOSEN.values:
-        return "word"
-    if channel.data_type not in (_NUMERIC_4 if is_4 else _NUMERIC_3):
+    if (is_4 and int(channel.channel_type) not in CHOSEN.values) or channel.data_type not in (
+        _NUMERIC_4 if is_4 else _NUMERIC_3
+    ):
         return "word"
     return _kind_of_conversion(channel.conversion, is_4)
 

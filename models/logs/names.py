@@ -23,7 +23,7 @@ from codegen.arrays import Array
 from models.logs.axes import Triad, along_axes, triads
 from models.logs.chosen import CHOSEN
 from models.logs.log import Channel, Heading, LogFile, RecordingError
-from models.logs.signals import BETA, COLUMNS, NEEDED, POSE, QUANTITIES, WHEELS, Signal, quantity_of
+from models.logs.signals import BETA, COLUMNS, POSE, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import unit_in_name, without_ending
 from models.logs.stamps import typical_rate
 from models.logs.units import (
@@ -110,15 +110,13 @@ _WHEEL, _TURNING, _SPEEDS, _BOTH, _ENCODER, _OTHERS = (
 )
 
 
-def _with_corner(word: str) -> tuple[str, ...]:
-    for stem, corner in ((word[:-2], word[-2:]), (word[2:], word[:2])):
-        if corner in _CORNERS and stem in _BOTH:
-            return stem, corner
-    return (word,)
-
-
 def _wheel_words(signal: str, words: Sequence[str]) -> bool:
-    listed = frozenset(part for word in words for part in _with_corner(word))
+    parts = set(words)
+    for word in words:
+        for stem, corner in ((word[:-2], word[-2:]), (word[2:], word[:2])):
+            if corner in _CORNERS and stem in _BOTH:
+                parts = parts - {word} | {stem, corner}
+    listed = frozenset(parts)
     if listed & _OTHERS:
         return False
     if signal == WHEELS[-1]:
@@ -171,16 +169,6 @@ class Proposal:
             and guess.confidence >= CHOSEN.names_sure
             and not guess.hand
         )
-
-    def unsure(self) -> tuple[str, ...]:
-        """Return the needed signals that are missing or not sure; beta stands in for v_y."""
-        wanted = [BETA if name == "v_y" and self.beta_stands_in else name for name in NEEDED]
-        return tuple(name for name in wanted if not self.is_sure(name))
-
-    @property
-    def beta_stands_in(self) -> bool:
-        """Whether v_y is made of the sideslip angle."""
-        return not self.is_sure("v_y") and self.is_sure(BETA)
 
     def signals(self) -> dict[str, Signal]:
         """Return how each signal that is sure is read; v_y is not made of beta where both are."""
@@ -280,13 +268,16 @@ def propose(
     candidates = {name: _candidates(name, headings) for name in QUANTITIES if name not in POSE}
     posed = _pose(headings)
     asked = {name for found in candidates.values() for guess in found for name in guess.channel}
-    boxes = _triads(headings)
+    given = {one.name: _with_given_unit(one).unit for one in headings}
+    names = {name: _words_of(without_ending(name, unit)) for name, unit in given.items()}
+    bad = _REFERENCE | _CORNERS
+    boxes = triads({name: one for name, one in names.items() if not bad & set(one)}, given)
     asked |= {name for box in boxes for name in box.names.values()}
     seen = _seen(log, [one.name for one in headings if one.name in asked], run)
     candidates = {
         name: [_looked(name, guess, seen) for guess in found] for name, found in candidates.items()
     }
-    candidates = _along_axes(_with_signs(candidates, headings, seen), boxes, headings, seen)
+    candidates = _along_axes(_with_signs(candidates, headings, seen), boxes, given, seen)
     candidates = _beside_turning(candidates, seen)
     guesses: dict[str, Guess] = {}
     rivals: dict[str, tuple[Guess, ...]] = {}
@@ -294,19 +285,14 @@ def propose(
         ranked = sorted((one for one in found if one.confidence > 0.0), key=_rank)
         if not ranked:
             continue
-        guesses[name] = ranked[0]
-        equal = [
-            one
-            for one in ranked
-            if one.confidence > ranked[0].confidence - CHOSEN.apart
-            and _rank(one)[0] == _rank(ranked[0])[0]
-        ]
+        hand, least = _rank(ranked[0])[0], ranked[0].confidence - CHOSEN.apart
+        equal = [one for one in ranked if one.confidence > least and _rank(one)[0] == hand]
         if len(equal) > 1:
             equal.sort(key=lambda one: -_rate(seen[one.channel[0]]))
-            guesses[name] = equal[0]
-            others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
-            if others:
-                rivals[name] = (equal[0], *others)
+        guesses[name] = equal[0]
+        others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
+        if others:
+            rivals[name] = (equal[0], *others)
     return Proposal(guesses={**guesses, **posed}, rivals=rivals)
 
 
@@ -343,17 +329,14 @@ def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     lost = CHOSEN.no_unit_loss if measured[0] and not is_given(some["x"].unit) else 0.0
     turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
     turned = [some["h"].name] if "h" in some else turned[-2:] if len(turned) < 4 else turned
-    channels = {"x": [some["x"].name], "y": [some["y"].name], "heading": turned}
-    units = {
-        "x": some["x"].unit,
-        "y": some["y"].unit,
-        "heading": some["h"].unit if "h" in some else "",
-    }
+    angle = some["h"].unit if "h" in some else ""
     return {
-        name: Guess(
-            channel=tuple(listed), confidence=sure - lost, unit=units[name].strip(), why=why
+        name: Guess(channel=tuple(listed), confidence=sure - lost, unit=unit.strip(), why=why)
+        for name, listed, unit in (
+            ("x", [some["x"].name], some["x"].unit),
+            ("y", [some["y"].name], some["y"].unit),
+            ("heading", turned, angle),
         )
-        for name, listed in channels.items()
     }
 
 
@@ -377,19 +360,10 @@ def _with_signs(
     return {name: [completed(one) for one in found] for name, found in candidates.items()}
 
 
-def _triads(headings: Sequence[Heading]) -> list[Triad]:
-    """Return the channels that are called alike but for x, y and z."""
-    named = map(_with_given_unit, headings)
-    units = {one.name: possible.unit for one, possible in zip(headings, named, strict=True)}
-    words = {name: _words_of(without_ending(name, unit)) for name, unit in units.items()}
-    bad = _REFERENCE | _CORNERS
-    return triads({name: some for name, some in words.items() if not bad & set(some)}, units)
-
-
 def _along_axes(
     candidates: Mapping[str, list[Guess]],
     boxes: Sequence[Triad],
-    headings: Sequence[Heading],
+    units: Mapping[str, str],
     seen: Mapping[str, Channel],
 ) -> dict[str, list[Guess]]:
     """Return the guesses; of boxes whose letters mislead those that their numbers tell."""
@@ -402,7 +376,6 @@ def _along_axes(
 
     speed = best("v_x") or _likeliest(candidates["v_x"])
     found = along_axes(boxes, seen, speed, best("r"), best("a_y"), best("delta_f"))
-    units = {one.name: _with_given_unit(one).unit.strip() for one in headings}
     mended = {
         name: [
             replace(_said(one, _OBLIQUE), confidence=min(one.confidence, CHOSEN.hint))
@@ -414,15 +387,11 @@ def _along_axes(
         for name, some in candidates.items()
     }
     for one in found.axes:
-        near = CHOSEN.known if is_given(units[one.name]) else CHOSEN.known - CHOSEN.no_unit_loss
-        guess = Guess(
-            channel=(one.name,),
-            confidence=near,
-            unit=units[one.name],
-            factor=one.factor,
-            why=one.why,
+        unit = units[one.name].strip()
+        sure = CHOSEN.known - (0.0 if is_given(unit) else CHOSEN.no_unit_loss)
+        mended[one.signal].append(
+            Guess(channel=(one.name,), confidence=sure, unit=unit, factor=one.factor, why=one.why)
         )
-        mended[one.signal].append(guess)
     return mended
 
 
@@ -537,9 +506,10 @@ def _corner(words: tuple[str, ...]) -> tuple[str, frozenset[str]] | None:
 def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:
     """Return pairs of channels of the left and the right wheel of an axle."""
     by_corner: dict[tuple[str, frozenset[str]], Heading] = {}
+    quantity = QUANTITIES[signal]
+    why = "sum of two wheels" if quantity == FORCE else "mean of two wheels"
     for one in listed:
         found = _corner(_words_of(one.name))
-        quantity = QUANTITIES[signal]
         fits = not is_given(one.unit) or quantity in quantities(one.unit)
         if found and fits and not found[1] & _REFERENCE:
             by_corner.setdefault(found, one)
@@ -550,7 +520,6 @@ def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:
             named = any(_matches(group, rest) for group in _PER_WHEEL[signal])
             if corner == first and right is not None and named:
                 guess = Guess(channel=(left.name, right.name), confidence=CHOSEN.words)
-                why = "sum of two wheels" if QUANTITIES[signal] == FORCE else "mean of two wheels"
                 pairs.append(_said(_with_unit(signal, left, guess), why))
     return pairs
 
@@ -568,12 +537,9 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
         finite = values[np.isfinite(values)]
         finite = finite[:: max(1, finite.size // CHOSEN.looked_at)]
         if not finite.size or (signal != "delta_r" and np.ptp(finite) == 0.0):
-            unlikely = (
-                CHOSEN.still * guess.confidence
-                if guess.confidence < CHOSEN.standard
-                else CHOSEN.standard
-            )
-            return replace(_said(guess, "it never changes"), confidence=unlikely)
+            left = CHOSEN.still if guess.confidence < CHOSEN.standard else 1.0
+            left *= guess.confidence
+            return replace(_said(guess, "it never changes"), confidence=left)
         size = max(size, float(np.abs(finite).max()))
         usual = max(usual, _usual(finite))
     if guess.confidence == CHOSEN.standard or signal in WHEELS:
@@ -581,7 +547,9 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
     if not guess.unit:
         return _by_range(signal, guess, size, usual)
     if QUANTITIES[signal] == RATE and guess.confidence <= CHOSEN.vague:
-        return _slow_enough(guess, usual * to_si(guess.unit, RATE, signal))
+        usual *= to_si(guess.unit, RATE, signal)  # wheels and shafts turn faster than any car
+        if unit_of_range(RATE, usual):
+            return replace(_said(guess, f"goes to {usual:.3g} rad/s"), confidence=0.0)
     if QUANTITIES[signal] != ANGLE:
         return guess
     largest = size * to_si(guess.unit, ANGLE, signal)
@@ -589,13 +557,6 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
         why = f"goes to {math.degrees(largest):.0f} deg, as a hand wheel does"
         return replace(_said(guess, why), hand=True)
     return guess
-
-
-def _slow_enough(guess: Guess, usual: float) -> Guess:
-    """Return a guess of r by a name that wheels and shafts have too; no car turns as fast."""
-    if not unit_of_range(RATE, usual):
-        return guess
-    return replace(_said(guess, f"goes to {usual:.3g} rad/s"), confidence=0.0)
 
 
 def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
@@ -671,8 +632,7 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
         return abs(math.log(in_si["a_y"] / (in_si["v_x"] * in_si["r"])))
 
     choices = [(one.unit,) if _is_given(one) else _ASSUMED[key] for key, one in there.items()]
-    nearest = min(itertools.product(*choices), key=far)
-    unit = nearest[list(there).index(name)]
+    unit = min(itertools.product(*choices), key=far)[list(there).index(name)]
     return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess
 
 

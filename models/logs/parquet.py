@@ -65,7 +65,13 @@ class _ParquetTable:
     @cached_property
     def _head(self) -> dict[int, Any]:
         """The first rows of the columns that may be read, which all are looked at."""
-        columns = [k for k, one in enumerate(self.schema) if _is_read(one.type)]
+        from pyarrow.types import is_timestamp
+
+        columns = [  # others, as lists and bytes, are not read at all
+            k
+            for k, one in enumerate(self.schema)
+            if _is_numeric(one.type) or _is_text(one.type) or is_timestamp(one.type)
+        ]
         first = next(self._batches(columns, CHOSEN.head), [])
         return dict(zip(columns, first, strict=False))
 
@@ -97,7 +103,9 @@ class _ParquetTable:
 
     def _batches(self, columns: Sequence[int], size: int) -> Iterator[list[Any]]:
         """Yield the cells of columns, some rows at a time; names may repeat, places do not."""
-        names = list(dict.fromkeys(self.columns.names[k] for k in columns))
+        all_names = self.columns.names
+        names = list(dict.fromkeys(all_names[k] for k in columns))
+        which = [(all_names[k], all_names[:k].count(all_names[k])) for k in columns]
         parquet = need(self.path, "pyarrow.parquet", "Parquet", "parquet")
         texts = [one.name for one in self.schema if _is_text(one.type)]  # each is kept once
         with parquet.ParquetFile(self.path, read_dictionary=texts) as file:
@@ -105,17 +113,7 @@ class _ParquetTable:
                 places: dict[str, list[int]] = {}
                 for place, name in enumerate(batch.schema.names):
                     places.setdefault(name, []).append(place)
-                yield [batch.column(places[self.columns.names[k]][self._which[k]]) for k in columns]
-
-    @cached_property
-    def _which(self) -> tuple[int, ...]:
-        """How many columns of the same name stand before each."""
-        seen: dict[str, int] = {}
-        result = []
-        for name in self.columns.names:
-            result.append(seen.get(name, 0))
-            seen[name] = result[-1] + 1
-        return tuple(result)
+                yield [batch.column(places[name][before]) for name, before in which]
 
     def _column(self, column: int, kind: Kind, cells: Any, rows: Any) -> Any:
         import pyarrow
@@ -153,13 +151,6 @@ def _is_numeric(kind: Any) -> bool:
         or types.is_decimal(kind)
         or types.is_duration(kind)
     )
-
-
-def _is_read(kind: Any) -> bool:
-    """Return whether cells of a type are read at all; others, as lists and bytes, are not."""
-    from pyarrow import types
-
-    return _is_numeric(kind) or _is_text(kind) or bool(types.is_timestamp(kind))
 
 
 def _is_text(kind: Any) -> bool:

@@ -124,12 +124,17 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
     way = _way(filled[-CHOSEN.tail :])
     if way is None:
-        return _no_data(path, lines, encoding)
+        raise RecordingError(f"{path}: there is a header but no row of data with numbers")
     few(path, way.width, "columns", "columns")
     table = [_Line(k, line, way.delimiter) for k, line in enumerate(lines, start=1)]
     return _table(path, table, way, encoding)
 
 
+_MAKERS = {
+    "motec csv": "MoTeC i2", "aim csv": "AiM Race Studio", "carmaker": "IPG CarMaker",
+    "#infofile": "IPG CarMaker", "2d datarecording": "2D", "winarace": "2D",
+    "racelogic": "Racelogic",
+}  # fmt: skip
 _PI_TOOLBOX, _BLOCK = "PiToolboxVersionedASCIIDataSet", "{ChannelBlock}"
 
 
@@ -145,27 +150,24 @@ def _require_one_block(path: Path, lines: list[str]) -> None:
 
 
 def _encoding(path: Path, head: bytes) -> str:
-    for mark, name in (
-        (codecs.BOM_UTF8, "utf-8-sig"),
-        (codecs.BOM_UTF32_LE, "utf-32"),
-        (codecs.BOM_UTF32_BE, "utf-32"),
-        (codecs.BOM_UTF16_LE, "utf-16"),
-        (codecs.BOM_UTF16_BE, "utf-16"),
+    for marks, name in (
+        ((codecs.BOM_UTF8,), "utf-8-sig"),
+        ((codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE), "utf-32"),
+        ((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE), "utf-16"),
     ):
-        if head.startswith(mark):
+        if head.startswith(marks):
             return name
     if b"\0" in head:
         for start, name in ((1, "utf-16-le"), (0, "utf-16-be")):
-            if head[start::2].count(0) > 0.8 * len(head[start::2]) and not head[
-                1 - start :: 2
-            ].count(0):
+            high, low = head[start::2], head[1 - start :: 2]
+            if high.count(0) > 0.8 * len(high) and 0 not in low:
                 return name
         raise RecordingError(f"{path}: is a binary file (it has NUL bytes); no reader knows it")
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head)
+        return "utf-8"
     except UnicodeDecodeError:
         return "cp1252"
-    return "utf-8"
 
 
 def _decoded(path: Path, head: bytes, encoding: str) -> str:
@@ -255,9 +257,8 @@ def _is_data(line: _Line, way: _Way) -> bool:
     if _numbers(way.delimiter, way.decimal).fullmatch(line.text) and line.text.strip(_ONES):
         return True  # as most lines are: nothing but numbers, not all of them 1, which is a unit
     cells = line.cells
-    filled = [cell for cell in cells[: CHOSEN.many] if cell]
-    right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
-    return right > 0 and 2 * right >= len(filled) and not is_units_row(cells)
+    right = _numbers_in(line, way)
+    return 2 * right >= max(sum(map(bool, cells[: CHOSEN.many])), 1) and not is_units_row(cells)
 
 
 # From the data upwards to header and units.
@@ -296,9 +297,11 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     rows = (line.cells for line in lines[first:])
     data = tuple(islice((row for row in rows if len(row) == len(names)), CHOSEN.rows))
     made_by = _maker(lines[:first])
+    share = way.share
+    sure = "sure" if share > CHOSEN.preamble_clear else "likely" if share > 0.6 else "a guess"
     words = [
         _encoding_word(encoding),
-        f"cells apart by {_DELIMITERS[way.delimiter]} ({_sure(way.share)})",
+        f"cells apart by {_DELIMITERS[way.delimiter]} ({sure})",
         "decimal comma" if way.decimal == "," else "decimal point",
     ]
     words += [f"thousands apart by {shown(way.thousands)}"] * bool(way.thousands)
@@ -340,9 +343,8 @@ def _given_rate(preamble: Sequence[str]) -> float:
 def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
     """Return the lines above the data, the nearest first, and the index of the first data."""
     above = [k for k, line in enumerate(lines) if line.text.strip(_PADDING)]
-    full = sorted(_numbers_in(lines[k], way) for k in above[-CHOSEN.tail :])[
-        len(above[-CHOSEN.tail :]) // 2
-    ]
+    counts = sorted(_numbers_in(lines[k], way) for k in above[-CHOSEN.tail :])
+    full = counts[len(counts) // 2]
     first = None
     zone: list[int] = []
     for place in range(len(above) - 1, -1, -1):
@@ -384,11 +386,9 @@ def _uncommented(line: _Line, way: _Way) -> tuple[str, ...]:
 def _named(zone: list[_Line], way: _Way) -> tuple[_Line, _Line | None]:
     """Return the lines of names and of units, of those above the data, the nearest first."""
     fitting = [line for line in zone[:6] if way.width - 1 <= len(_uncommented(line, way))]
-    if not fitting:
-        return zone[0], None  # of another width: the first row of data is refused
     units = next((line for line in fitting[:3] if is_units_row(_uncommented(line, way))), None)
     if units is None or len(fitting) == 1:
-        return fitting[0], None
+        return (*fitting, zone[0])[0], None  # of another width: the first row of data is refused
     at = fitting.index(units)
     if at + 1 < len(fitting) and units.number - fitting[at + 1].number <= 3:
         return fitting[at + 1], units
@@ -402,20 +402,13 @@ def _numeric(data: Sequence[Sequence[str]], names: Sequence[str], way: _Way) -> 
         cells = [row[column] for row in data]
         filled = [cell for cell in cells if cell.lower() not in MISSING]
         right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
-        found.append(2 * right >= len(filled) and not _all_instants(filled))
-        if not names[column] and not filled:
-            found[-1] = False  # what follows the delimiter that rows end in
+        if filled:
+            times = (_is_instant(cell) and not _DOT.fullmatch(cell) for cell in filled)
+            marked = (":" in cell or cell.count("-") == 2 for cell in filled)
+            found.append(2 * right >= len(filled) and not (all(marked) or all(times)))
+        else:
+            found.append(names[column] != "")  # what follows the delimiter that rows end in
     return tuple(found)
-
-
-def _all_instants(cells: Sequence[str]) -> bool:
-    times = (_is_instant(cell) and not _DOT.fullmatch(cell) for cell in cells)
-    marked = (":" in cell or cell.count("-") == 2 for cell in cells)
-    return bool(cells) and (all(marked) or all(times))
-
-
-def _sure(share: float) -> str:
-    return "sure" if share > CHOSEN.preamble_clear else "likely" if share > 0.6 else "a guess"
 
 
 def _encoding_word(encoding: str) -> str:
@@ -424,34 +417,7 @@ def _encoding_word(encoding: str) -> str:
 
 def _maker(lines: Sequence[_Line]) -> str:
     start = " ".join(line.text for line in lines[:8]).lower()
-    for words, maker in (
-        ("motec csv", "MoTeC i2"),
-        ("aim csv", "AiM Race Studio"),
-        ("carmaker", "IPG CarMaker"),
-        ("#infofile", "IPG CarMaker"),
-        ("2d datarecording", "2D"),
-        ("winarace", "2D"),
-        ("racelogic", "Racelogic"),
-    ):
-        if words in start:
-            return maker
-    return ""
-
-
-def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
-    number, text = next((k, line) for k, line in enumerate(lines, start=1) if line.strip())
-    delimiter = max(_DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
-    names = cells_of(text, delimiter)
-    few(path, len(names), "columns", "columns")
-    after = cells_of(lines[number], delimiter) if number < len(lines) else ()
-    under = len(after) == len(names) and is_units_row(after)
-    words = (_encoding_word(encoding), f"names in line {number}")
-    units = tuple(unit_in_name(name) for name in names)
-    columns = Columns(names, units, (True,) * len(names), words)
-    first = number + 1 + under
-    return Layout(
-        encoding=encoding, delimiter=delimiter, columns=columns, first=first, again=(text,)
-    )
+    return next((maker for words, maker in _MAKERS.items() if words in start), "")
 
 
 # Racelogic VBOX: [header], [channel units], [column names], [data], each a section.
@@ -485,17 +451,16 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
     if "channel units" in at:
         units = _with_channel_units(lines, at, names, units)
     known = {"time": "hhmmss", "velocity": "km/h", "lat": "min", "long": "min", "heading": "deg"}
-    units = [unit or known.get(name.lower(), "") for name, unit in zip(names, units, strict=True)]
-    units = [known["time"] if a.lower() == "time" else u for a, u in zip(names, units, strict=True)]
+    units = [
+        known[name.lower()] if name.lower() == "time" else unit or known.get(name.lower(), "")
+        for name, unit in zip(names, units, strict=True)
+    ]
     first = at["data"] + 1
     data = [cells for line in lines[first:] if len(cells := cells_of(line, BLANKS)) == len(names)]
     way = _way([line for line in lines[first:] if line.strip()][-CHOSEN.tail :])
     decimal = "." if way is None else way.decimal
-    words = (
-        _encoding_word(encoding),
-        "Racelogic VBOX sections (sure)",
-        "decimal comma" if decimal == "," else "decimal point",
-    )
+    point = "decimal comma" if decimal == "," else "decimal point"
+    words = (_encoding_word(encoding), "Racelogic VBOX sections (sure)", point)
     return Layout(
         encoding=encoding,
         delimiter=BLANKS,

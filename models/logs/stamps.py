@@ -69,6 +69,9 @@ _MONTHS = {
 _SHORT = re.compile(r"(\d\d)(\d\d)(\d\d)(?:[.,](\d+))?Z?")
 
 
+_Head = Callable[[int], Sequence[str]]  # of a column, its first cells
+
+
 class Stamps(NamedTuple):
     """Time of each sample [s], (n,), and what was mended, one sentence each.
     order : which rows they are of, (n,); None are all as they stand.
@@ -85,9 +88,7 @@ class Stamps(NamedTuple):
 # Which column, in which unit.
 
 
-def find_clock(
-    names: Sequence[str], units: Sequence[str], head: Callable[[int], Sequence[str]]
-) -> Clock | None:
+def find_clock(names: Sequence[str], units: Sequence[str], head: _Head) -> Clock | None:
     """Return the column that is the time, by its name or else as the one that rises evenly.
 
     Of several that are called so it is the first whose stamps hardly ever repeat, as one that is
@@ -108,9 +109,7 @@ def find_clock(
     return None
 
 
-def no_clock(
-    names: Sequence[str], units: Sequence[str], head: Callable[[int], Sequence[str]]
-) -> str:
+def no_clock(names: Sequence[str], units: Sequence[str], head: _Head) -> str:
     """Return why no column is the time, and what to do; arguments as of `find_clock`."""
     even = [one.name for one in _even(names, units, head, ())]
     if len(even) > 1:
@@ -130,10 +129,7 @@ def no_clock(
 
 
 def _even(
-    names: Sequence[str],
-    units: Sequence[str],
-    head: Callable[[int], Sequence[str]],
-    named: Sequence[int],
+    names: Sequence[str], units: Sequence[str], head: _Head, named: Sequence[int]
 ) -> list[Clock]:
     """Return the columns that rise evenly and count neither samples nor the way; a time first."""
     found = []
@@ -167,7 +163,7 @@ def _counts(name: str, cells: Sequence[str]) -> bool:
 
 
 def own_clocks(
-    names: Sequence[str], units: Sequence[str], head: Callable[[int], Sequence[str]], first: Clock
+    names: Sequence[str], units: Sequence[str], head: _Head, first: Clock
 ) -> dict[int, Clock]:
     """Return by column the clock of those that stand behind a time of their own; else nothing.
     So tables are written whose channels were sampled at rates of their own: "time_1, v_x, time_2,
@@ -228,8 +224,7 @@ def _plain(name: str) -> str:
     unit = unit_in_name(name)
     if unit and not name.endswith("_" + unit):
         name = re.split(r"[\[({:,/]", name)[0]
-    elif unit:
-        name = name.removesuffix("_" + unit)
+    name = name.removesuffix("_" + unit) if unit else name
     return re.sub(r"[^a-z]", "", name.lower())
 
 
@@ -251,10 +246,9 @@ def _clock(
     t = np.array([value for value in values if value is not None], dtype=np.float64)
     if not fits(np.diff(t)):
         return None
-    if kind == "instant":
-        return Clock(column, name, kind, f"{name!r} as date or time of day, {words}")
-    if kind == "hhmmss":
-        return Clock(column, name, kind, f"{name!r} as hhmmss, {words}")
+    if kind:
+        form = "date or time of day" if kind == "instant" else kind
+        return Clock(column, name, kind, f"{name!r} as {form}, {words}")
     advice = time_unit(unit)
     found, epoch = _unit(t, advice)
     since = " since 1970" if epoch else ""
@@ -324,7 +318,10 @@ def nanoseconds(cell: str) -> int | None:
     found = _DATE.fullmatch(text) or _DATE.fullmatch(_in_digits(text))
     if found is None:
         lasting = _DURATION.fullmatch(text)
-        return _of_day(text) if lasting is None else _of_duration(lasting)
+        if lasting is None:
+            return _of_day(text)
+        lasts = float(lasting[1]) / PER_SECOND[time_unit(lasting[2])] * 1e9
+        return round(lasts) if lasts < 2**62 else None
     if found[1]:
         year, month, day = int(found[1]), int(found[2]), int(found[3])
     else:
@@ -355,12 +352,6 @@ def _in_digits(text: str) -> str:
 
 _FIRST = datetime.date(1970, 1, 1).toordinal()
 _DURATION = re.compile(r"(\d{1,15}(?:\.\d{0,15})?(?:e-?\d{1,2})?) (sec|min|hr)")
-
-
-def _of_duration(found: re.Match[str]) -> int | None:
-    """Return a number and its unit of time [ns]."""
-    total = float(found[1]) / PER_SECOND[time_unit(found[2])] * 1e9
-    return round(total) if total < 2**62 else None
 
 
 def _of_day(text: str) -> int | None:
@@ -429,7 +420,7 @@ def seconds(
     repeat = None if fall is not None else _first_step(t, lambda step: step == 0.0)
     even = None if fall is not None else _even_clock(t)
     if even is not None:
-        return Stamps(even.t, (f"{clock.name} {even.words}",))
+        return even._replace(notes=(f"{clock.name} {even.notes[0]}",))
     if fall is None and repeat is None:
         return Stamps(t, ())
     mended = _in_order(t, restarts=restarts) if mend else None
@@ -437,20 +428,6 @@ def seconds(
         said = not_rising(t, rows, place, restarts=restarts)
         raise RecordingError(f"{label}: {clock.name} {said}")
     return mended._replace(notes=tuple(f"{clock.name}: {note}" for note in mended.notes))
-
-
-def risen(
-    label: str,
-    name: str,
-    t: Array,
-    rows: NDArray[np.int64],
-    place: str,
-    *,
-    mend: bool = False,
-    restarts: bool = True,
-) -> Stamps:
-    clock = Clock(0, name, "s", "")
-    return seconds(label, clock, t, rows, place, mend=mend, restarts=restarts)
 
 
 def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
@@ -490,13 +467,6 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
         back = f"times it goes back by {CHOSEN.back:g} s or more, and on {CHOSEN.pause:g} s later"
         notes.append(f"{back}: {len(begins) - 1}")
     return Stamps(found, tuple(notes), np.concatenate(orders))
-
-
-def _starts_again(first: float, before: float, after: float) -> bool:
-    """Return whether a clock that fell starts again; else its samples are out of order.
-    first : stamp since which it rose [s].   before, after : stamps between which it fell [s].
-    """
-    return bool(after - first <= 0.5 * (before - first) and before > first)
 
 
 def typical_rate(t: Array) -> float:
@@ -556,16 +526,10 @@ def _first_step(t: Array, wrong: Callable[[Array], NDArray[Any]]) -> int | None:
 # Rounded stamps of an even clock.
 
 
-class _Even(NamedTuple):
-    """An even clock: time [s], (n,), and what was mended, after the name of the column."""
-
-    t: Array
-    words: str
-
-
 @np.errstate(all="ignore")
-def _even_clock(t: Array) -> _Even | None:
+def _even_clock(t: Array) -> Stamps | None:
     """Return the even clock that stamps were rounded from; None where there is none, or no need.
+    Its note goes on after the name of the column.
     t : stamps [s] that never fall, (n,).
     """
     if t.size < 10 or not t[-1] > t[0]:
@@ -591,7 +555,7 @@ def _even_clock(t: Array) -> _Even | None:
     return _fitted(t, tick)
 
 
-def _unjittered(t: Array) -> _Even | None:
+def _unjittered(t: Array) -> Stamps | None:
     """Return the even clock of stamps that jitter so far that some are there twice; or None.
     They must wander about it by less than a step, and not drift by half of one: then none is lost.
     """
@@ -606,7 +570,8 @@ def _unjittered(t: Array) -> _Even | None:
         return None
     begin = float(off.max() + off.min()) / 2.0
     even = np.round(begin + dt * np.arange(t.size), 9)
-    return _Even(even, f"jitters, some stamps are there twice: taken as even at {1.0 / dt:.6g} Hz")
+    said = f"jitters, some stamps are there twice: taken as even at {1.0 / dt:.6g} Hz"
+    return Stamps(even, (said,))
 
 
 def _tick(t: Array) -> float | None:
@@ -620,7 +585,7 @@ def _tick(t: Array) -> float | None:
     return None
 
 
-def _fitted(t: Array, tick: float) -> _Even | None:
+def _fitted(t: Array, tick: float) -> Stamps | None:
     """Return the even clock of which every stamp is less than a tick away, lost samples aside."""
     steps = np.diff(t)
     usual = float(np.median(steps[steps > 0.0]))
@@ -642,11 +607,8 @@ def _fitted(t: Array, tick: float) -> _Even | None:
         even[first:end] = start + dt * (lost + k)
     if not (np.diff(even) > 0.0).all():
         return None
-    return _Even(
-        np.round(even, 9),
-        f"is rounded to {tick:g} s, its samples were put on the even clock of {dt:.9g} s that "
-        "explains every stamp",
-    )
+    said = f"is rounded to {tick:g} s, its samples were put on the even clock of {dt:.9g} s that "
+    return Stamps(np.round(even, 9), (said + "explains every stamp",))
 
 
 def _slack(tick: float, t: Array) -> float:
@@ -682,7 +644,7 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
     if t[k + 1] < t[k]:
         if not restarts and t[k] - t[k + 1] >= CHOSEN.back:
             return said + "the clock starts again beside others: cut the log there"
-        if _starts_again(t[0], t[k], t[k + 1]):
+        if t[k + 1] - t[0] <= 0.5 * (t[k] - t[0]) and t[k] > t[0]:  # else a sample is astray
             return said + (
                 "the clock starts again: several runs in one file need a column run, or "
                 f"{_MENDING}, which learns on them as one drive"

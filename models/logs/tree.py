@@ -81,9 +81,9 @@ class Signal(NamedTuple):
 class _Found(NamedTuple):
     """What a tree holds: signals, names of vectors without clock, names of what is not read."""
 
-    signals: tuple[Signal, ...]
-    clockless: tuple[str, ...]
-    unread: tuple[str, ...]
+    signals: list[Signal]
+    clockless: list[str]
+    unread: list[str]
     said: tuple[str, ...] = ()
 
 
@@ -96,27 +96,24 @@ def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> _Found:
     walk.struct(dict(tree), "", ())
     rate = rate or walk.rate
     if not rate or not walk.clockless:
-        return _Found(tuple(walk.signals), tuple(walk.clockless), tuple(walk.unread))
+        return _Found(walk.signals, list(walk.clockless), walk.unread)
     sizes = Counter(max(leaf.shape) for _, _, leaf, _ in walk.clockless.values())
-    samples = sizes.most_common(1)[0][0]
+    ((samples, _),) = sizes.most_common(1)
     even = Leaf(shape=(samples, 1), load=lambda: (np.arange(samples) / rate).reshape(-1, 1))
     clock = Clock(f"even {rate:g} Hz", even, None, "s")
     rest = _Walk()
     for name, unit, leaf, columns in walk.clockless.values():
         rest.leaf(leaf, name, unit, (clock,), columns)
     said = (f"time is even at {rate:g} Hz of vectors without a time of their own",)
-    return _Found((*walk.signals, *rest.signals), tuple(rest.clockless), tuple(walk.unread), said)
+    return _Found(walk.signals + rest.signals, list(rest.clockless), walk.unread, said)
 
 
 def times_of(clock: Clock) -> Array:
     """Read the times of a clock as they are in the file, (n,)."""
-    values = clock.leaf.load()
-    return values.reshape(-1) if clock.column is None else _line(values, clock.column, clock.leaf)
-
-
-def _line(values: Array, place: int, leaf: Leaf) -> Array:
-    """Return the column of a tall matrix, the row of a wide one."""
-    return values[:, place] if leaf.shape[0] >= leaf.shape[1] else values[place]
+    values, (rows, width) = clock.leaf.load(), clock.leaf.shape
+    if clock.column is None:
+        return values.reshape(-1)
+    return values[:, clock.column] if rows >= width else values[clock.column]
 
 
 _Columns = tuple[list[str], list[str]] | None  # names and units of those of a matrix
@@ -175,8 +172,13 @@ class _Walk:
         columns: _Columns,
     ) -> None:
         rows, width = leaf.shape
-        if rows * width < 2:
-            self.given_rate(name, leaf)
+        if rows * width < 2:  # it may be the rate of samples, or the time between them
+            word = re.sub("[^a-z]", "", name.rpartition(".")[2].lower())
+            if word in _RATES + _STEPS and leaf.shape == (1, 1):
+                value = float(leaf.load()[0, 0])
+                rate = value if word in _RATES or not value else 1.0 / value
+                if CHOSEN.least_rate <= rate <= CHOSEN.most_rate:
+                    self.rate = rate
             return
         for clock in clocks:
             samples = max(clock.leaf.shape)
@@ -195,22 +197,9 @@ class _Walk:
         else:
             self.clockless[name] = (name, unit, leaf, columns)
 
-    def given_rate(self, name: str, leaf: Leaf) -> None:
-        """Take a single number for the rate of samples, or the time between them, by its name."""
-        word = re.sub("[^a-z]", "", name.rpartition(".")[2].lower())
-        if word in _RATES + _STEPS and leaf.shape == (1, 1):
-            value = float(leaf.load()[0, 0])
-            rate = value if word in _RATES or not value else 1.0 / value
-            self.rate = rate if CHOSEN.least_rate <= rate <= CHOSEN.most_rate else self.rate
-
 
 def _lines(
-    leaf: Leaf,
-    name: str,
-    unit: str,
-    along: int,
-    clock: Clock,
-    columns: _Columns,
+    leaf: Leaf, name: str, unit: str, along: int, clock: Clock, columns: _Columns
 ) -> Iterator[Signal]:
     """Yield the signal of a vector, or those of the columns or rows of a matrix."""
     width = leaf.shape[1 - along]
@@ -220,14 +209,9 @@ def _lines(
     names, units = columns or ([], [])
     for k in range(width):
         place = f"(:,{k + 1})" if along == 0 else f"({k + 1},:)"
-        yield Signal(
-            names[k] if len(names) == width else name + place,
-            units[k] if len(units) == width else unit,
-            leaf,
-            k,
-            along,
-            clock,
-        )
+        of_line = names[k] if len(names) == width else name + place
+        unit_of = units[k] if len(units) == width else unit
+        yield Signal(of_line, unit_of, leaf, k, along, clock)
 
 
 def line_of(values: Array, signal: Signal) -> Array:

@@ -55,23 +55,34 @@ def chosen_signals(
 ) -> _Reading:
     names = [one.name for one in headings]
     by_map = as_listed(log, log_map.signals, names)
-    lost = _lost_text(log_map.signals, by_map)
+    lost: tuple[str, ...] = ()
+    if "v_x" in log_map.signals and "v_x" not in by_map:
+        channels = shown(" + ".join(log_map.signals["v_x"].channel))
+        lost = (f"there is no column {channels}: vx is computed from the wheels",)
     if log_map.is_complete:
         return _Reading(by_map, lost)
-    given = _beside(standard_signals(log, names), by_map)
-    given = _without_wheels(given, by_map)
+    given = _without_wheels(_beside(standard_signals(log, names), by_map), by_map)
     missing = missing_signals(given)
     if has_v_y(given) and not missing:
         return _Reading(given, lost)
-    _refuse_words(log, missing if has_v_y(given) else ["v_y", *missing], run)
+    for column in map(column_of, missing if has_v_y(given) else ["v_y", *missing]):
+        if column in log.unlisted:  # it is there and not numeric: by its first word
+            log.read([column], run)
+            raise RecordingError(f"{log.path}: {column} must be numeric, its cells are words")
     proposal = propose(log, headings, run)
     found = _without_wheels(likely_signals(given, proposal), by_map)
     if missing := missing_signals(found):
         raise RecordingError(_missing_text(log, missing, proposal, names))
-    notes = [_taken_text(name, found[name]) for name in found if name not in given]
+    notes = list(lost)
+    for name, one in found.items():
+        if name not in given:
+            channels = " + ".join(map(without_unit, one.channel))
+            unit = f" [{one.unit}]" if one.unit else ""
+            unit += " with its sign turned" if one.factor < 0.0 else ""
+            notes.append(f"{column_of(name)} is taken from {channels}{unit}, by its name")
     if aside := aside_text(found, proposal):
         notes.append(aside)
-    return _Reading(found, (*lost, *notes))
+    return _Reading(found, tuple(notes))
 
 
 def as_listed(
@@ -107,18 +118,15 @@ def as_listed(
 def likely_signals(given: Mapping[str, Signal], proposal: Proposal) -> dict[str, Signal]:
     """Return what is given, and what a proposal is sure of beside it, in the order of signals."""
     sure = {name: one for name, one in proposal.signals().items() if name not in given}
-    if has_wheels(given):
-        sure.pop("v_x", None)
-    if "v_y" in given_by(given) or {"v_y", BETA} & set(sure):  # a pose is for what no sensor shows
-        sure = {name: one for name, one in sure.items() if name not in POSE}
+    out = {"v_x"} if has_wheels(given) else set()
+    if has_v_y(given) or {"v_y", BETA} & set(sure):  # a pose is for what no sensor shows
+        out |= set(POSE)
     if "v_x" in given_by(given) or "v_x" in proposal.guesses:
-        sure = {name: one for name, one in sure.items() if name not in WHEELS}
-    found = _beside(sure, given)
-    if ("Fyf" in found) != ("Fyr" in found):
-        found = {name: one for name, one in found.items() if name not in ("Fyf", "Fyr")}
-    if not set(POSE) <= set(found):
-        found = {name: one for name, one in found.items() if name not in POSE}
-    return {name: found[name] for name in QUANTITIES if name in found}
+        out |= set(WHEELS)
+    found = _beside({name: one for name, one in sure.items() if name not in out}, given)
+    lone = [some for some in (("Fyf", "Fyr"), POSE) if not set(some) <= set(found)]
+    out = {name for some in lone for name in some}
+    return {name: found[name] for name in QUANTITIES if name in found and name not in out}
 
 
 def with_wheels(signals: Mapping[str, Signal], proposal: Proposal) -> dict[str, Signal]:
@@ -126,8 +134,11 @@ def with_wheels(signals: Mapping[str, Signal], proposal: Proposal) -> dict[str, 
     if "v_x" not in signals:
         return dict(signals)
     there = {channel for one in signals.values() for channel in one.channel}
-    sure = {name: one for name, one in proposal.signals().items() if name in WHEELS}
-    more = {name: one for name, one in sure.items() if not there & set(one.channel)}
+    more = {
+        name: one
+        for name, one in proposal.signals().items()
+        if name in WHEELS and not there & set(one.channel)
+    }
     return {**more, **signals}
 
 
@@ -141,15 +152,6 @@ def _without_wheels(found: Mapping[str, Signal], by_map: Mapping[str, Signal]) -
     if "v_x" not in found:
         return dict(found)
     return {name: one for name, one in found.items() if name not in WHEELS or name in by_map}
-
-
-def _refuse_words(log: LogFile, missing: list[str], run: str | None) -> None:
-    """Refuse columns of standard names that are there and not numeric, with their first word."""
-    unlisted = set(log.unlisted)
-    for column in map(column_of, missing):
-        if column in unlisted:
-            log.read([column], run)
-            raise RecordingError(f"{log.path}: {column} must be numeric, its cells are words")
 
 
 def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
@@ -210,21 +212,6 @@ def missing_signals(signals: Mapping[str, Signal]) -> list[str]:
 def _listing(names: Sequence[str]) -> str:
     """Return what channels there are, the first of many."""
     return f"columns found: '{some(names)}'" if names else "there is none but the time"
-
-
-def _taken_text(name: str, signal: Signal) -> str:
-    channels = [without_unit(one) for one in signal.channel]
-    unit = f" [{signal.unit}]" if signal.unit else ""
-    unit += " with its sign turned" if signal.factor < 0.0 else ""
-    return f"{column_of(name)} is taken from {' + '.join(channels)}{unit}, by its name"
-
-
-def _lost_text(given: Mapping[str, Signal], listed: Mapping[str, Signal]) -> tuple[str, ...]:
-    """Return what is said where the v_x that a map tells is not in the log, and wheels are."""
-    if "v_x" not in given or "v_x" in listed:
-        return ()
-    channels = " + ".join(given["v_x"].channel)
-    return (f"there is no column {shown(channels)}: vx is computed from the wheels",)
 
 
 def aside_text(found: Mapping[str, Signal], proposal: Proposal) -> str:

@@ -97,20 +97,16 @@ class LogMap:
         require_fitting(self.signals, "")
         if self.axes not in AXES:
             raise RecordingError(f"axes must be one of {', '.join(AXES)}, not {shown(self.axes)}")
-        if not 0.0 < self.longest_gap < math.inf:
-            raise RecordingError(
-                f"longest_gap must be positive and finite, it is {self.longest_gap}"
-            )
-        if self.rate is not None and not 0.0 < self.rate < math.inf:
-            raise RecordingError(f"rate must be positive and finite, in Hz, it is {self.rate}")
+        for name, unit in (("longest_gap", ""), ("rate", "in Hz, "), ("low_pass", "")):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < math.inf:
+                raise RecordingError(f"{name} must be positive and finite, {unit}it is {value}")
         if self.rate is not None and self.clock:
             raise RecordingError("rate replaces a time: give it or the channel of the clock")
-        if self.holes not in (_REFUSE, CUT):
-            raise RecordingError(f"holes must be {_REFUSE} or {CUT}, not {shown(self.holes)}")
-        if self.order not in (_REFUSE, MEND):
-            raise RecordingError(f"order must be {_REFUSE} or {MEND}, not {shown(self.order)}")
-        if self.low_pass is not None and not 0.0 < self.low_pass < math.inf:
-            raise RecordingError(f"low_pass must be positive and finite, it is {self.low_pass}")
+        for name, other in (("holes", CUT), ("order", MEND)):
+            value = getattr(self, name)
+            if value not in (_REFUSE, other):
+                raise RecordingError(f"{name} must be {_REFUSE} or {other}, not {shown(value)}")
         for name, signal in self.signals.items():
             if signal.unit:
                 to_si(signal.unit, quantity_of(name, signal.unit), f"signals.{name}")
@@ -180,7 +176,11 @@ class LogMap:
             other by its whole path. None names it as given.
         """
         if self.dbc and folder is not None:
-            return replace(self, dbc=_named_from(Path(self.dbc), Path(folder))).toml()
+            file, below = Path(self.dbc), Path(folder).resolve()
+            whole = resolved(file) if file.is_file() else file
+            inside = file.is_file() and whole.is_relative_to(below)
+            named = whole.relative_to(below).as_posix() if inside else str(whole)
+            return replace(self, dbc=named).toml()
         declared = changed(self)
         tables: dict[str, dict[str, Any]] = {
             section: {key: declared[one] for key, one in keys.items() if one in declared}
@@ -206,15 +206,6 @@ class LogMap:
         path : of the file; what is there is replaced.
         """
         write_atomically(path, self.toml(Path(path).parent))
-
-
-def _named_from(file: Path, folder: Path) -> str:
-    """Return how a file that is there is named in one of a folder; the name itself of another."""
-    if not file.is_file():
-        return str(file)
-    whole = resolved(file)
-    below = whole.is_relative_to(folder.resolve())
-    return whole.relative_to(folder.resolve()).as_posix() if below else str(whole)
 
 
 _RULES = {

@@ -42,7 +42,10 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
     if n <= LONG:
         return Portion(recording, np.arange(n))
     step = min(round(CHOSEN.segment / recording.dt), LONG // CHOSEN.fewest_segments) // CHOSEN.steps
-    power = _power(recording, step)
+    power = np.zeros(-(-n // step))  # sum of (v_x r)² over each `step` samples
+    for part in blocks(n):
+        turning = np.clip(recording.v_x[part] * recording.r[part], -_HARDEST, _HARDEST) ** 2
+        np.add.at(power, np.arange(part.start, part.stop) // step, turning)
     count = LONG // (CHOSEN.steps * step)
     if middle is None or not 0 < middle < n:
         sides = [(0, n, count)]
@@ -56,16 +59,6 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
     v_x = taken.v_x.copy()
     v_x[np.maximum(ends[:, None] - 1 - np.arange(round(CHOSEN.rest / recording.dt)), 0)] = 0.0
     return Portion(replace(taken, v_x=v_x), samples)
-
-
-def _power(recording: Recording, step: int) -> Array:
-    """Return the sum of (v_x r)² over each `step` samples."""
-    n = len(recording)
-    power = np.zeros(-(-n // step))
-    for part in blocks(n):
-        turning = np.clip(recording.v_x[part] * recording.r[part], -_HARDEST, _HARDEST) ** 2
-        np.add.at(power, np.arange(part.start, part.stop) // step, turning)
-    return power
 
 
 def _hardest(power: Array, step: int, first: int, last: int, count: int) -> list[int]:

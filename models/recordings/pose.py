@@ -53,7 +53,7 @@ def with_pose(
     what = "vx, vy and r" if "r" in of_pose else "vx and vy"
     said = [f"{what} are taken from the pose{motion.said}"]
     late = None if gyro is None else _lateness(gyro, motion.r)
-    if gyro is not None and late is not None and abs(late) > CHOSEN.late:
+    if late is not None and abs(late) > CHOSEN.late:
         box = [name for name in ("r", "a_y", "a_x") if name in found]
         for name in box:
             found[name] = [_earlier(raw, late, motion.r.t) for raw in found[name]]
@@ -99,20 +99,17 @@ class _Motion(NamedTuple):
     said: str
 
 
-class _Smooth(NamedTuple):
-    """Smoothed columns (n, k), and the standard deviation of what was taken out."""
-
-    values: Array
-    noise: float
-
-
 def _motion_of(label: str, parts: Mapping[str, Raw]) -> _Motion:
     """Return how a car moves by its pose.
     parts : by name of `POSE` on one clock or several, SI.
     """
     x = parts["x"]
     t = x.t
-    z = np.column_stack([np.interp(t, parts[name].t, _unwrapped(name, parts)) for name in POSE])
+    psi = parts["heading"].values
+    period = 360.0 if np.abs(psi).max(initial=0.0) > 2.0 * math.pi + 0.1 else 2.0 * math.pi
+    values = (x.values, parts["y"].values, np.unwrap(psi, period=period))
+    of_pose = zip(POSE, values, strict=True)
+    z = np.column_stack([np.interp(t, parts[name].t, one) for name, one in of_pose])
     cuts = [0, *gaps(t, LOGS_CHOSEN.longest_gap).tolist(), t.size]
     pieces = []
     for first, end in itertools.pairwise(cuts):
@@ -123,30 +120,27 @@ def _motion_of(label: str, parts: Mapping[str, Raw]) -> _Motion:
             f"{label}: the pose must have at least {CHOSEN.fewest_samples} samples without a gap, "
             f"it has {t.size}"
         )
-    psi, turned = _heading(label, pieces)
-    columns: list[list[Array]] = [[], [], []]
-    for piece, angle in zip(pieces, psi, strict=True):
-        dx, dy = piece.rates[:, 0], piece.rates[:, 1]
-        columns[0].append(dx * np.cos(angle) + dy * np.sin(angle))
-        columns[1].append(-dx * np.sin(angle) + dy * np.cos(angle))
-        columns[2].append(np.gradient(angle, piece.step, edge_order=2))
+    angles, turned = _heading(label, pieces)
+    angle = np.concatenate(angles)
+    dx, dy = np.concatenate([piece.rates for piece in pieces]).T
+    each = zip(angles, pieces, strict=True)
+    rates = [np.gradient(one, piece.step, edge_order=2) for one, piece in each]
     rows = np.concatenate([piece.rows for piece in pieces])
     clock = np.concatenate([piece.t for piece in pieces])
-    v_x, v_y, r = (Raw(clock, np.concatenate(one), x.place, rows) for one in columns)
+    v_x, v_y, r = (
+        Raw(clock, one, x.place, rows)
+        for one in (
+            dx * np.cos(angle) + dy * np.sin(angle),
+            -dx * np.sin(angle) + dy * np.cos(angle),
+            np.concatenate(rates),
+        )
+    )
     noise = [float(np.median([piece.noise[k] for piece in pieces])) for k in (0, 1)]
     said = (
         f"{turned}; its position scatters by {noise[0]:.2g} m, its heading by "
         f"{math.degrees(noise[1]):.2g} deg"
     )
     return _Motion(v_x, v_y, r, said)
-
-
-def _unwrapped(name: str, parts: Mapping[str, Raw]) -> Array:
-    values = parts[name].values
-    if name != "heading":
-        return values
-    far = float(np.abs(values).max(initial=0.0))
-    return np.unwrap(values, period=360.0 if far > 2.0 * math.pi + 0.1 else 2.0 * math.pi)
 
 
 class _Piece(NamedTuple):
@@ -165,13 +159,14 @@ def _piece(t: Array, z: Array, rows: NDArray[np.int64]) -> _Piece:
     even = t[0] + step * np.arange(t.size)
     even = t if np.abs(even - t).max() < 1e-6 * step else even
     z = np.column_stack([np.interp(even, t, column) for column in z.T])
-    place, heading = _smoothed(z[:, :2]), _smoothed(z[:, 2:])
-    rates = np.gradient(place.values, step, axis=0, edge_order=2)
-    return _Piece(even, rows, step, rates, heading.values[:, 0], (place.noise, heading.noise))
+    (place, off), (heading, turned) = _smoothed(z[:, :2]), _smoothed(z[:, 2:])
+    rates = np.gradient(place, step, axis=0, edge_order=2)
+    return _Piece(even, rows, step, rates, heading[:, 0], (off, turned))
 
 
-def _smoothed(z: Array) -> _Smooth:
+def _smoothed(z: Array) -> tuple[Array, float]:
     """Return columns of one size, smoothed alike as strongly as they predict themselves best.
+    Beside them (n, k) stands the standard deviation of what was taken out.
     z : (n, k), evenly sampled.
     """
     from scipy.fft import dct  # takes longer than to read a short log
@@ -187,15 +182,14 @@ def _smoothed(z: Array) -> _Smooth:
     third = np.array([-1.0, 3.0, -3.0, 1.0])
     bands = np.zeros((4, n))
     for lag in range(4):
-        products = third[: 4 - lag] * third[lag:]
-        for k, product in enumerate(products):
-            bands[3 - lag, k + lag : k + lag + n - 3] += product
+        for k in range(lag, 4):
+            bands[3 - lag, k : k + n - 3] += third[k - lag] * third[k]
     bands *= _STRENGTHS[best]
     bands[3] += 1.0
     values = np.asarray(solveh_banded(bands, z))
     freedom = float(np.sum(left[best])) * z.shape[1]
     noise = math.sqrt(float(np.sum((z - values) ** 2)) / max(freedom, 1.0))
-    return _Smooth(values, noise)
+    return values, noise
 
 
 def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:

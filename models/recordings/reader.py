@@ -155,16 +155,13 @@ def _judged(
     recording = recording_of(log, name, given, run=run, dt=dt)
     if check:
         try:
-            check_physics(_without_faults(recording, given.repair))
+            # Repaired; of the car only its size counts, for noise.
+            repair = replace(given.repair, vehicle={})
+            check_physics(repair.apply(recording, sedan())[0] if given.repair else recording)
         except RecordingError as error:
             label = f"{log.path}{recording.name.removeprefix(name)}"
             raise RecordingError(label + str(error).removeprefix(recording.name)) from None
     return recording
-
-
-def _without_faults(recording: Recording, repair: Repair) -> Recording:
-    """Return a recording repaired, to be judged; of the car only its size counts, for noise."""
-    return replace(repair, vehicle={}).apply(recording, sedan())[0] if repair else recording
 
 
 def runs(path: str | Path) -> list[str]:

@@ -45,14 +45,16 @@ def rolled(
     dt : sample time [s].
     """
     names, most = _sources(speeds, wheels), wheels.acceleration
-    n, v_x = r.size, large((r.size,))
+    v_x = large((r.size,))
     span = max(1, round(CHOSEN.rolled_window / dt))
-    free = [bool(wheels.driven) and not set(group) & set(_pushed(wheels)) for group in names]
+    driven = DRIVEN[wheels.driven] if wheels.driven else WHEELS
+    pushed = {*driven, WHEELS[4]} if driven else set()  # a lone encoder counts with the motor
+    free = [not pushed & set(group) for group in names]
     rule = np.array([dt, most, most + CHOSEN.noise / (span * dt)])
     scan, constants = _trust_scan(len(names)), {"rule": rule, "free": np.array(free, dtype=float)}
     gated = untrusted = 0
     trust: Array | None = None
-    for part in blocks(n):
+    for part in blocks(r.size):
         early = slice(max(part.start - span, 0), part.stop)
         motion = r[early], delta_f[early], delta_r[early]
         of_part = {name: one[early] for name, one in speeds.items()}
@@ -61,16 +63,17 @@ def rolled(
         begin = part.start - early.start
         rates = (rows - before)[begin:] / (span * dt)
         rows = rows[begin:]
-        if trust is None:
-            trust = _begun(rows[0], free)
+        if trust is None:  # the middle one of wheels, of those that are free if there are any
+            known = sorted(rows[0][free]) or sorted(rows[0])
+            middle = known[(len(known) - 1) // 2]
+            trust = np.array([middle, 0.0, 0.0, middle])
         samples = {"row": rows, "rates": rates}
         record = scan(len(rows), {"trust": trust, **samples, **constants}, ports=("v", "untrusted"))
         trust = record["trust_final"]
         v_x[part] = record["v"].ravel()
         untrusted += int(np.count_nonzero(record["untrusted"] > 0.0))
-        agree = np.abs(rows - v_x[part, None]) <= CHOSEN.noise + CHOSEN.slip * np.abs(
-            v_x[part, None]
-        )
+        now = v_x[part, None]
+        agree = np.abs(rows - now) <= CHOSEN.noise + CHOSEN.slip * np.abs(now)
         gated += int(np.count_nonzero(~agree.all(axis=1)))
     return _Rolled(v_x, gated, untrusted)
 
@@ -87,26 +90,15 @@ class _Trust(NamedTuple):
     known: ca.SX
 
 
-class _Rule(NamedTuple):
-    """What holds for all samples.
-
-    dt [s]; most: acceleration of a car, steady: of a wheel that may be trusted [m/s²]; free: of
-    each wheel, whether it is known not to be driven, (k,).
-    """
-
-    dt: ca.SX
-    most: ca.SX
-    steady: ca.SX
-    free: ca.SX
-
-
-def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: _Rule) -> _Trust:
+def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: ca.SX, free: ca.SX) -> _Trust:
     """Return the speed at the next sample.
     c : speed of the center of gravity by each wheel [m/s], (k,).
     rates : by which each changed lately [m/s²], (k,).
+    rule : dt [s], and the largest accelerations of a car and of a trusted wheel [m/s²], (3,).
+    free : of each wheel, whether it is known not to be driven, (k,).
     """
     v, a, since, known = trust
-    dt, most, limit, free = rule
+    dt, most, limit = ca.vertsplit(rule)
     ahead, passed = v + a * dt, since + dt
     near, alike = (
         CHOSEN.noise + share * ca.fabs(ahead) for share in (CHOSEN.slip, CHOSEN.rolled_alike)
@@ -180,9 +172,7 @@ def _trust_scan(k: int) -> Scan:
     """Return the compiled loop over samples."""
     trust, row, rates = ca.SX.sym("trust", 4), ca.SX.sym("row", k), ca.SX.sym("rates", k)
     rule, free = ca.SX.sym("rule", 3), ca.SX.sym("free", k)
-    after = _trusted(
-        _Trust(*(trust[i] for i in range(4))), row, rates, _Rule(rule[0], rule[1], rule[2], free)
-    )
+    after = _trusted(_Trust(*ca.vertsplit(trust)), row, rates, rule, free)
     step = ca.Function(
         f"rolled_{k}",
         [trust, row, rates, rule, free],
@@ -191,19 +181,6 @@ def _trust_scan(k: int) -> Scan:
         ["trust_next", "v", "untrusted"],
     )
     return Scan(step, carry=("trust",), over=("row", "rates"))
-
-
-def _begun(row: Array, free: Sequence[bool]) -> Array:
-    """Return the speed before the first sample: the middle one of wheels, if they can be free."""
-    known = sorted(c for c, rolls in zip(row, free, strict=True) if rolls) or sorted(row)
-    middle = known[(len(known) - 1) // 2]
-    return np.array([middle, 0.0, 0.0, middle])
-
-
-def _pushed(wheels: Wheels) -> tuple[str, ...]:
-    """Return the wheels that are driven; a lone encoder counts with the motor."""
-    driven = DRIVEN[wheels.driven]
-    return (*driven, WHEELS[4]) if driven else ()
 
 
 def _sources(speeds: Mapping[str, Array], wheels: Wheels) -> list[tuple[str, ...]]:

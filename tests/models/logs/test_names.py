@@ -8,6 +8,7 @@ import pytest
 from models.logs.chosen import CHOSEN as LOGS_CHOSEN
 from models.logs.log import Channel, Listed
 from models.logs.names import _HAND, _RULES, Guess, _name_confidence, _words_of, propose
+from models.logs.signals import NEEDED
 from models.logs.spelling import unit_in_name, without_ending
 
 CALLED = {
@@ -130,7 +131,7 @@ def test_a_log_with_units_is_proposed_whole():
         ("RoadWheelAngle", "deg", 5 * WAVE),
         ("Lateral Acceleration", "g", WAVE),
     )
-    assert found.unsure() == ()
+    assert all(map(found.is_sure, NEEDED))
     signals = found.signals()
     assert signals["v_y"].channel == ("Vel Lat",) and signals["v_y"].unit == "km/h"
     assert set(signals) == {"v_x", "v_y", "r", "delta_f", "a_y"}
@@ -138,7 +139,7 @@ def test_a_log_with_units_is_proposed_whole():
 
 def test_of_two_that_are_equal_none_is_taken():
     found = proposed(("GPS Speed", "km/h", WAVE), ("Ground Speed", "km/h", WAVE))
-    assert not found.is_sure("v_x") and "v_x" in found.unsure()
+    assert not found.is_sure("v_x")
     assert {one.channel[0] for one in found.rivals["v_x"]} == {"GPS Speed", "Ground Speed"}
     better = proposed(("GPS Speed", "km/h", WAVE), ("Velocity Forward", "km/h", WAVE))
     assert better.is_sure("v_x") and better.guesses["v_x"].channel == ("Velocity Forward",)
@@ -198,9 +199,9 @@ def test_two_wheels_of_an_axle_are_taken_together():
 
 def test_sideslip_stands_in_for_lateral_velocity_where_there_is_none():
     beta = ("Schwimmwinkel", "deg", WAVE)
-    assert "beta" in proposed(beta).signals() and proposed(beta).beta_stands_in
+    assert "beta" in proposed(beta).signals()
     both = proposed(beta, ("Vel Lat", "km/h", WAVE))
-    assert "beta" not in both.signals() and not both.beta_stands_in
+    assert "beta" not in both.signals()
 
 
 def test_a_guess_that_cannot_be_read_is_none():
