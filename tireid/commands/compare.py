@@ -62,10 +62,8 @@ def run(options: argparse.Namespace) -> int:
     watch = Stopwatch()
     vehicle = shared.read_vehicle(options)
     parts = {"methods": 9.0, "step times, tables and figures": 1.0}
-    with (
-        output_folder(options.out, force=options.force) as folder,
-        Progress("compare", parts, long=True) as work,
-    ):
+    with output_folder(options.out, force=options.force) as folder:
+        work = Progress("compare", parts, long=True)
         log_map, check = shared.given_map(options), not options.no_check
         recordings = [shared.read_log(log, vehicle, log_map, check=check) for log in options.logs]
         if not recordings:

@@ -209,10 +209,8 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> None:
     watch = Stopwatch()
-    with (
-        output_folder(options.out, force=options.force) as folder,
-        Progress("demo", _PARTS, long=True) as work,
-    ):
+    with output_folder(options.out, force=options.force) as folder:
+        work = Progress("demo", _PARTS, long=True)
         story = run_story(partial(work.begin(_LEARNING).step, 2 * len(STORY)))
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():

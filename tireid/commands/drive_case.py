@@ -4,6 +4,7 @@ import argparse
 import math
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -13,7 +14,7 @@ from identifier.tire_model import TireModel
 from models.faults import SIZED, FaultError, SensorFault
 from models.rules import require_within
 from models.schema import require_few
-from models.vehicle import Vehicle, sedan
+from models.vehicle import Vehicle
 from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from tireid.commands.options import (
@@ -28,7 +29,6 @@ from tireid.driving.chosen import CHOSEN as DRIVING_CHOSEN
 from tireid.driving.learn import learning_drive
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.learning import identify
-from tireid.progress import Progress
 from tireid.verdicts import warn_of
 
 _PLAIN = 1.5  # a number without a unit up to here is a share of the grip
@@ -40,11 +40,10 @@ def _parse_speed(text: str) -> SpeedWish:
     text : 90% or 0.9 of the grip, 17m/s or 60km/h.
     """
     found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(%|m/s|km/h)?\s*", text, re.ASCII)
-    try:
-        value, unit = (float(found[1]), found[2]) if found else (math.nan, None)
-    except ValueError:
-        value, unit = math.nan, None
-    if not (math.isfinite(value) and value > 0.0):
+    value, unit = math.nan, None
+    with suppress(ValueError):
+        value, unit = (float(found[1]), found[2]) if found else (value, unit)
+    if not 0.0 < value < math.inf:
         raise ValueError(f"--speed wants a share of the grip or a speed (90%, 17m/s), not {text!r}")
     if unit is None and value > _PLAIN:
         raise ValueError(f"--speed {text} has no unit: write {text}%, {text}m/s or {text}km/h")
@@ -64,14 +63,12 @@ def _parse_drop(text: str) -> tuple[float, float]:
 
     text : such as 60:0.5.
     """
-    place, colon, friction = text.partition(":")
-    try:
-        s, mu = float(place), float(friction)
-    except ValueError:
-        s = mu = math.nan
-    if not colon or math.isnan(s) or math.isnan(mu):
+    s = mu = math.nan
+    with suppress(ValueError):
+        s, mu = map(float, text.split(":"))
+    if math.isnan(s) or math.isnan(mu):
         raise ValueError(f"--mu-drop wants S:MU, arc length [m] and friction, not {text!r}")
-    if not (math.isfinite(s) and s >= 0.0):
+    if not 0.0 <= s < math.inf:
         raise ValueError(f"--mu-drop: the place must not be negative, it is {s:g} m")
     require_within(ValueError, *DRIVING_CHOSEN.frictions, **{"friction of --mu-drop": mu})
     return s, mu
@@ -117,17 +114,20 @@ def conditions_of(options: argparse.Namespace) -> runs.Conditions:
         raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
     require_within(ValueError, *DRIVING_CHOSEN.frictions, **{"--mu": options.mu})
     require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
-    path = _named_path(options.path)
+    name = options.path
+    if name not in BUILT_IN and not FilePath(name).suffix:
+        raise ValueError(f"--path: there is no path {name!r}; {', '.join(BUILT_IN)}, or FILE.csv")
+    path = BUILT_IN[name]() if name in BUILT_IN else Path.from_csv(FilePath(name))
     if options.laps != 1.0 and not path.closed:
         raise ValueError(f"--laps is for a closed path, {path.name} is not")
     require_one(options, "weights", "method", "paper", "design")
-    setup = make_setup(
-        path,
-        vehicle=None if options.vehicle is None else read_vehicle(options),
-        mu=options.mu,
-        drops=[_parse_drop(text) for text in options.mu_drop],
-        wish=_parse_speed(options.speed),
-    )
+    vehicle, wish = read_vehicle(options), _parse_speed(options.speed)
+    vehicle.require_chassis()
+    drops = tuple(sorted(_parse_drop(text) for text in options.mu_drop))
+    for s, _ in drops:
+        if not path.closed and s >= path.length:
+            raise ValueError(f"--mu-drop {s:g} is beyond the path, which is {path.length:.0f} m")
+    setup = Setup(path=path, vehicle=vehicle, mu=options.mu, drops=drops, wish=wish)
     hours = options.laps * setup.time_at(setup.path.s[-2]) / 3600.0
     require_few(ValueError, f"--path {path.name}", hours, "hours", "hours of driving")
     return runs.Conditions(
@@ -140,36 +140,6 @@ def conditions_of(options: argparse.Namespace) -> runs.Conditions:
         caution=options.caution,
         kind=options.sensors,
     )
-
-
-def _named_path(name: str) -> Path:
-    if name in BUILT_IN:
-        return BUILT_IN[name]()
-    if not FilePath(name).suffix:
-        raise ValueError(f"--path: there is no path {name!r}; {', '.join(BUILT_IN)}, or FILE.csv")
-    return Path.from_csv(FilePath(name))
-
-
-def make_setup(
-    path: Path,
-    *,
-    vehicle: Vehicle | None,
-    mu: float,
-    drops: Sequence[tuple[float, float]],
-    wish: SpeedWish,
-) -> Setup:
-    """Return a car at the start of a path.
-
-    vehicle : the car; None takes the built-in sedan.   mu : friction before the first drop [-].
-    drops : arc length [m] and friction from there on.
-    """
-    ordered = tuple(sorted(drops))
-    for s, _ in ordered:
-        if not path.closed and s >= path.length:
-            raise ValueError(f"--mu-drop {s:g} is beyond the path, which is {path.length:.0f} m")
-    car = vehicle or sedan()
-    car.require_chassis()
-    return Setup(path=path, vehicle=car, mu=mu, drops=ordered, wish=wish)
 
 
 def frozen_tires(
@@ -185,16 +155,14 @@ def frozen_tires(
         _require_its_car(options, model.vehicle, setup)
         return f"frozen ones from {options.weights}", model
     law, method = chosen_method(options, setup.vehicle)
-    with Progress("the drive to learn on") as progress:
-        recording = learning_drive(
-            setup.car(open_field=True),
-            conditions.sensors,
-            np.random.default_rng([conditions.seed, 1]),
-            grip=setup.grip,
-            seed=conditions.seed,
-            lateral=conditions.lateral(),
-            progress=progress,
-        )
+    recording = learning_drive(
+        setup.car(open_field=True),
+        conditions.sensors,
+        np.random.default_rng([conditions.seed, 1]),
+        grip=setup.grip,
+        seed=conditions.seed,
+        lateral=conditions.lateral(),
+    )
     run = identify(recording, setup.vehicle, method, check=False)
     warn_of(run.verdict, f"the identification drive of {law}")
     assert recording.a_y is not None

@@ -96,10 +96,8 @@ def run(options: argparse.Namespace) -> int:
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     count = 1.0 + len(others)
     parts = {_LEARNING: 1.0 + count, _JUDGING: count, _DRAWING: 2.0 + 3.0 * count}
-    with (
-        output_folder(options.out, force=options.force) as folder,
-        Progress("identify", parts) as progress,
-    ):
+    with output_folder(options.out, force=options.force) as folder:
+        progress = Progress("identify", parts)
         runs: list[History] = []
         for k, one in enumerate((recording, *others)):
             if design.whole and runs:

@@ -242,10 +242,8 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--seeds must be at least 1, it is {options.seeds}")
     require_few(ValueError, "--seeds", options.seeds, "runs", "runs")
     parts = {_STUDY: float(options.seeds), _DRAWING: 10.0}
-    with (
-        output_folder(options.out, force=options.force) as folder,
-        Progress("paper", parts, long=True) as progress,
-    ):
+    with output_folder(options.out, force=options.force) as folder:
+        progress = Progress("paper", parts, long=True)
         study = paper_study.run_study(
             options.seeds, partial(progress.begin(_STUDY).step, paper_study.STEPS)
         )

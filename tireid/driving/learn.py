@@ -1,6 +1,5 @@
 """A drive to learn tires on, of a simulated car."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +25,6 @@ def learning_drive(
     grip: float,
     seed: int,
     lateral: LateralVelocity | None = None,
-    progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Drive a car without a path and return what its sensors saw; a car that spins or tips ends it.
 
@@ -46,6 +44,7 @@ def learning_drive(
     )
     t = car.period * np.arange(round(CHOSEN.duration / car.period), dtype=np.float64)
     steering = maneuver.steering(t)[:, 0] * np.minimum(CHOSEN.gentle + t / CHOSEN.grows, 1.0)
+    progress = Progress("the drive to learn on")
     state, samples, forces = car.start(CHOSEN.speed), [], []
     for k, angle in enumerate(steering):
         measured = sensors.measure(state, rng)
@@ -58,8 +57,7 @@ def learning_drive(
             kept = max(len(samples) - round(CHOSEN.forgotten / car.period), 10)
             samples, forces = samples[:kept], forces[:kept]
             break
-        if progress is not None:
-            progress((k + 1) / t.size)
+        progress((k + 1) / t.size)
     signals = dict(zip(Measured._fields, np.array(samples).T, strict=True))
     return Recording(
         name="learning drive",
@@ -88,6 +86,5 @@ def sample_recording(vehicle: Vehicle | None = None, *, seed: int = 0) -> Record
     car = DoubleTrackCar(sedan() if vehicle is None else vehicle, period=CHOSEN.period)
     grip = cornering_limit(car.vehicle, car.tire)
     rng = np.random.default_rng([seed, 1])
-    with Progress("the drive to learn on") as progress:
-        driven = learning_drive(car, inertial_unit(), rng, grip=grip, seed=seed, progress=progress)
+    driven = learning_drive(car, inertial_unit(), rng, grip=grip, seed=seed)
     return replace(driven, name=f"sample {seed}")

@@ -14,7 +14,6 @@ from identifier.methods import continuing
 from identifier.run import OnlineIdentifier
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
-from models.friction import Friction
 from models.rules import require_within
 from models.vehicle import Vehicle
 from mpc.handover.learner import Learner
@@ -49,7 +48,10 @@ class _Informer:
 
     def observe(self, measured: Measured, tracker: Any) -> str | None:
         """Change the tire where the friction has changed; return that it was done."""
-        mu = _friction_now(self._friction, measured)
+        mu = self._friction.scale
+        for change in self._friction.changes:  # steps
+            here = measured.t if change.at_time is not None else measured.X
+            mu = change.scale if here >= change.start else mu
         if mu == self._mu:
             return None
         self._mu = mu
@@ -76,24 +78,6 @@ class _BacksOff:
         self._noted = tracker.grip
         grip = f"plans with {tracker.grip:.2f} of the grip"
         return grip if said is None else f"{said}; {grip}"
-
-
-def _friction_now(friction: Friction, measured: Measured) -> float:
-    """Return the friction where the car is, of a road whose changes are steps [-]."""
-    mu = friction.scale
-    for change in friction.changes:
-        here = measured.t if change.at_time is not None else measured.X
-        if here >= change.start:
-            mu = change.scale
-    return mu
-
-
-def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> LateralVelocity:
-    """Return what estimates v_y where no sensor shows it, on the tires of a fit or while it learns
-    them.
-    """
-    method, start = InertialIdentifier.beginning_with(learnt, vehicle, dt=CHOSEN.period)
-    return LateralVelocity(OnlineIdentifier(method, vehicle, CHOSEN.period, start))
 
 
 def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
@@ -139,14 +123,17 @@ class Conditions:
     def sensors(self) -> CarSensors:
         """The sensors of the car, in order; those of one seed are the same unit."""
         if self.kind == IMU:
-            return imu_and_localization(
-                np.random.default_rng([self.seed, 3]) if self.noise else None
-            )
+            rng = np.random.default_rng([self.seed, 3]) if self.noise else None
+            return imu_and_localization(rng)
         return inertial_unit() if self.noise else CarSensors()
 
     def lateral(self, learnt: TireModel | None = None) -> LateralVelocity | None:
         """Return what estimates v_y on a drive, None where a sensor measures it."""
-        return None if self.kind == FULL else lateral_velocity(self.setup.vehicle, learnt)
+        if self.kind == FULL:
+            return None
+        car, period = self.setup.vehicle, CHOSEN.period
+        method, start = InertialIdentifier.beginning_with(learnt, car, dt=period)
+        return LateralVelocity(OnlineIdentifier(method, car, period, start))
 
     @property
     def driving_sensors(self) -> Measures:
@@ -229,26 +216,29 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         )
     except NoCompilerError as error:
         raise ValueError(str(error)) from None
-    learner = _learner(label, setup, learnt)
-    witness = Witness(learner, CHOSEN.period) if isinstance(learner, Learner) else None
-    beside: LearningTires | None = witness or learner
-    with Progress(f"driving on {label} tires") as progress:
-        driven = drive_tracker(
-            setup.path,
-            setup.car(),
-            tracker,
-            speed=setup.profile(),
-            sensors=conditions.driving_sensors,
-            delay=conditions.delay,
-            rng=np.random.default_rng([conditions.seed, 2]),
-            learner=_BacksOff(beside) if conditions.caution > 0.0 else beside,
-            lateral=conditions.lateral(learnt),
-            laps=conditions.laps,
-            widest=CHOSEN.widest,
-            plan_every=CHOSEN.plan_every,
-            name=f"{setup.path.name}, {label}",
-            progress=progress,
-        )
+    informed = label == ORACLE and setup.drops
+    learner: LearningTires | None = _Informer(setup) if informed else None
+    beside, witness = learner, None
+    if label == LEARNING:
+        assert learnt is not None
+        learner = make_learner(learnt, setup.vehicle)
+        beside = witness = Witness(learner, CHOSEN.period)
+    driven = drive_tracker(
+        setup.path,
+        setup.car(),
+        tracker,
+        speed=setup.profile(),
+        sensors=conditions.driving_sensors,
+        delay=conditions.delay,
+        rng=np.random.default_rng([conditions.seed, 2]),
+        learner=_BacksOff(beside) if conditions.caution > 0.0 else beside,
+        lateral=conditions.lateral(learnt),
+        laps=conditions.laps,
+        widest=CHOSEN.widest,
+        plan_every=CHOSEN.plan_every,
+        name=f"{setup.path.name}, {label}",
+        progress=Progress(f"driving on {label} tires"),
+    )
     return ClosedLoop(
         label=label,
         model=model,
@@ -259,15 +249,6 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         learner=learner,
         known=() if witness is None else tuple(witness.known),
     )
-
-
-def _learner(label: str, setup: Setup, learnt: TireModel | None) -> LearningTires | None:
-    if label == ORACLE and setup.drops:
-        return _Informer(setup)
-    if label == LEARNING:
-        assert learnt is not None
-        return make_learner(learnt, setup.vehicle)
-    return None
 
 
 def drive(
@@ -320,7 +301,6 @@ def drive(
         Where a number is not that of a drive, there is no tire to go on learning from, or no C
         compiler for the tracker.
     """
-    periods = delay_periods(delay)
     for name, value in (("share", share), ("laps", laps), ("speed", speed)):
         if value is not None and not value > 0.0:
             raise ValueError(f"{name} must be positive, it is {value:g}")
@@ -333,16 +313,11 @@ def drive(
     require_within(ValueError, *CHOSEN.frictions, friction=friction)
     require_within(ValueError, 0.0, 1.0, caution=caution)
     vehicle.require_chassis()
-    setup = Setup(
-        path=path,
-        vehicle=vehicle,
-        mu=friction,
-        drops=(),
-        wish=SpeedWish(share if speed is None else None, speed),
-    )
+    wish = SpeedWish(share if speed is None else None, speed)
+    setup = Setup(path=path, vehicle=vehicle, mu=friction, drops=(), wish=wish)
     conditions = Conditions(
         setup=setup,
-        delay=periods,
+        delay=delay_periods(delay),
         noise=noise,
         seed=seed,
         laps=laps,

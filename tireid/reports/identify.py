@@ -58,11 +58,7 @@ def write_identify_report(
         lead=[curve_drawing(figures, verdict)],
         warnings=[
             *verdicts.verdict_warnings(verdict),
-            *(
-                one
-                for name, other in asked.items()
-                for one in verdicts.verdict_warnings(other, f"{name}, replayed: ")
-            ),
+            *verdicts.verdicts_warnings(asked, "{}, replayed: "),
             *notes,
         ],
         sections=[
