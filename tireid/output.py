@@ -1,9 +1,9 @@
 """The folder that a command writes: complete or not there, and never over what is not ours.
 
-It is written in a scratch folder beside it and takes its place in one step. A marker inside lists
-every file with its size and hash: only a folder that holds these files, as they were written, and
-nothing else, at any depth, is ever replaced. The scratch folder of a run that was killed stays, and
-the next run says so.
+It is written in a scratch folder beside it and takes its place when it is whole. A marker inside
+lists every file with its size and hash: only a folder that holds these files, as they were written,
+and nothing else, at any depth, is ever replaced. The scratch folder of a run that was killed stays,
+and the next run says so.
 """
 
 import hashlib
@@ -24,7 +24,7 @@ from codegen.errors import TireidError
 from codegen.writing import naming, write_file
 from models.files import resolved
 from models.schema import read_json
-from tireid.exchange import ClaimedError, claim, exchange
+from tireid.claim import ClaimedError, claim
 from tireid.progress import say
 
 MARKER = ".tireid"  # in every folder that we write: what we put there
@@ -206,7 +206,16 @@ def _put_in_place(new: Path, target: Path, final: Path, *, force: bool, aside: P
         if _takes_name(new, final):
             return
         _require_replaceable(target, final, force)
-        _swap(new, target, final, aside=aside)
+        try:
+            final.rename(aside)
+            strange = foreign(aside)  # nobody finds it here, so that it stays as it is looked at
+            if strange is not None:
+                raise OutputError(f"{target} came to hold {strange} while this ran")
+            new.rename(final)
+        except BaseException:
+            if aside.exists():
+                aside.rename(final)
+            raise
     except OutputError as error:
         kept = _kept_elsewhere(new, final)
         raise OutputError(f"{error}; what this run computed is in {kept}") from None
@@ -225,28 +234,6 @@ def _takes_name(new: Path, final: Path) -> bool:
             return False
         raise
     return True
-
-
-def _swap(new: Path, target: Path, final: Path, *, aside: Path) -> None:
-    """Change the places of the new and the old folder, and look again at what the old one held."""
-    at_once = False
-    try:
-        at_once = exchange(new, final)
-        (new if at_once else final).rename(aside)
-        strange = foreign(aside)  # nobody finds it here, so that it stays as it is looked at
-        if strange is not None:
-            raise OutputError(f"{target} came to hold {strange} while this ran")
-        if not at_once:
-            new.rename(final)
-    except BaseException:
-        if at_once and aside.exists():
-            exchange(aside, final)
-            aside.rename(new)
-        elif at_once:
-            exchange(new, final)
-        elif aside.exists():
-            aside.rename(final)
-        raise
 
 
 def _kept_elsewhere(new: Path, final: Path) -> Path:

@@ -119,21 +119,14 @@ class Picture:
         object.__setattr__(self, "image", data)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Subheading:
-    """A heading inside a section."""
-
-    text: str
-
-
-Block = Paragraph | Table | Picture | Subheading
+Block = Paragraph | Table | Picture
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
     """A part of a report under one heading.
 
-    blocks : paragraphs, tables, pictures and smaller headings in order.
+    blocks : paragraphs, tables and pictures in order.
     folded : whether only the heading is seen until a reader opens it.
     """
 
@@ -174,8 +167,7 @@ def report_html(report: Report) -> str:
             return _table(block, next(tables))
         if isinstance(block, Picture):
             return _picture(block, next(figures))
-        tag = "h3" if isinstance(block, Subheading) else "p"
-        return f"<{tag}>{_inline(block.text)}</{tag}>"
+        return f"<p>{_inline(block.text)}</p>"
 
     lead = [written(block) for block in report.lead]
     entries, parts = [], []

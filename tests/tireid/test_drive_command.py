@@ -215,7 +215,7 @@ def test_without_a_compiler_it_says_so_before_it_learns(bend, tmp_path, capsys, 
         raise AssertionError("it has begun to learn")
 
     monkeypatch.setattr(drive_runs, "find_compiler", lambda: None)
-    monkeypatch.setattr("tireid.commands.drive_case.learning_drive", learns)
+    monkeypatch.setattr("tireid.commands.drive.learning_drive", learns)
     words = ["drive", "--path", bend, "--out", tmp_path / "out"]
     assert "no C compiler found: the tracker cannot be built" in refusal(capsys, words)
     assert list(tmp_path.iterdir()) == []

@@ -8,7 +8,7 @@ import pytest
 
 from models.faults import SensorFault
 from tireid.cli import build_parser
-from tireid.commands.drive_case import _parse_drop, _parse_speed, conditions_of, parse_fault
+from tireid.commands.drive import _parse_drop, _parse_speed, conditions_of, parse_fault
 from tireid.driving.runs import _BacksOff
 from tireid.driving.setup import SpeedWish
 

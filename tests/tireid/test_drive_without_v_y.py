@@ -10,7 +10,7 @@ from tests.pages import faults_of, outline
 from tests.tireid.conftest import refusal
 from tests.tireid.test_drive_command import bend, summary_of  # noqa: F401
 from tireid.cli import main
-from tireid.commands.drive_case import parse_fault
+from tireid.commands.drive import parse_fault
 from tireid.driving import learn as drive_learn
 
 TOLD = ("v_y_estimated_m_s", "v_y_estimated_sd_m_s", "side_slip_observable", "a_y_level_m_s2")

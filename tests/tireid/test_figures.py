@@ -26,7 +26,6 @@ from tireid.figures.forces import (
     force_figure,
     inputs_figure,
     prediction_figure,
-    side_by_side_figure,
 )
 from tireid.figures.paper import comparison_figure, error_figure, weights_figure
 from tireid.figures.style import (
@@ -336,23 +335,6 @@ def test_a_comparison_draws_medians_with_quartiles_on_their_own_sides() -> None:
     assert list(line.get_ydata()) == [0.5, 0.4]
     spans = [tuple(segment[:, 1]) for segment in whiskers.get_segments()]
     assert spans == [pytest.approx((0.2, 1.1)), pytest.approx((0.1, 0.6))]
-
-
-@pytest.mark.parametrize("scale", [5000.0, 5.0])
-def test_models_side_by_side_are_drawn_in_the_unit_of_the_axis_with_what_they_miss(scale) -> None:
-    history = made_up(scale)
-    truth = history.recording.axle_force
-    assert truth is not None
-    near = replace(replayed(history), axle_force=0.9 * truth)
-    figure = side_by_side_figure({"near": near})
-    newtons = 1000.0 if scale > 100.0 else 1.0
-    assert f"[{'kN' if newtons > 1.0 else 'N'}]" in figure.axes[0].get_ylabel()
-    for axle in (0, 1):
-        upper, lower = figure.axes[axle], figure.axes[2 + axle]
-        drawn = {line.get_label(): np.asarray(line.get_ydata()) for line in upper.get_lines()}
-        assert drawn["near"] == pytest.approx(0.9 * truth[:, axle] / newtons)
-        _, missed = lower.get_lines()
-        assert np.asarray(missed.get_ydata()) == pytest.approx(-0.1 * truth[:, axle] / newtons)
 
 
 @pytest.mark.parametrize("truth", [True, False])

@@ -10,18 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from tireid import exchange as exchange_module
-from tireid import output as output_module
-from tireid.exchange import ClaimedError, claim, exchange
+from tireid import claim as claim_module
+from tireid.claim import ClaimedError, claim
 from tireid.output import MARKER, OutputError, foreign, output_folder
-
-
-@pytest.fixture(params=["at once", "in two steps"])
-def swaps(request, monkeypatch):
-    """Both ways to replace a folder, the second where the system cannot exchange names."""
-    if request.param == "in two steps":
-        monkeypatch.setattr(output_module, "exchange", lambda *_: False)
-    return request.param
 
 
 def write(target, text="new", *, force=False):
@@ -53,7 +44,7 @@ def test_a_folder_appears_with_all_that_was_written(tmp_path):
     assert marker["files"]["result.txt"][0] == len("new")
 
 
-def test_an_empty_folder_is_filled_and_our_own_replaced_when_asked(tmp_path, swaps):
+def test_an_empty_folder_is_filled_and_our_own_replaced_when_asked(tmp_path):
     out = tmp_path / "out"
     out.mkdir()
     write(out, "first")
@@ -144,7 +135,6 @@ def fail_to_rename(monkeypatch, *, onto):
             raise OSError("disk trouble")
         return rename(self, target)
 
-    monkeypatch.setattr(output_module, "exchange", lambda *_: False)
     monkeypatch.setattr(Path, "rename", failing)
     return failures
 
@@ -169,7 +159,6 @@ def test_an_old_folder_that_cannot_be_put_back_is_kept_aside(tmp_path, monkeypat
             raise OSError("disk trouble")
         return rename(self, target)
 
-    monkeypatch.setattr(output_module, "exchange", lambda *_: False)
     monkeypatch.setattr(Path, "rename", failing)
     with pytest.raises(OSError, match="disk trouble"):
         write(tmp_path / "out", "new", force=True)
@@ -202,19 +191,16 @@ each_change = pytest.mark.parametrize("spoil", CHANGES.values(), ids=CHANGES)
 
 
 @each_change
-def test_what_a_user_does_at_the_last_moment_survives_force(tmp_path, monkeypatch, swaps, spoil):
-    out = tmp_path / "out"
+def test_what_a_user_does_at_the_last_moment_survives_force(tmp_path, monkeypatch, spoil):
+    out, rename = tmp_path / "out", Path.rename
     write_deep(out)
 
-    calls = []
-
-    def late(one, other):
-        calls.append(one)
-        if len(calls) == 1:
+    def late(self, target):
+        if self == out:
             spoil(out)
-        return swaps == "at once" and exchange(one, other)
+        return rename(self, target)
 
-    monkeypatch.setattr(output_module, "exchange", late)
+    monkeypatch.setattr(Path, "rename", late)
     with pytest.raises(OutputError, match=r"came to hold .*; what this run computed is in .*out-2"):
         write(out, force=True)
     assert foreign(out) is not None
@@ -240,9 +226,7 @@ def test_what_appears_while_a_run_works_is_left_alone(tmp_path, theirs):
     assert content(tmp_path / "out-2") == {"result.txt": "hours of work"}
 
 
-def test_an_interruption_at_any_moment_of_the_exchange_leaves_one_folder_whole(
-    tmp_path, monkeypatch, swaps
-):
+def test_an_interruption_at_any_moment_leaves_one_folder_whole(tmp_path, monkeypatch):
     out = tmp_path / "out"
     write(out, "old")
     rename = Path.rename
@@ -262,7 +246,7 @@ def test_an_interruption_at_any_moment_of_the_exchange_leaves_one_folder_whole(
             assert content(tmp_path) == {"out/result.txt": "old"}
         else:
             break
-    assert moment == (3 if swaps == "at once" else 4)  # each rename was interrupted once
+    assert moment == 4  # each rename was interrupted once
     assert content(tmp_path) == {"out/result.txt": "new"}
 
 
@@ -278,7 +262,7 @@ def test_a_claim_without_locks_is_the_file_itself(tmp_path, monkeypatch):
     def unable(*_):
         raise OSError(errno.ENOLCK, "no locks here")
 
-    monkeypatch.setattr(exchange_module.fcntl, "flock", unable)
+    monkeypatch.setattr(claim_module.fcntl, "flock", unable)
     with claim(tmp_path / "claim"), pytest.raises(ClaimedError), claim(tmp_path / "claim"):
         pytest.fail("two hold it")
     assert list(tmp_path.iterdir()) == []
@@ -329,30 +313,25 @@ FORKED = """
 
 @pytest.mark.sweep("True")
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
-@pytest.mark.parametrize("at_once", [True, False])
-def test_a_run_that_is_killed_leaves_the_old_folder_or_the_new_one(tmp_path, at_once):
-    program = f"""
-    from tireid import output
+def test_a_run_that_is_killed_leaves_the_old_folder_or_the_new_one(tmp_path):
+    program = """
     from tireid.output import foreign
-    if not {at_once}:
-        output.exchange = lambda *_: False
     random.seed(1)
     write("start", force=False)
     start = time.perf_counter()
     write("begin", force=True)
     lasts = time.perf_counter() - start
-    seen, lost = {{"begin"}}, 0
+    seen = {"begin"}
     for i in range(60):
-        child = forked(lambda: write(f"run {{i}}", force=True))
+        child = forked(lambda: write(f"run {i}", force=True))
         time.sleep(random.uniform(0.0, (0.5 + i / 15) * lasts))  # on a busy machine, later
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         folder = out
         if not out.exists():  # between the two renames
             (folder,) = [p / "old" for p in Path().glob(".out-*.part") if (p / "old").exists()]
-            lost += 1
         assert foreign(folder) is None
-        texts = {{path.read_text() for path in folder.rglob("*.txt")}}
+        texts = {path.read_text() for path in folder.rglob("*.txt")}
         assert len(texts) == 1 and len(list(folder.rglob("*.txt"))) == 30
         seen |= texts
         if folder is not out:
@@ -363,9 +342,8 @@ def test_a_run_that_is_killed_leaves_the_old_folder_or_the_new_one(tmp_path, at_
             import shutil
             shutil.rmtree(path)
     assert len(seen) > 3, "no kill came after the rename"
-    print("lost" if lost and {at_once} else "kept")
     """
-    assert ran(textwrap.dedent(FORKED) + textwrap.dedent(program), tmp_path) == ["kept"]
+    assert ran(textwrap.dedent(FORKED) + textwrap.dedent(program), tmp_path) == []
 
 
 def test_what_cannot_be_written_is_named_by_every_writer(tmp_path):

@@ -168,23 +168,6 @@ def prediction_figure(replay: Replay | Prediction, online: History | None = None
 
 
 @style.styled
-def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
-    """Draw forces of frozen models over one drive with true forces, and what each misses."""
-    recording = next(iter(replays.values())).recording
-    truth = recording.axle_force
-    assert truth is not None
-    colors = (style.ORANGE, *style.SERIES)
-    curves = [
-        (replay.axle_force, {"color": color, "linewidth": 1.1, "label": label})
-        for (label, replay), color in zip(replays.items(), colors, strict=False)
-    ]
-    row = [("", [(truth, style.TRUTH), *curves])]
-    figure, _, _ = _force_panels(recording, row, truth, curves)
-    style.legend_above(figure)
-    return figure
-
-
-@style.styled
 def inputs_figure(recording: Recording) -> Figure:
     """Draw the signals of a recording; rear steering and a_y only where there are any."""
     require_kind(Recording, "as of read_recording, or run.recording", recording=recording)

@@ -17,7 +17,7 @@ from models.bicycle import measured_slip
 from models.recordings import Recording
 from tireid.figures import style
 from tireid.figures.chosen import CHOSEN
-from tireid.figures.drive import AT_THE_END, ORACLE, tire_look
+from tireid.figures.drive import tire_look
 from tireid.figures.thinned import cloud, shown_of_run
 
 if TYPE_CHECKING:
@@ -133,10 +133,7 @@ _REACH = 1.25  # curves go on this far beyond the slip of the drive
 
 @style.styled
 def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
-    """Draw the forces of a drive as a cloud, and the curves that trackers believed.
-
-    Below stands what each curve misses of the true one, where the true one is known.
-    """
+    """Draw the forces of a drive as a cloud, and the curves that trackers believed."""
     unit = style.force_unit_of(drive.axle_force)
     alpha, force = np.rad2deg(axle_slip(drive)), drive.axle_force / unit.newtons
     reach = _REACH * float(np.abs(alpha).max())
@@ -144,9 +141,8 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
     within = [c.force[part] / unit.newtons for c, part in zip(curves, shown, strict=True)]
     steep = [f for c, f in zip(curves, within, strict=True) if not c.label.startswith("linear")]
     low, high = style.force_range(force, *steep)
-    missed = _missed_of_truth(curves, reach, unit.newtons)
     cloud = {**_CLOUD, "markersize": 3.0, "alpha": 0.6, "label": "this drive, true forces"}
-    figure, panels = style.axle_panels([3.3, 1.3] if missed else [3.3], sharex="col")
+    figure, panels = style.axle_panels([3.3])
     for axle, axes in enumerate(panels[0]):
         axes.plot(alpha[:, axle], force[:, axle], color=style.SKY, **cloud)
         for curve, part, values in zip(curves, shown, within, strict=True):
@@ -154,32 +150,10 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
             look = {**tire_look(curve.label), "label": curve.label}
             axes.plot(np.rad2deg(curve.alpha[part]), drawn, **look)
         axes.set(xlim=(-reach, reach), ylim=(low, high))
-        for label, slip, residual in missed:
-            panels[1, axle].plot(slip, residual[:, axle], **tire_look(label))
-        _label_slip(panels[-1, axle], axle)
-    if missed:
-        near = [one for label, _, one in missed if not label.startswith("linear")]
-        panels[1, 0].set_ylim(style.force_range(np.zeros(1), *near))
-    style.label_forces(panels, unit, residual=bool(missed))
+        _label_slip(axes, axle)
+    style.label_forces(panels, unit, residual=False)
     style.legend_above(figure, columns=1 + len(curves) if len(curves) < 5 else 3)
     return figure
-
-
-def _missed_of_truth(
-    curves: Sequence[TireCurve], reach: float, newtons: float
-) -> list[tuple[str, Array, Array]]:
-    """Return by label slip [deg] and what a curve misses of the true one of the same road."""
-    true = {curve.label: curve for curve in curves if curve.label.startswith(ORACLE)}
-    found = []
-    for curve in curves:
-        at_the_end = curve.label.endswith(AT_THE_END) and ORACLE + AT_THE_END in true
-        truth = true.get(ORACLE + AT_THE_END * at_the_end)
-        if truth is None or truth is curve or not np.array_equal(truth.alpha, curve.alpha):
-            continue
-        slip = np.rad2deg(curve.alpha)
-        part = np.abs(slip) <= reach
-        found.append((curve.label, slip[part], (curve.force - truth.force)[part] / newtons))
-    return [one for one in found if not one[0].startswith(ORACLE)]
 
 
 @style.styled

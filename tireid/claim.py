@@ -1,13 +1,10 @@
-"""Two names that change places at once, where the system can; and a claim that only one holds."""
+"""A claim on a folder that only one process holds."""
 
-import ctypes
 import errno
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 from codegen.errors import TireidError
 
@@ -16,8 +13,6 @@ try:
 except ImportError:  # not on Windows
     fcntl = None  # type: ignore[assignment]
 
-_AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # <fcntl.h> and <linux/fs.h>
-_CANNOT = {errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.ENOTSUP}  # here, or on this disk
 _UNLOCKABLE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL}
 
 
@@ -29,32 +24,6 @@ class ClaimedError(TireidError, OSError):
             f"another run of tireid {doing}: wait for it, or choose another folder "
             f"(where there is none, delete {self})"
         )
-
-
-@cache
-def _renameat2() -> Any:
-    """Return the function of the C library; None where it has none, as on other than Linux."""
-    try:
-        function = ctypes.CDLL(None, use_errno=True).renameat2
-    except (OSError, AttributeError, TypeError):
-        return None
-    kinds = (ctypes.c_int, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_uint)
-    function.argtypes = list(kinds)
-    return function
-
-
-def exchange(one: Path, other: Path) -> bool:
-    """Let two folders change places in one step; return whether the system could."""
-    function = _renameat2()
-    if function is None:
-        return False
-    names = os.fsencode(one), os.fsencode(other)
-    if function(_AT_FDCWD, names[0], _AT_FDCWD, names[1], _RENAME_EXCHANGE) == 0:
-        return True
-    number = ctypes.get_errno()
-    if number in _CANNOT:
-        return False
-    raise OSError(number, os.strerror(number), str(other))
 
 
 @contextmanager
