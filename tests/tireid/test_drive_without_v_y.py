@@ -22,8 +22,8 @@ def result(bend, tmp_path_factory):  # noqa: F811
     out = tmp_path_factory.mktemp("imu") / "out"
     words = ["drive", "--sensors", "imu", "--path", str(bend), "--tires", "learning", "linear"]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drive_learn, "CHOSEN", drive_learn.CHOSEN._replace(duration=20.0))
-        patch.setattr(drive_learn, "CHOSEN", drive_learn.CHOSEN._replace(grows=15.0))
+        patch.setattr(drive_learn, "DURATION", 20.0)
+        patch.setattr(drive_learn, "_GROWS", 15.0)
         assert main([*words, "--film", "none", "--out", str(out)]) == 0
     return out
 

@@ -311,7 +311,6 @@ FORKED = """
 """
 
 
-@pytest.mark.sweep("True")
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_a_run_that_is_killed_leaves_the_old_folder_or_the_new_one(tmp_path):
     program = """

@@ -21,8 +21,7 @@ from mpc.path import BUILT_IN, Path
 from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.driving import runs as driving
-from tireid.driving.chosen import CHOSEN as DRIVING_CHOSEN
-from tireid.driving.learn import learning_drive
+from tireid.driving.learn import DURATION, learning_drive
 from tireid.driving.results import NO_FILM, Drives, headline, write_drive_report
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.figures.film import FORMATS
@@ -34,7 +33,7 @@ from tireid.verdicts import warn_of
 _NOT_COMPLETED = 1
 _EPILOG = (
     "Without --weights, frozen tires are identified first: the same car drives on "
-    f"an open field for {DRIVING_CHOSEN.duration:g} s, steered at random and ever harder until it "
+    f"an open field for {DURATION:g} s, steered at random and ever harder until it "
     "slides, and the tires at the end are used. linear is the tire of the vehicle file, oracle the "
     "true tire of the plant, learning begins with the frozen tires and updates them while driving. "
     "Exit code 0 where the first of the cars reached the end of the path, else 1."
@@ -179,7 +178,7 @@ def _parse_drop(text: str) -> tuple[float, float]:
         raise ValueError(f"--mu-drop wants S:MU, arc length [m] and friction, not {text!r}")
     if not 0.0 <= s < math.inf:
         raise ValueError(f"--mu-drop: the place must not be negative, it is {s:g} m")
-    require_within(ValueError, *DRIVING_CHOSEN.frictions, **{"friction of --mu-drop": mu})
+    require_within(ValueError, *driving.FRICTIONS, **{"friction of --mu-drop": mu})
     return s, mu
 
 
@@ -225,7 +224,7 @@ def labels_of(words: Sequence[str]) -> list[str]:
 def conditions_of(options: argparse.Namespace) -> driving.Conditions:
     if not 0.0 < options.laps <= 100.0:
         raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
-    require_within(ValueError, *DRIVING_CHOSEN.frictions, **{"--mu": options.mu})
+    require_within(ValueError, *driving.FRICTIONS, **{"--mu": options.mu})
     require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
     name = options.path
     if name not in BUILT_IN and not FilePath(name).suffix:

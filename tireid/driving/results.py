@@ -18,7 +18,6 @@ from mpc.loop.record import Drive, estimate_scores
 from mpc.tires import CurveFitError, prediction_tire
 from mpc.tires.tire import curves_at
 from tireid import __version__
-from tireid.driving.chosen import CHOSEN
 from tireid.driving.runs import (
     FROZEN,
     FULL,
@@ -30,7 +29,7 @@ from tireid.driving.runs import (
     Conditions,
     run_drive,
 )
-from tireid.driving.setup import PLANT, Setup
+from tireid.driving.setup import PERIOD, PLANT, WIDEST, Setup
 from tireid.figures.drive import (
     AT_THE_END,
     drive_errors_figure,
@@ -64,7 +63,7 @@ def headline(conditions: Conditions) -> str:
     noise += "".join(f", {fault}" for fault in conditions.faults)
     return (
         f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
-        f"{PLANT} {setup.vehicle.name}, {1e3 * CHOSEN.period * conditions.delay:g} ms delay, "
+        f"{PLANT} {setup.vehicle.name}, {1e3 * PERIOD * conditions.delay:g} ms delay, "
         f"{noise}, seed {conditions.seed}"
     )
 
@@ -113,8 +112,8 @@ class Drives(NamedTuple):
             "plant": PLANT,
             "vehicle": vehicle_numbers(setup.vehicle),
             "chassis": {**asdict(chassis), "tire": tire},
-            "delay_ms": 1e3 * CHOSEN.period * conditions.delay,
-            "period_ms": 1e3 * CHOSEN.period,
+            "delay_ms": 1e3 * PERIOD * conditions.delay,
+            "period_ms": 1e3 * PERIOD,
             "noise": conditions.noise,
             **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
             **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
@@ -142,7 +141,7 @@ class Drives(NamedTuple):
         limits = first.problem.limits
         figures = {
             "path": drive_path_figure(drives),
-            "errors": drive_errors_figure(drives, off_path=CHOSEN.widest, **on_the_way),
+            "errors": drive_errors_figure(drives, off_path=WIDEST, **on_the_way),
             "steering": drive_steering_figure(
                 drives, angle_limit=limits.steering, rate_limit=limits.steering_rate, **on_the_way
             ),
@@ -311,7 +310,7 @@ def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
         if scores.failures:
             counted = ", ".join(f"{n} {name}" for name, n in scores.failures.items())
             said.append(f"{run.label}: steps of the tracker failed: {counted}.")
-        if scores.solve_ms["p99"] > 1e3 * CHOSEN.period:
+        if scores.solve_ms["p99"] > 1e3 * PERIOD:
             said.append(f"{run.label}: one step in a hundred takes longer than the period.")
         for t, text in run.drive.notes:
             if text.startswith(Verdict.FAULT.value) or "dead reckoning" in text:

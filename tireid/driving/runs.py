@@ -34,10 +34,14 @@ from mpc.path import Path
 from mpc.problem import Problem
 from mpc.realtime import NoCompilerError, Tracker
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.driving.chosen import CHOSEN
 from tireid.driving.known import Known, Witness
-from tireid.driving.setup import Setup, SpeedWish
+from tireid.driving.setup import PERIOD, WIDEST, Setup, SpeedWish
 from tireid.progress import Progress
+
+_NOTED = 0.1  # change of the grip that is worth a note
+_PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
+# least and most friction of a road over that of the measured tire [-]
+FRICTIONS = (0.05, 1.5)
 
 
 class _Informer:
@@ -73,7 +77,7 @@ class _BacksOff:
     def observe(self, measured: Measured, tracker: Any) -> str | None:
         """Ask what learns; return what it said, and the grip where that changed."""
         said = None if self._beside is None else self._beside.observe(measured, tracker)
-        if abs(tracker.grip - self._noted) < CHOSEN.noted:
+        if abs(tracker.grip - self._noted) < _NOTED:
             return said
         self._noted = tracker.grip
         grip = f"plans with {tracker.grip:.2f} of the grip"
@@ -87,12 +91,12 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     """
     learnt = begun(learnt)
     try:
-        method = continuing(learnt, vehicle, CHOSEN.period)
+        method = continuing(learnt, vehicle, PERIOD)
     except ValueError as error:
         raise ValueError(f"--tires learning: {error}") from None
     if learnt.kind == AxleModel.kind:
-        method = AxleIdentifier.for_vehicle(vehicle, dt=CHOSEN.period)
-    identifier = OnlineIdentifier(method, vehicle, CHOSEN.period, learnt)
+        method = AxleIdentifier.for_vehicle(vehicle, dt=PERIOD)
+    identifier = OnlineIdentifier(method, vehicle, PERIOD, learnt)
     return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)))
 
 
@@ -131,7 +135,7 @@ class Conditions:
         """Return what estimates v_y on a drive, None where a sensor measures it."""
         if self.kind == FULL:
             return None
-        car, period = self.setup.vehicle, CHOSEN.period
+        car, period = self.setup.vehicle, PERIOD
         method, start = InertialIdentifier.beginning_with(learnt, car, dt=period)
         return LateralVelocity(OnlineIdentifier(method, car, period, start))
 
@@ -182,11 +186,10 @@ def delay_periods(delay: float, name: str = "delay") -> int:
 
     delay : a multiple of the period [s].   name : of the argument, in an error.
     """
-    periods = delay / CHOSEN.period
+    periods = delay / PERIOD
     if not (0.0 <= delay <= 0.1 and abs(periods - round(periods)) < 1e-9):
         raise ValueError(
-            f"{name} must be 0 to 100 ms in steps of {1e3 * CHOSEN.period:g} ms, it is "
-            f"{1e3 * delay:g}"
+            f"{name} must be 0 to 100 ms in steps of {1e3 * PERIOD:g} ms, it is {1e3 * delay:g}"
         )
     return round(periods)
 
@@ -210,8 +213,8 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         tracker = Tracker(
             model,
             problem,
-            period=CHOSEN.period,
-            delay=conditions.delay * CHOSEN.period + lag,
+            period=PERIOD,
+            delay=conditions.delay * PERIOD + lag,
             caution=conditions.caution,
         )
     except NoCompilerError as error:
@@ -222,7 +225,7 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
     if label == LEARNING:
         assert learnt is not None
         learner = make_learner(learnt, setup.vehicle)
-        beside = witness = Witness(learner, CHOSEN.period)
+        beside = witness = Witness(learner, PERIOD)
     driven = drive_tracker(
         setup.path,
         setup.car(),
@@ -234,8 +237,8 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         learner=_BacksOff(beside) if conditions.caution > 0.0 else beside,
         lateral=conditions.lateral(learnt),
         laps=conditions.laps,
-        widest=CHOSEN.widest,
-        plan_every=CHOSEN.plan_every,
+        widest=WIDEST,
+        plan_every=_PLAN_EVERY,
         name=f"{setup.path.name}, {label}",
         progress=Progress(f"driving on {label} tires"),
     )
@@ -310,7 +313,7 @@ def drive(
         raise ValueError(f"laps are of a closed path, {path.name} is not")
     if learning and tire is None:
         raise ValueError("learning goes on from a tire: none is given")
-    require_within(ValueError, *CHOSEN.frictions, friction=friction)
+    require_within(ValueError, *FRICTIONS, friction=friction)
     require_within(ValueError, 0.0, 1.0, caution=caution)
     vehicle.require_chassis()
     wish = SpeedWish(share if speed is None else None, speed)

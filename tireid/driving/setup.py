@@ -18,7 +18,12 @@ from mpc.cars import DoubleTrackCar
 from mpc.loop.sensing import SpeedProfile, cornering_limit
 from mpc.path import Path, grip_speed, steady_speed
 from mpc.tires import PredictionTire, oracle_tire
-from tireid.driving.chosen import CHOSEN
+
+WIDEST = 2.0  # deviation at which a car is off the path [m]
+FASTEST = 30.0  # on a closed course [m/s]
+ACCELERATION = 2.0  # on a closed course at friction 1 [m/s²]
+BRAKING = 3.0  # on a closed course at friction 1 [m/s²]
+PERIOD = 0.01  # control period [s]
 
 PLANT = "double-track"
 
@@ -49,7 +54,7 @@ class Setup:
     def car(self, *, open_field: bool = False) -> DoubleTrackCar:
         """Return a car on the road, or on a field that has the friction of the start everywhere."""
         friction = Friction(scale=self.mu) if open_field else self.friction()
-        return DoubleTrackCar(self.vehicle, friction=friction, period=CHOSEN.period)
+        return DoubleTrackCar(self.vehicle, friction=friction, period=PERIOD)
 
     def oracle(self, mu: float | None = None) -> PredictionTire:
         """Return the true tire on a road.
@@ -81,9 +86,9 @@ class Setup:
         return grip_speed(
             self.path,
             a_y_max=a_y,
-            v_max=CHOSEN.fastest,
-            a_accel=self.mu * CHOSEN.acceleration,
-            a_brake=self.mu * CHOSEN.braking,
+            v_max=FASTEST,
+            a_accel=self.mu * ACCELERATION,
+            a_brake=self.mu * BRAKING,
         )
 
     def profile(self) -> SpeedProfile:

@@ -11,7 +11,9 @@ from codegen.escape import mathtext
 from identifier.compare.course import same_and_other
 from identifier.compare.study import Comparison, ranking
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
+
+_FARTHEST = 300.0  # [%], what is worse is drawn at the end of the axis
+_ROW = 0.3  # height of a method [in]
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:
@@ -40,11 +42,11 @@ def methods_figure(comparison: Comparison) -> Figure:
     """Draw a row for each method: means over recordings, lines from the best to the worst."""
     rows = {method_label(name): _method_errors(comparison, name) for name in ranking(comparison)}
     lost = {method_label(n) for n, trial in comparison.trials.items() if trial.diverged_at}
-    figure = style.new_figure(CHOSEN.page, 0.9 + CHOSEN.row * len(rows))
+    figure = style.new_figure(0.9 + _ROW * len(rows))
     axes = figure.subplots()
     every = [v for row in rows.values() for vs in row.values() for v in vs]
     finite = [value for value in every if np.isfinite(value)]
-    low, high = min(finite, default=1.0), min(max(finite, default=100.0), CHOSEN.compare_farthest)
+    low, high = min(finite, default=1.0), min(max(finite, default=100.0), _FARTHEST)
     axes.set(xscale="log", xlim=(low / 1.2, high * 1.2))
     style.few_ticks(axes.xaxis)
     for position, (label, errors) in enumerate(rows.items()):
@@ -76,8 +78,8 @@ def _draw_row(axes: Axes, position: int, errors: Mapping[str, list[float]]) -> N
         if not values:
             continue
         color, marker, shift = _KINDS[kind]
-        shown = np.minimum(values, CHOSEN.compare_farthest * 1.1)
+        shown = np.minimum(values, _FARTHEST * 1.1)
         y = position + shift
         axes.plot([shown.min(), shown.max()], [y, y], color=color, linewidth=1.0, alpha=0.6)
-        mean = min(float(np.mean(values)), CHOSEN.compare_farthest * 1.1)
+        mean = min(float(np.mean(values)), _FARTHEST * 1.1)
         axes.plot(mean, y, marker, color=color, ms=4.5, clip_on=False, label=kind)

@@ -12,18 +12,37 @@ from codegen.arrays import Array
 from models.faults import SensorFault
 from models.vehicle import Vehicle
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
 
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
     from mpc.path import Path
+
+# dashes of tires as they are at the end of a drive [points]
+_LATER = (0, (2.5, 0.9))
+_NEAR = 0.75  # a limit is drawn where a command comes this close to it
+_FRONT_OVERHANG = 0.32  # of the wheelbase, beyond the front axle
+_REAR_OVERHANG = 0.36  # of the wheelbase, beyond the rear axle
+_TRACK = 0.57  # of the wheelbase, where no chassis says
+_BODY_BESIDE_TRACK = 0.1  # of the wheelbase: how much wider than the track the body is
+_WHEEL_LENGTH = 0.24  # of the wheelbase
+_WHEEL_WIDTH = 0.085  # of the wheelbase
+_CORNERS = 33  # points of the body
+_ROUNDING = 0.3  # of its corners: exponent of a circle that becomes a rectangle
+# a long and narrow path goes on in the next row after about this many meters
+_ROW_LENGTH = 80.0
+_MOST_ROWS = 5  # of a path
+_NARROW = 4.0  # from this ratio between its extents on a path is long and narrow
+_MARGIN = 3.0  # around the path [m]
+_RUN_UP = 16.0  # of the straights before and after the cones that is shown [m]
+_HIGHEST = 5.0  # panel [in]
+_CARS_EVERY = 2.6  # wheelbases between two outlines
 
 
 @style.styled
 def drive_solve_figure(drive: "Drive") -> Figure:
     """Draw the solve times of a drive, their median and the time that one of a hundred exceeds."""
     times = 1e3 * drive.solve_time  # ms
-    figure = style.new_figure(CHOSEN.page, 2.5)
+    figure = style.new_figure(2.5)
     axes = figure.subplots()
     axes.plot(
         drive.t, times, ".", ms=2.2, mew=0.0, color=style.BLUE, rasterized=True, label="a step"
@@ -72,9 +91,7 @@ _TIRES: Mapping[str, Mapping[str, Any]] = {
 def tire_look(label: str) -> dict[str, Any]:
     """Return color, line style and width of a tire in every figure."""
     look = dict(_TIRES.get(label.split()[0], _TIRES["frozen"]))
-    return (
-        look | {"linestyle": CHOSEN.later, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
-    )
+    return look | {"linestyle": _LATER, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
 
 
 _REPLANNED, _NOTICED = "plans with another tire or grip", "sensor fault noticed"
@@ -94,7 +111,7 @@ def drive_errors_figure(
     off_path : deviation [m] at which a car counts as off the path, drawn where it comes near.
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = style.new_figure(CHOSEN.page, 5.2)
+    figure = style.new_figure(5.2)
     panels = figure.subplots(4, 1, sharex=True)
     labels = ("deviation $e_y$\n[m]", "heading error\n[deg]", "lateral acc.\n[m/s²]")
     for label, drive in reversed(list(drives.items())):
@@ -183,7 +200,7 @@ def drive_steering_figure(
     angle_limit : that the tracker keeps [rad].   rate_limit : that the tracker keeps [rad/s].
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = style.new_figure(CHOSEN.page, 3.4)
+    figure = style.new_figure(3.4)
     angle, rate = figure.subplots(2, 1, sharex=True)
     for label, drive in reversed(list(drives.items())):
         look = tire_look(label)
@@ -199,7 +216,7 @@ def drive_steering_figure(
     ):
         axes.set_ylabel(label)
         most = float(np.rad2deg(limit))
-        if max(np.abs(axes.get_ylim())) > CHOSEN.near * most:
+        if max(np.abs(axes.get_ylim())) > _NEAR * most:
             for side in (-most, most):
                 look = {"color": "#AA4499", "linewidth": 0.8, "linestyle": (0, (4, 2))}
                 axes.axhline(side, label="limit", **look)
@@ -232,21 +249,19 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
     """
     long = vehicle.wheelbase
     chassis = vehicle.chassis
-    tracks = (
-        (CHOSEN.track * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
-    )
-    half = 0.5 * (max(tracks) + CHOSEN.body_beside_track * long)
+    tracks = (_TRACK * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
+    half = 0.5 * (max(tracks) + _BODY_BESIDE_TRACK * long)
     front, rear = (
-        vehicle.l_f + CHOSEN.front_overhang * long,
-        -vehicle.l_r - CHOSEN.rear_overhang * long,
+        vehicle.l_f + _FRONT_OVERHANG * long,
+        -vehicle.l_r - _REAR_OVERHANG * long,
     )
-    angle = np.linspace(0.0, 2.0 * np.pi, CHOSEN.corners)
+    angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
     round_ = np.column_stack([np.cos(angle), np.sin(angle)])
-    body = np.sign(round_) * np.abs(round_) ** CHOSEN.rounding * (0.5 * (front - rear), half)
+    body = np.sign(round_) * np.abs(round_) ** _ROUNDING * (0.5 * (front - rear), half)
     body += (0.5 * (front + rear), 0.0)
     glass = np.array([(0.37, 0.6), (0.23, 0.78), (0.23, -0.78), (0.37, -0.6)]) * (long, half)
     corners = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
-    wheel = 0.5 * long * corners * (CHOSEN.wheel_length, CHOSEN.wheel_width)
+    wheel = 0.5 * long * corners * (_WHEEL_LENGTH, _WHEEL_WIDTH)
     wheels = np.stack(
         [
             wheel @ _turn(angle).T + (x, 0.5 * side * track)
@@ -263,7 +278,7 @@ def _turn(angle: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
-_INNER_WIDTH = CHOSEN.page - 0.75  # what labels leave of the page [in]
+_INNER_WIDTH = style.PAGE - 0.75  # what labels leave of the page [in]
 
 
 @style.styled
@@ -273,11 +288,11 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
     low, high = _extent(path, drives)
     width, height = high - low
     rows = 1
-    if width > CHOSEN.narrow * height:
-        rows = min(CHOSEN.most_rows, max(1, round(width / CHOSEN.row_length)))
+    if width > _NARROW * height:
+        rows = min(_MOST_ROWS, max(1, round(width / _ROW_LENGTH)))
     step = width / rows
-    inch = min(_INNER_WIDTH / step, CHOSEN.highest / height)  # of a meter
-    figure = style.new_figure(CHOSEN.page, rows * (height * inch + 0.3) + 0.6)
+    inch = min(_INNER_WIDTH / step, _HIGHEST / height)  # of a meter
+    figure = style.new_figure(rows * (height * inch + 0.3) + 0.6)
     panels = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for row, axes in enumerate(panels):
         ends = float(low[0] + row * step), float(low[0] + (row + 1) * step)
@@ -293,14 +308,14 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
 def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
     """Corners of what is shown: the path with its cones, and the tracks as far as not absurd."""
     places = np.column_stack([path.X, path.Y])
-    low, high = places.min(axis=0) - CHOSEN.margin, places.max(axis=0) + CHOSEN.margin
+    low, high = places.min(axis=0) - _MARGIN, places.max(axis=0) + _MARGIN
     if len(path.cones):
         first, last = path.cones.min(axis=0), path.cones.max(axis=0)
-        low, high = np.minimum(low, first - CHOSEN.margin), np.maximum(high, last + CHOSEN.margin)
-        low[0] = max(low[0], first[0] - CHOSEN.run_up)
-        high[0] = min(high[0], last[0] + CHOSEN.run_up)
+        low, high = np.minimum(low, first - _MARGIN), np.maximum(high, last + _MARGIN)
+        low[0] = max(low[0], first[0] - _RUN_UP)
+        high[0] = min(high[0], last[0] + _RUN_UP)
     driven = np.concatenate([drive.Y for drive in drives.values()])
-    room = 2.0 * CHOSEN.margin
+    room = 2.0 * _MARGIN
     low[1] = np.clip(driven.min() - 2.0, low[1] - room, low[1])
     high[1] = np.clip(driven.max() + 2.0, high[1], high[1] + room)
     return low, high
@@ -311,7 +326,7 @@ def _draw(axes: Axes, path: "Path", drives: Mapping[str, "Drive"]) -> None:
     if len(path.cones):
         axes.plot(*path.cones.T, **CONES)
     label, drive = next(iter(drives.items()))
-    color, every = tire_look(label)["color"], CHOSEN.cars_every * drive.vehicle.wheelbase
+    color, every = tire_look(label)["color"], _CARS_EVERY * drive.vehicle.wheelbase
     at = np.searchsorted(drive.s, np.arange(drive.s[0], drive.s[-1], every))
     shapes = [
         car_shape(drive.vehicle, drive.X[k], drive.Y[k], drive.psi[k], drive.delta[k])

@@ -21,7 +21,6 @@ from models.recordings import Recording
 from models.rules import require_kind
 from models.vehicle import Vehicle
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
 from tireid.figures.thinned import Signal, drawn_times, shown
 
 _Curve = tuple[Array, Mapping[str, Any]]  # forces of both axles (n, 2) [N], and their look
@@ -184,7 +183,7 @@ def inputs_figure(recording: Recording) -> Figure:
     drawn = [recording.delta_r, *(signal for signal, _ in signals.values())]
     part = shown(recording.t, ends, *(signal.__getitem__ for signal in drawn))
     t = drawn_times(recording, recording.t[part])
-    figure = style.new_figure(CHOSEN.page, 0.5 + 1.05 * len(signals))
+    figure = style.new_figure(0.5 + 1.05 * len(signals))
     panels = figure.subplots(len(signals), 1, sharex=True)
     panels[0].set_xlim(ends)
     for axes, (label, (signal, scale)) in zip(panels, signals.items(), strict=True):

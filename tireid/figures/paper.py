@@ -16,8 +16,10 @@ from identifier.setup import force_unit_name
 from identifier.stability.loop import Loop, eigenvalues, root_locus
 from identifier.stability.margins import gain_margin, phase_margin
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
 from tireid.figures.thinned import shown_of_run
+
+_WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
+_OFFSET = 0.2  # between neighboring laws, as a share of the distance of columns
 
 SCHEME = Path(__file__).with_name("fig1_scheme.png")  # Fig. 1, and as .svg beside it
 
@@ -44,10 +46,10 @@ def error_figure(
     typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
     top = max(peak, *known.values()) if known else peak
 
-    figure = style.new_figure(CHOSEN.page, 2.6)
+    figure = style.new_figure(2.6)
     axes = figure.subplots()
     axes.set_xlim(ends)
-    if top > CHOSEN.paper_wide * peak or peak > 100.0 * CHOSEN.paper_wide * typical:
+    if top > _WIDE * peak or peak > 100.0 * _WIDE * typical:
         axes.set_yscale("log")
         axes.set_ylim(typical / 30.0, 2.0 * top)
     else:
@@ -87,7 +89,7 @@ def weights_figure(history: History, freeze_times: Sequence[float] = ()) -> Figu
     ends = style.time_window(recording.t, None)
     t, (W, V) = shown_of_run(history, lambda block: [block.before["W"], block.before["V"]])
 
-    figure = style.new_figure(CHOSEN.page, 4.2)
+    figure = style.new_figure(4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)
     upper.set_xlim(ends)
     _lines(upper, t, W[:, 0, :], style.GREEN, "front axle")
@@ -135,7 +137,7 @@ def comparison_figure(
     paper : by law, by column: the value that the paper prints [kN].
     """
     columns = list(dict.fromkeys(name for row in results.values() for name in row))
-    figure = style.new_figure(CHOSEN.page, 2.9)
+    figure = style.new_figure(2.9)
     axes = figure.subplots()
     drawn: list[float] = []
     order: list[str] = []
@@ -145,7 +147,7 @@ def comparison_figure(
         label = VARIANTS[law].title.replace("eta/lambda", "η/λ")
         color, marker = _MARKS[law]
         order += [label, f"{label} (paper)"]
-        shift = CHOSEN.offset * (number - (len(results) - 1) / 2)
+        shift = _OFFSET * (number - (len(results) - 1) / 2)
         middle, low, high = np.array(list(row.values()), dtype=np.float64).T
         middle = np.where(np.isfinite(middle), middle, np.nan)
         whiskers = [np.where(np.isfinite(end), abs(middle - end), 0.0) for end in (low, high)]
@@ -159,7 +161,7 @@ def comparison_figure(
             axes.plot(at, list(printed.values()), marker, label=f"{label} (paper)", **look)
         drawn += [*middle, *(middle - whiskers[0]), *(middle + whiskers[1]), *printed.values()]
     positive = [value for value in drawn if value > 0.0]
-    if positive and max(positive) > CHOSEN.paper_wide * min(positive):
+    if positive and max(positive) > _WIDE * min(positive):
         axes.set(yscale="log", ylim=(min(positive) / 1.5, max(positive) * 1.5))
     else:
         axes.set_ylim(0.0, 1.08 * max(positive, default=1.0))
@@ -188,7 +190,7 @@ def locus_figure(loop: Loop, dt: float) -> Figure:
     design = 1.0 + eigenvalues(loop.matrix()) * dt
     margin = gain_margin(loop, dt)
     circle = np.exp(1j * np.linspace(-np.pi, np.pi, 2881))
-    figure = style.new_figure(CHOSEN.page, 3.5)
+    figure = style.new_figure(3.5)
     panels = figure.subplots(1, 2)
     span = 1.3 * float(np.abs(1.0 - design).max())
     views = (-1.1, 1.1, 1.1), (1.0 - 1.5 * span, 1.0 + 0.5 * span, span)

@@ -10,7 +10,6 @@ from codegen.arrays import thinning
 from identifier.verdict import RoadFriction, WindowForces
 from models.vehicle import Vehicle
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
 
 _POINTS: Mapping[str, Any] = {"linestyle": "", "marker": ".", "markersize": 3.0, "rasterized": True}
 
@@ -40,7 +39,7 @@ def friction_figure(friction: RoadFriction) -> Figure:
     """Draw the friction of a drive's road over that of the drive that taught, and its doubt."""
     some = slice(None, None, thinning(len(friction.t)))
     t, ratio, sd = friction.t[some], friction.ratio[some], friction.sd[some]
-    figure = style.new_figure(CHOSEN.page, 2.8)
+    figure = style.new_figure(2.8)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
     ends = ratio * np.exp(-sd), ratio * np.exp(sd)
     shade: Mapping[str, Any] = {"color": style.SKY, "alpha": 0.5, "linewidth": 0.0}

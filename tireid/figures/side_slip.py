@@ -12,13 +12,16 @@ from codegen.arrays import Array
 from identifier.compare.course import SIGMAS, SideSlip
 from models.recordings import Recording
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
 from tireid.figures.compare import method_label, short_names
 from tireid.figures.drive import ARC
 from tireid.figures.thinned import drawn_times, shown
 
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
+
+_MOST = 4  # recordings that are drawn
+_COLUMNS = 5  # entries of a row of the legend
+_BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
 
 _FIRST = "inertial"  # which has the band where several estimate v_y
 _OTHERS = (style.ORANGE, style.GREEN, style.PURPLE, style.AMBER, style.SKY, style.GREY)
@@ -35,7 +38,7 @@ def side_slip_figure(
 
     Where that is not there, it is of the first method that has one.
     """
-    drawn = list(recordings)[: CHOSEN.most]
+    drawn = list(recordings)[:_MOST]
     given = {name: by_name for name, by_name in given.items() if by_name}
     has_band = {n: any(one.v_y_sd is not None for one in given[n].values()) for n in given}
     first = max(given, key=lambda name: (name == _FIRST, has_band[name]))
@@ -44,14 +47,14 @@ def side_slip_figure(
     }  # above the others
     others = [name for name in given if name != first]
     looks |= {n: {"color": color} for n, color in zip(others, cycle(_OTHERS), strict=False)}
-    figure = style.new_figure(CHOSEN.page, 0.7 + 1.5 * len(drawn))
+    figure = style.new_figure(0.7 + 1.5 * len(drawn))
     panels = figure.subplots(len(drawn), 1, squeeze=False)[:, 0]
     names = short_names([recording.name for recording in recordings])
     for axes, recording in zip(panels, drawn, strict=True):
         axes.set_title(names[recording.name])
         _draw(axes, recording, {name: given[name][recording.name] for name in looks}, looks)
     figure.align_ylabels()
-    style.legend_above(figure, columns=CHOSEN.columns)
+    style.legend_above(figure, columns=_COLUMNS)
     return figure
 
 
@@ -70,7 +73,7 @@ def _draw(
         return _degrees(v_y[part], recording.v_x[part])
 
     main = slip(first.v_y if truth is None else truth)
-    limit = CHOSEN.beyond * max(float(np.abs(main).max()), 0.1)
+    limit = _BEYOND * max(float(np.abs(main).max()), 0.1)
     if first.v_y_sd is not None:
         room = SIGMAS * first.v_y_sd
         low, high = (slip(end).clip(-limit, limit) for end in (first.v_y - room, first.v_y + room))
@@ -95,7 +98,7 @@ def _degrees(v_y: Array, v_x: Array) -> Array:
 def drive_lateral_figure(drive: "Drive") -> Figure:
     """Draw the estimated v_y over the true one, and its error, each with the band of two sigma."""
     v_y, band = drive.estimates["v_y"], SIGMAS * drive.estimates["v_y_sd"]
-    figure = style.new_figure(CHOSEN.page, 3.6)
+    figure = style.new_figure(3.6)
     panels = figure.subplots(2, 1, sharex=True)
     for axes, scale, zero in zip(panels, (1.0, 1e3), (0.0, drive.v_y), strict=True):  # m/s, mm/s
         for curve, look in (

@@ -26,7 +26,15 @@ from codegen.writing import write_file
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.run import History
-from tireid.figures.chosen import CHOSEN
+
+PAGE = 7.16  # width of both columns of a paper [in]
+RESOLUTION = 200  # [dots per inch]
+CLOUDS = 130  # dots per inch of what is pixels in a drawing
+# s: of a clock that begins later, as a Unix time does, only the last digits are shown
+FAR = 1e5
+DIGITS_SHOWN = 100.0  # s
+# an axis reaches at most this many times beyond the force it is compared with
+FARTHEST = 3.0
 
 _P = ParamSpec("_P")
 
@@ -64,12 +72,12 @@ class _NotebookFigure(Figure):
         return figure_png(self, resolution=100)
 
 
-def new_figure(width: float, height: float) -> Figure:
+def new_figure(height: float) -> Figure:
     """Return an empty figure that fits its labels into its size when drawn.
 
-    width : of the figure [in].   height : of the figure [in].
+    height : of the figure [in].
     """
-    figure = _NotebookFigure(figsize=(width, height), layout="constrained")
+    figure = _NotebookFigure(figsize=(PAGE, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -81,7 +89,7 @@ def axle_panels(
 
     room : above and below them [in].
     """
-    figure = new_figure(CHOSEN.page, room + sum(heights))
+    figure = new_figure(room + sum(heights))
     ratios: Mapping[str, Any] = {"height_ratios": heights, "squeeze": False}
     panels = figure.subplots(len(heights), 2, sharex=sharex, sharey="row", **ratios)
     for axes, name in zip(panels[0], AXLES, strict=True):
@@ -122,14 +130,14 @@ def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
         engine = figure.get_layout_engine()
         if engine is not None:
             # At fewer dots letters are less exact.
-            resolution, figure.dpi = figure.dpi, CHOSEN.resolution
+            resolution, figure.dpi = figure.dpi, RESOLUTION
             engine.execute(figure)
             figure.dpi = resolution
             figure.set_layout_engine(None)  # that of rcParams, where `LOOK` has none
         yield
 
 
-def figure_png(figure: Figure, *, resolution: int = CHOSEN.resolution) -> bytes:
+def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     buffer = BytesIO()
     with laid_out(figure):
         figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
@@ -145,9 +153,7 @@ def figure_svg(figure: Figure) -> bytes:
     """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels."""
     buffer = BytesIO()
     with laid_out(figure, {**LOOK, **_VECTOR}):
-        figure.savefig(
-            buffer, format="svg", dpi=CHOSEN.clouds, metadata={"Date": None, "Creator": None}
-        )
+        figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
 
 
@@ -176,11 +182,7 @@ def _clock_zero(t: Array) -> float:
     t : times of the samples (n,) [s].
     """
     first = float(t[0])
-    return (
-        0.0
-        if abs(first) < CHOSEN.far
-        else CHOSEN.digits_shown * float(np.floor(first / CHOSEN.digits_shown))
-    )
+    return 0.0 if abs(first) < FAR else DIGITS_SHOWN * float(np.floor(first / DIGITS_SHOWN))
 
 
 def frozen_title(t: Array, t_freeze: float) -> str:
@@ -316,7 +318,7 @@ def force_range(reference: Array, *others: Array) -> tuple[float, float]:
     A law that diverges or a model that is far off leaves the panel instead of flattening the rest.
     """
     largest = _finite(reference)
-    bound = CHOSEN.style_farthest * float(np.abs(largest).max(initial=0.0)) or np.inf
+    bound = FARTHEST * float(np.abs(largest).max(initial=0.0)) or np.inf
     every = np.concatenate([largest, *(_finite(other) for other in others)])
     every = every[np.abs(every) <= 1e12]
     low = max(float(every.min(initial=0.0)), -bound)

@@ -16,7 +16,6 @@ from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
 from models.recordings import Recording
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
 from tireid.figures.drive import tire_look
 from tireid.figures.thinned import cloud, shown_of_run
 
@@ -169,7 +168,7 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     if not tracks:
         raise TypeError(f"{history.method} has no estimates of the axles")
     at, curves = shown_of_run(history, lambda block: [o.values for o in history.tracks_over(block)])
-    figure = style.new_figure(CHOSEN.page, 4.4)
+    figure = style.new_figure(4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
         label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values
