@@ -1,6 +1,7 @@
 """`tireid identify LOG --vehicle FILE --out DIR`: learn the tires of a recording, freeze them."""
 
 import argparse
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -11,8 +12,6 @@ from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
 from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import History, check_recording
-from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, calibrated, judge, judge_prediction
 from models.recordings import Recording, Repair, check_against_vehicle, check_physics, joined
 from models.vehicle import Vehicle
 from tireid.commands import COMMANDS
@@ -20,7 +19,7 @@ from tireid.commands import options as shared
 from tireid.commands.certificate_table import verdict_line
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.identified import Results, file_name
-from tireid.learning import identify, with_v_y
+from tireid.learning import identify
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
@@ -113,10 +112,9 @@ def run(options: argparse.Namespace) -> int:
         for t in freeze_times:
             _require_tires(learnt, t)
         pieces = learnt.parts(logs) if len(logs) > 1 else []
-        verdict = with_doctor(judge(learnt, last), diagnosis, repair)
-        asked = _asked(learnt.freeze(last), others)
-        tire = calibrated(learnt, last, verdict)
-        found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
+        noted = partial(with_doctor, diagnosis=diagnosis, repair=repair)
+        found = Results.learnt(law, runs, freeze_times, others, pieces, noted)
+        verdict, asked = found.verdict, found.asked
         figures = found.write(folder, progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(folder, found, figures, diagnosis, options.words)
@@ -133,11 +131,6 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join(part for part in given if part))
     say(f"wrote {options.out}/")
     return max(shared.exit_code(one, options) for one in (verdict, *asked.values()))
-
-
-def _asked(model: TireModel, others: list[Recording]) -> dict[str, Verdict]:
-    """Return the verdict of `tireid predict` on a model over each replayed log, by its name."""
-    return {one.name: judge_prediction(model, with_v_y(one, model)) for one in others}
 
 
 def _require_model(law: str, design: Method, vehicle: Vehicle) -> None:

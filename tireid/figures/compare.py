@@ -60,7 +60,6 @@ def methods_figure(comparison: Comparison) -> Figure:
     axes.grid(visible=False, axis="y")
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel(f"{comparison.course.measure}, both axles [% of rms force]")
-    style.legend_above(figure)
     return figure
 
 

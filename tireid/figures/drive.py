@@ -59,7 +59,6 @@ def drive_solve_figure(drive: "Drive") -> Figure:
     period = f"largest {times.max():.3g} ms of a period of {1e3 * drive.period:g} ms"
     axes.set_title(period, loc="right")
     axes.set_title(f"{times.size} steps")
-    style.legend_above(figure)
     return figure
 
 
@@ -141,7 +140,7 @@ def drive_errors_figure(
     panels[-1].set(xlabel=ARC, xlim=(0.0, last))
     figure.align_ylabels(panels)
     order = (*drives, _REPLANNED, *(friction_label(mu) for _, mu in drops))
-    style.legend_above(figure, order=order)
+    style.legend_above(figure, last=order)
     return figure
 
 
@@ -223,7 +222,7 @@ def drive_steering_figure(
         _mark_road(axes, drives, drops, faults)
     rate.set(xlabel=ARC, xlim=(0.0, max(float(drive.s[-1]) for drive in drives.values())))
     figure.align_ylabels([angle, rate])
-    style.legend_above(figure, order=tuple(drives))
+    style.legend_above(figure, last=tuple(drives))
     return figure
 
 
@@ -301,19 +300,17 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
         axes.set_yticks(axes.get_yticks()[1:-1:1])
         axes.set_ylim(low[1], high[1])
     panels[-1].set_xlabel("X [m]")
-    style.legend_above(figure, order=tuple(drives))
+    style.legend_above(figure, last=tuple(drives))
     return figure
 
 
 def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
     """Corners of what is shown: the path with its cones, and the tracks as far as not absurd."""
-    places = np.column_stack([path.X, path.Y])
+    places = np.vstack([np.column_stack([path.X, path.Y]), path.cones])
     low, high = places.min(axis=0) - _MARGIN, places.max(axis=0) + _MARGIN
     if len(path.cones):
-        first, last = path.cones.min(axis=0), path.cones.max(axis=0)
-        low, high = np.minimum(low, first - _MARGIN), np.maximum(high, last + _MARGIN)
-        low[0] = max(low[0], first[0] - _RUN_UP)
-        high[0] = min(high[0], last[0] + _RUN_UP)
+        X = path.cones[:, 0]
+        low[0], high[0] = max(low[0], X.min() - _RUN_UP), min(high[0], X.max() + _RUN_UP)
     driven = np.concatenate([drive.Y for drive in drives.values()])
     room = 2.0 * _MARGIN
     low[1] = np.clip(driven.min() - 2.0, low[1] - room, low[1])

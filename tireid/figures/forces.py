@@ -36,7 +36,7 @@ def _force_panels(
     rows: Sequence[tuple[str, Sequence[_Curve]]],
     known: Array | None,
     missed: Sequence[_Curve],
-    window: style.Window = None,
+    window: tuple[float, float] | None = None,
     heights: tuple[float, float] = (2.0, 1.0),
 ) -> tuple[Figure, NDArray[Any], style.ForceUnit]:
     """Draw forces in rows, below them what some miss of those that are known.
@@ -44,7 +44,7 @@ def _force_panels(
     rows : title of each behind the axle's name, and its curves.
     known : (n, 2) [N]; None misses nothing.   heights : of a row of forces, of the residual [in].
     """
-    ends = style.time_window(recording.t, window)
+    ends = (recording.t[0], recording.t[-1]) if window is None else window
     curves = [force for _, row in rows for force, _ in row]
     reference = curves[0] if known is None else known
     signals: list[Signal] = [force.__getitem__ for force in (reference, *curves)]
@@ -86,7 +86,7 @@ def force_figure(
     history: History,
     replays: Mapping[float, Replay] | None = None,
     *,
-    window: style.Window = None,
+    window: tuple[float, float] | None = None,
     since: float | None = None,
 ) -> Figure:
     """Draw forces of front and rear axle over time: identified online, and replayed frozen.
@@ -129,7 +129,6 @@ def force_figure(
         if len(panels) > len(rows):
             against = "online" if truth is None else "truth"
             panels[-1, axle].set_title(f"{name}, residual to {against}")
-    style.legend_above(figure)
     return figure
 
 
@@ -162,7 +161,6 @@ def prediction_figure(replay: Replay | Prediction, online: History | None = None
     if known is not None:
         for axle, axes in enumerate(panels[0]):
             style.note(axes, _errors(replay, unit, axle))
-    style.legend_above(figure)
     return figure
 
 
@@ -188,7 +186,7 @@ def inputs_figure(recording: Recording) -> Figure:
     panels[0].set_xlim(ends)
     for axes, (label, (signal, scale)) in zip(panels, signals.items(), strict=True):
         values = scale * signal[part]
-        axes.plot(t, values, color=style.BLUE, linewidth=0.9, label=label)
+        axes.plot(t, values, color=style.BLUE, linewidth=0.9)
         axes.set_ylabel(label)
         span = float(np.ptp(values))
         middle = float(values.min()) + span / 2
@@ -224,5 +222,4 @@ def draw_diagnosis(
         panel.set_xlabel("slip angle [deg]")
         panel.axhline(0.0, color=style.GREY, linewidth=0.5)
     panels[0, 0].set_ylabel("force from the motion [load]")
-    style.legend_above(figure)
     return figure

@@ -38,7 +38,6 @@ def error_figure(
     freeze_times : times at which weights were taken [s].
     """
     recording = history.recording
-    ends = style.time_window(recording.t, None)
     # A root of squares would overflow where a law diverges; hypot does not.
     t, (norm,) = shown_of_run(history, lambda block: [np.hypot(*block.outputs["xi_tilde"].T)])
     known = {name: bound for name, bound in (bounds or {}).items() if np.isfinite(bound)}
@@ -48,7 +47,7 @@ def error_figure(
 
     figure = style.new_figure(2.6)
     axes = figure.subplots()
-    axes.set_xlim(ends)
+    axes.set_xlim(recording.t[0], recording.t[-1])
     if top > _WIDE * peak or peak > 100.0 * _WIDE * typical:
         axes.set_yscale("log")
         axes.set_ylim(typical / 30.0, 2.0 * top)
@@ -64,7 +63,7 @@ def error_figure(
     unit = force_unit_name(style.paper_design(history).force_unit)
     axes.set(ylabel=rf"error norm $|\tilde{{\xi}}|$ [{unit} s]")
     style.label_time(axes, recording.t)
-    style.legend_above(figure, columns=min(4, 1 + len(known) + bool(freeze_times)))
+    style.legend_above(figure, columns=4)
     return figure
 
 
@@ -86,12 +85,11 @@ def weights_figure(history: History, freeze_times: Sequence[float] = ()) -> Figu
     freeze_times : times at which weights were taken [s].
     """
     recording, design = history.recording, style.paper_design(history)
-    ends = style.time_window(recording.t, None)
     t, (W, V) = shown_of_run(history, lambda block: [block.before["W"], block.before["V"]])
 
     figure = style.new_figure(4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)
-    upper.set_xlim(ends)
+    upper.set_xlim(recording.t[0], recording.t[-1])
     _lines(upper, t, W[:, 0, :], style.GREEN, "front axle")
     _lines(upper, t, W[:, 1, :], style.PURPLE, "rear axle")
     upper.set_ylabel(rf"weights $\hat{{W}}$ [{force_unit_name(design.force_unit)}]")
@@ -171,7 +169,7 @@ def comparison_figure(
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylabel="force RMSE [kN]")
     for boundary in range(1, len(columns)):
         axes.axvline(boundary - 0.5, color="#DDDDDD", linewidth=0.6)
-    style.legend_above(figure, columns=len(results), order=order)
+    style.legend_above(figure, columns=len(results), last=order)
     return figure
 
 
@@ -209,5 +207,4 @@ def locus_figure(loop: Loop, dt: float) -> Figure:
     panels[0].set_title("Poles of the sampled loop")
     phase = phase_margin(loop, dt)
     panels[1].set_title(f"Near z = 1; phase margin {phase:.0f}°")
-    style.legend_above(figure)
     return figure

@@ -30,7 +30,6 @@ def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
         style.label_time(lower, shown.t)
     panels[0, 0].set_ylabel(f"mean force [{unit.name}]")
     panels[1, 0].set_ylabel(f"missed [{unit.name}]")
-    style.legend_above(figure)
     return figure
 
 
@@ -52,5 +51,4 @@ def friction_figure(friction: RoadFriction) -> Figure:
     lower.plot(t, friction.unexplained[some], label="no friction explains it", **look)
     lower.set(ylabel="probability", ylim=(-0.05, 1.05))
     style.label_time(lower, friction.t)
-    style.legend_above(figure)
     return figure

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from mpc.loop.record import Drive
 
 _MOST = 4  # recordings that are drawn
-_COLUMNS = 5  # entries of a row of the legend
 _BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
 
 _FIRST = "inertial"  # which has the band where several estimate v_y
@@ -54,7 +53,6 @@ def side_slip_figure(
         axes.set_title(names[recording.name])
         _draw(axes, recording, {name: given[name][recording.name] for name in looks}, looks)
     figure.align_ylabels()
-    style.legend_above(figure, columns=_COLUMNS)
     return figure
 
 
@@ -113,5 +111,4 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     panels[0].set(ylabel="$v_y$\n[m/s]", xlim=drive.s[[0, -1]])
     panels[1].set(ylabel="error of it\n[mm/s]", xlabel=ARC, ylim=(-reach, reach))
     figure.align_ylabels(panels)
-    style.legend_above(figure)
     return figure

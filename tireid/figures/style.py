@@ -55,12 +55,18 @@ LOOK: dict[str, Any] = dict(_look.items())
 
 
 def styled(draw: Callable[_P, Figure]) -> Callable[_P, Figure]:
-    """Return a drawing function that works in the look of the project, whatever the user's own."""
+    """Return a drawing function that works in the look of the project, whatever the user's own.
+
+    A figure that has no legend gets one above its panels.
+    """
 
     @wraps(draw)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> Figure:
         with style.context(["default", LOOK]):
-            return draw(*args, **kwargs)
+            figure = draw(*args, **kwargs)
+            if not any(one.get_legend() for one in figure.axes) and not figure.legends:
+                legend_above(figure)
+            return figure
 
     return wrapper
 
@@ -169,8 +175,6 @@ def save_figures(folder: Path, figures: dict[str, Figure]) -> dict[str, Figure]:
     return figures
 
 
-Window = tuple[float, float] | None
-
 TIME = "time [s]"
 AXLES = ("Front axle", "Rear axle")
 _FREEZE, _PREDICTION = "freeze", "after the freeze (prediction)"
@@ -204,16 +208,6 @@ def label_time(axes: Axes, t: Array) -> None:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value - zero:g}"))
 
 
-def time_window(t: Array, window: Window) -> tuple[float, float]:
-    """Return the ends of a time axis.
-
-    t : times of the samples (n,) [s].   window : first and last time to show [s], or None for all.
-    """
-    if window is None:
-        return float(t[0]), float(t[-1])
-    return max(window[0], float(t[0])), min(window[1], float(t[-1]))
-
-
 def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
     """Draw the freeze as a line and, where the replay goes on, shade what it predicts.
 
@@ -243,23 +237,22 @@ def note(axes: Axes, text: str) -> None:
     axes.set_title(text, loc="right", color="#444444")
 
 
-def legend_above(
-    figure: Figure, *, columns: int | None = None, order: Sequence[str] = (_FREEZE, _PREDICTION)
-) -> None:
+def legend_above(figure: Figure, *, columns: int | None = None, last: Sequence[str] = ()) -> None:
     """Put one legend of all labeled curves above all panels, where it covers no data.
 
-    columns : entries in a row; None puts all in one.
+    columns : entries in a row; None puts up to five in one.   last : labels that end it.
     """
     entries: dict[str, Any] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    for label in order:
+    for label in (*last, _FREEZE, _PREDICTION):
         if label in entries:
             entries[label] = entries.pop(label)
-    place: Mapping[str, Any] = {"loc": "outside upper center", "borderaxespad": 0.2}
-    columns = columns or len(entries)
-    _bolder(figure.legend(list(entries.values()), list(entries), ncols=columns, **place))
+    if entries:
+        place: Mapping[str, Any] = {"loc": "outside upper center", "borderaxespad": 0.2}
+        columns = columns or (len(entries) if len(entries) < 6 else 3)
+        _bolder(figure.legend(list(entries.values()), list(entries), ncols=columns, **place))
 
 
 def legend_beside(axes: Axes) -> None:
@@ -302,7 +295,7 @@ def force_unit_of(force: Array) -> ForceUnit:
 
     force : any shape [N]; what is not finite does not count.
     """
-    return _KILONEWTON if np.abs(_finite(force)).max(initial=0.0) >= 1000.0 else _NEWTON
+    return _KILONEWTON if np.abs(force[np.isfinite(force)]).max(initial=0.0) >= 1000.0 else _NEWTON
 
 
 def paper_design(history: History) -> PaperIdentifier:
@@ -317,9 +310,9 @@ def force_range(reference: Array, *others: Array) -> tuple[float, float]:
 
     A law that diverges or a model that is far off leaves the panel instead of flattening the rest.
     """
-    largest = _finite(reference)
-    bound = FARTHEST * float(np.abs(largest).max(initial=0.0)) or np.inf
-    every = np.concatenate([largest, *(_finite(other) for other in others)])
+    known = reference[np.isfinite(reference)]
+    bound = FARTHEST * float(np.abs(known).max(initial=0.0)) or np.inf
+    every = np.concatenate([one.ravel() for one in (reference, *others)])
     every = every[np.abs(every) <= 1e12]
     low = max(float(every.min(initial=0.0)), -bound)
     high = min(float(every.max(initial=0.0)), bound)
@@ -332,8 +325,3 @@ def drawable(curve: Array, limits: tuple[float, float]) -> Array:
     low, high = limits
     reach = 10.0 * (high - low)
     return np.clip(curve, low - reach, high + reach)
-
-
-def _finite(values: Array) -> Array:
-    kept: Array = values[np.isfinite(values)]
-    return kept

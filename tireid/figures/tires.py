@@ -84,8 +84,7 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         axes.set(xlim=ends, ylim=limits)
         _label_slip(lowest, axle)
     style.label_forces(panels, unit, residual=known is not None)
-    labels = {label for axes in figure.axes for label in axes.get_legend_handles_labels()[1]}
-    style.legend_above(figure, columns=None if len(labels) < 6 else 3, order=(_UNKNOWN,))
+    style.legend_above(figure, last=(_UNKNOWN,))
     return figure
 
 
@@ -151,7 +150,6 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
         axes.set(xlim=(-reach, reach), ylim=(low, high))
         _label_slip(axes, axle)
     style.label_forces(panels, unit, residual=False)
-    style.legend_above(figure, columns=1 + len(curves) if len(curves) < 5 else 3)
     return figure
 
 
@@ -180,5 +178,4 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
         for freeze in freeze_times:
             style.mark_freeze(axes, freeze, prediction=False)
     style.label_time(panels[-1], t)
-    style.legend_above(figure)
     return figure
