@@ -23,9 +23,15 @@ class _Line(logging.Handler):
         say(record.getMessage())
 
 
+def _escaped(text: str) -> str:
+    from codegen.escape import terminal  # with all of codegen: what says nothing does not need it
+
+    return terminal(text)
+
+
 def say(text: str) -> None:
     """Print one line for the person who waits."""
-    from codegen.escape import visible  # with all of codegen: only what speaks needs it
+    from codegen.escape import visible
 
     complain(f"  {visible(text)}")
 
@@ -70,10 +76,7 @@ def _write(stream: TextIO | None, text: str) -> None:
     if stream is None:  # closed before we began
         return
     try:
-        if text:
-            from codegen.escape import terminal
-
-            stream.write(terminal(text))
+        stream.write(_escaped(text) if text else "")
         stream.flush()
     except OSError:
         with suppress(OSError, ValueError):  # ValueError: it has no file behind it

@@ -20,7 +20,7 @@ from identifier.stability.certificate import judged_loop
 from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import proven_bounds
 from models.vehicle import Vehicle
-from tireid.commands import COMMANDS, DONE, FAILS
+from tireid.commands import DONE, FAILS
 from tireid.commands import options as shared
 from tireid.commands.certificate_table import certificate_text, method_text, unit_text
 from tireid.commands.demo_story import drive_to_learn
@@ -67,10 +67,8 @@ _OF_ALL = ("v_x", "friction")  # conditions of which not gains alone are judged
 _TEXT, _NUMBERS, _DESIGN = "certificate.txt", "certificate.json", "design.toml"
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "check",
-        help=COMMANDS["check"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Certify an identifier; with no option the axle identifier, the default in "
         "a car: limits, curve, jumps, the time to follow a drop of friction. Gains of the paper's "
         "laws (--paper, --method NAME, --design FILE) are judged at the worst regressor: poles, "
@@ -82,7 +80,6 @@ def add_parser(commands: Any) -> None:
     shared.add_options(parser, float, dict(_CONDITIONS.values()))
     shared.add_options(parser, bool, {"--json": "print the certificate as JSON"})
     shared.add_output(parser, None)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ from identifier.tire_model import TireModel
 from identifier.verdict import Verdict
 from mpc.path import BUILT_IN
 from tireid import report as page
-from tireid.commands import COMMANDS, certificate_table
+from tireid.commands import certificate_table
 from tireid.commands import options as shared
 from tireid.commands.check import draw_check
 from tireid.commands.demo_story import FREEZE, SPEED, STORY, Story, run_story
@@ -365,17 +365,14 @@ _PARTS = {
 }  # about s
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "demo",
-        help=COMMANDS["demo"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Drive the built-in sedan, learn its tires, freeze them, test them on another "
         "maneuver, export them as a C package that is compiled and tested, repeat the paper's "
         "tables, and steer the car along a path on the identified tires; leaves one report.html to "
         "read.",
     )
     shared.add_output(parser, "demo")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -18,7 +18,6 @@ from models.schema import require_few
 from models.vehicle import Vehicle
 from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
-from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION, learning_drive
@@ -40,10 +39,8 @@ _EPILOG = (
 )
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "drive",
-        help=COMMANDS["drive"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Learn the tires on one drive, freeze them, and let a model predictive "
         "tracker with them steer the car along a path; write report.html, summary.json, every "
         "signal as CSV, figures and a film.",
@@ -113,7 +110,6 @@ def add_parser(commands: Any) -> None:
     text = f"{', '.join(FORMATS)} or {NO_FILM} (%(default)s)"
     parser.add_argument("--film", metavar="NAME", help=text, **formats)
     shared.add_output(parser, "drive")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -222,27 +218,18 @@ def labels_of(words: Sequence[str]) -> list[str]:
 
 
 def conditions_of(options: argparse.Namespace) -> driving.Conditions:
-    if not 0.0 < options.laps <= 100.0:
-        raise ValueError(f"--laps must be positive and at most 100, it is {options.laps:g}")
-    require_within(ValueError, *driving.FRICTIONS, **{"--mu": options.mu})
-    require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
     name = options.path
     if name not in BUILT_IN and not FilePath(name).suffix:
         raise ValueError(f"--path: there is no path {name!r}; {', '.join(BUILT_IN)}, or FILE.csv")
     path = BUILT_IN[name]() if name in BUILT_IN else Path.from_csv(FilePath(name))
-    if options.laps != 1.0 and not path.closed:
-        raise ValueError(f"--laps is for a closed path, {path.name} is not")
     shared.require_one(options, "weights", "method", "paper", "design")
     vehicle, wish = shared.read_vehicle(options), _parse_speed(options.speed)
-    vehicle.require_chassis()
     drops = tuple(sorted(_parse_drop(text) for text in options.mu_drop))
     for s, _ in drops:
         if not path.closed and s >= path.length:
             raise ValueError(f"--mu-drop {s:g} is beyond the path, which is {path.length:.0f} m")
     setup = Setup(path=path, vehicle=vehicle, mu=options.mu, drops=drops, wish=wish)
-    hours = options.laps * setup.time_at(setup.path.s[-2]) / 3600.0
-    require_few(ValueError, f"--path {path.name}", hours, "hours", "hours of driving")
-    return driving.Conditions(
+    conditions = driving.Conditions(
         setup=setup,
         delay=driving.delay_periods(1e-3 * options.delay, "--delay"),
         noise=options.noise,
@@ -252,6 +239,9 @@ def conditions_of(options: argparse.Namespace) -> driving.Conditions:
         caution=options.caution,
         kind=options.sensors,
     )
+    hours = options.laps * setup.time_at(setup.path.s[-2]) / 3600.0
+    require_few(ValueError, f"--path {path.name}", hours, "hours", "hours of driving")
+    return conditions
 
 
 def frozen_tires(

@@ -14,7 +14,6 @@ from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import History, check_recording
 from models.recordings import Recording, Repair, check_against_vehicle, check_physics, joined
 from models.vehicle import Vehicle
-from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.certificate_table import verdict_line
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
@@ -28,10 +27,8 @@ from tireid.verdicts import verdict_text, verdicts_text
 _LEARNING, _JUDGING, _DRAWING = "learning", "replays and verdict", "curves and figures"
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "identify",
-        help=COMMANDS["identify"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Identify the axle forces of LOG, freeze the model, replay LOG and other "
         "recordings; write report.html, summary.json, weights.json, curves as CSV and figures.",
         epilog="LOG is a log of any format with the columns t [s], vx, vy [m/s], r [rad/s], "
@@ -56,7 +53,6 @@ def add_parser(commands: Any) -> None:
     shared.add_seed(parser, "the initial weights of the paper's network")
     shared.add_accept(parser)
     shared.add_output(parser, "identify")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

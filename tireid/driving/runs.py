@@ -123,6 +123,18 @@ class Conditions:
     kind: str = FULL
     caution: float = 0.0
 
+    def __post_init__(self) -> None:
+        path = self.setup.path
+        if not 0.0 < self.laps <= 100.0:
+            raise ValueError(f"laps must be positive and at most 100, they are {self.laps:g}")
+        if self.laps != 1.0 and not path.closed:
+            raise ValueError(f"laps are of a closed path, {path.name} is not")
+        if self.kind not in SENSORS:
+            raise ValueError(f"sensors must be one of {', '.join(SENSORS)}, not {self.kind!r}")
+        require_within(ValueError, *FRICTIONS, friction=self.setup.mu)
+        require_within(ValueError, 0.0, 1.0, caution=self.caution)
+        self.setup.vehicle.require_chassis()
+
     @property
     def sensors(self) -> CarSensors:
         """The sensors of the car, in order; those of one seed are the same unit."""
@@ -304,18 +316,11 @@ def drive(
         Where a number is not that of a drive, there is no tire to go on learning from, or no C
         compiler for the tracker.
     """
-    for name, value in (("share", share), ("laps", laps), ("speed", speed)):
+    for name, value in (("share", share), ("speed", speed)):
         if value is not None and not value > 0.0:
             raise ValueError(f"{name} must be positive, it is {value:g}")
-    if sensors not in SENSORS:
-        raise ValueError(f"sensors must be one of {', '.join(SENSORS)}, not {sensors!r}")
-    if laps != 1.0 and not path.closed:
-        raise ValueError(f"laps are of a closed path, {path.name} is not")
     if learning and tire is None:
         raise ValueError("learning goes on from a tire: none is given")
-    require_within(ValueError, *FRICTIONS, friction=friction)
-    require_within(ValueError, 0.0, 1.0, caution=caution)
-    vehicle.require_chassis()
     wish = SpeedWish(share if speed is None else None, speed)
     setup = Setup(path=path, vehicle=vehicle, mu=friction, drops=(), wish=wish)
     conditions = Conditions(
