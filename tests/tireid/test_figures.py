@@ -8,7 +8,6 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from matplotlib import font_manager
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
@@ -29,7 +28,6 @@ from tireid.figures.forces import (
 )
 from tireid.figures.paper import comparison_figure, error_figure, weights_figure
 from tireid.figures.style import (
-    _with_own_fonts,
     figure_png,
     force_unit_of,
     save_figures,
@@ -379,23 +377,6 @@ def test_times_of_a_clock_that_began_long_ago_fit_their_titles_and_axes() -> Non
     assert figure.axes[-1].get_xlabel() == "time since 1700000000 s [s]"
     shown = [text.get_text() for text in figure.axes[-1].get_xticklabels()]
     assert {"20", "22"} <= {one.split(".")[0] for one in shown}
-
-
-def test_fonts_of_matplotlib_are_found_where_the_list_of_the_machine_lacks_them(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    fonts = font_manager.fontManager
-    system = [entry for entry in fonts.ttflist if "mpl-data" not in entry.fname]
-    monkeypatch.setattr(fonts, "ttflist", system)
-    for name in ("DejaVu Sans Display", "STIXGeneral", "cmr10"):
-        with pytest.raises(ValueError, match=name):
-            fonts.findfont(name, fallback_to_default=False)
-    _with_own_fonts()
-    for name in ("DejaVu Sans Display", "STIXGeneral", "cmr10"):
-        assert Path(fonts.findfont(name, fallback_to_default=False)).is_file()
-    listed = len(fonts.ttflist)
-    _with_own_fonts()
-    assert len(fonts.ttflist) == listed
 
 
 def test_a_tire_is_no_recording_to_plot():

@@ -61,8 +61,7 @@ def run(options: argparse.Namespace) -> int:
     parts = {"methods": 9.0, "step times, tables and figures": 1.0}
     with output_folder(options.out, force=options.force) as folder:
         work = Progress("compare", parts, long=True)
-        log_map, check = shared.given_map(options), not options.no_check
-        recordings = [shared.read_log(log, vehicle, log_map, check=check) for log in options.logs]
+        recordings = [shared.read_log(log, vehicle, options) for log in options.logs]
         if not recordings:
             say(f"driving the plant of {vehicle.name} with noisy sensors")
             recordings = [*plant_recordings(vehicle, np.random.default_rng(seed))]

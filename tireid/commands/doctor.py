@@ -38,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
         shared.require_toml(options.repair)
         require_free(options.repair, force=options.force)
     vehicle, log_map = shared.read_vehicle(options), shared.given_map(options)
-    recording = shared.read_log(options.log, vehicle, log_map, check=False)
+    recording = shared.read_log(options.log, vehicle, options, check=False)
     say("the doctor looks at it")
     diagnosis = diagnose(recording, vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()

@@ -106,9 +106,10 @@ def declare(new: Any) -> None:
     fault = "CHANNEL:KIND:START:DURATION[:SIZE]"
     parser.add_argument("--fault", action="append", default=[], metavar=fault, help=text)
     shared.add_seed(parser, "noise and learning")
-    formats: dict[str, Any] = {"choices": (*FORMATS, NO_FILM), "default": FORMATS[0]}
     text = f"{', '.join(FORMATS)} or {NO_FILM} (%(default)s)"
-    parser.add_argument("--film", metavar="NAME", help=text, **formats)
+    parser.add_argument(
+        "--film", metavar="NAME", help=text, choices=(*FORMATS, NO_FILM), default=FORMATS[0]
+    )
     shared.add_output(parser, "drive")
 
 

@@ -173,8 +173,8 @@ def _read(log: str, vehicle: Vehicle, design: Method, options: argparse.Namespac
     recording = shared.read_log(
         log,
         vehicle,
-        shared.given_map(options),
-        check=not options.no_check and options.repair is None,  # else once it is repaired
+        options,
+        check=options.repair is None,  # else once it is repaired
         dt=design.dt,
     )
     counted_samples(recording, design.min_speed)  # refuses a car that never drives

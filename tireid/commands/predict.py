@@ -67,8 +67,7 @@ def declare(new: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where the model does not give back the drive's motion."""
     model = _model(options)
-    log_map, check = shared.given_map(options), not options.no_check
-    recording = shared.read_log(options.log, model.vehicle, log_map, check=check)
+    recording = shared.read_log(options.log, model.vehicle, options)
     prediction = replay(recording, model)
     recording, verdict = prediction.recording, prediction.verdict
     if recording.estimated:

@@ -1,7 +1,6 @@
 """Methods side by side: how far off online, frozen where learnt, and frozen elsewhere."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -52,8 +51,15 @@ def methods_figure(comparison: Comparison) -> Figure:
     for position, (label, errors) in enumerate(rows.items()):
         _draw_row(axes, position, errors)
         if label in lost:
-            place: Mapping[str, Any] = {"transform": axes.get_yaxis_transform(), "va": "center"}
-            axes.text(0.995, position, "diverged", color=style.GREY, ha="right", **place)
+            axes.text(
+                0.995,
+                position,
+                "diverged",
+                color=style.GREY,
+                ha="right",
+                transform=axes.get_yaxis_transform(),
+                va="center",
+            )
         axes.axhline(position + 0.5, color="#DDDDDD", linewidth=0.5)
     axes.set_yticks(range(len(rows)), list(rows))
     axes.tick_params(axis="y", length=0.0)

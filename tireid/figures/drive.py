@@ -120,8 +120,16 @@ def drive_errors_figure(
             axes.plot(drive.s, curve, label=label, **look)
         if drive.notes:
             at = np.searchsorted(drive.t, [t for t, _ in drive.notes]).clip(max=drive.t.size - 1)
-            mark: Mapping[str, Any] = {"color": look["color"], "ms": 3.2, "mfc": "white"}
-            panels[0].plot(drive.s[at], drive.e_y[at], "D", label=_REPLANNED, **mark, zorder=3.0)
+            panels[0].plot(
+                drive.s[at],
+                drive.e_y[at],
+                "D",
+                label=_REPLANNED,
+                color=look["color"],
+                ms=3.2,
+                mfc="white",
+                zorder=3.0,
+            )
     for axes, label in zip(panels, (*labels, "speed $v_x$\n[m/s]"), strict=True):
         axes.set_ylabel(label)
         _mark_road(axes, drives, drops, faults)
@@ -149,9 +157,10 @@ def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
 
     drops : arc length [m] and friction from there on.
     """
-    look: Mapping[str, Any] = {"color": style.GREY, "linewidth": 0.8, "linestyle": (0, (4, 2))}
     for place, mu in drops:
-        axes.axvline(place, label=friction_label(mu), **look)
+        axes.axvline(
+            place, label=friction_label(mu), color=style.GREY, linewidth=0.8, linestyle=(0, (4, 2))
+        )
 
 
 def _mark_road(
@@ -165,16 +174,26 @@ def _mark_road(
 
     mark_drops(axes, drops)
     first = next(iter(drives.values()))
-    shade: Mapping[str, Any] = {"facecolor": "#F6D9D5", "edgecolor": "none", "zorder": 0}
     for fault in faults:
         if fault.start <= first.t[-1]:
             span = np.interp([fault.start, fault.start + fault.duration], first.t, first.s)
-            axes.axvspan(*map(float, span), label=f"{fault.channel} {fault.kind}", **shade)
+            axes.axvspan(
+                *map(float, span),
+                label=f"{fault.channel} {fault.kind}",
+                facecolor="#F6D9D5",
+                edgecolor="none",
+                zorder=0,
+            )
     for label, drive in drives.items():
-        look = {"color": tire_look(label)["color"], "linewidth": 1.2, "linestyle": (0, (1, 1))}
         for t, text in drive.notes:
             if text.startswith(Verdict.FAULT.value):
-                axes.axvline(float(np.interp(t, drive.t, drive.s)), label=_NOTICED, **look)
+                axes.axvline(
+                    float(np.interp(t, drive.t, drive.s)),
+                    label=_NOTICED,
+                    color=tire_look(label)["color"],
+                    linewidth=1.2,
+                    linestyle=(0, (1, 1)),
+                )
 
 
 def friction_label(mu: float) -> str:
@@ -205,8 +224,13 @@ def drive_steering_figure(
         look = tire_look(label)
         angle.plot(drive.s, np.rad2deg(drive.command), label=label, **look)
     name, first = next(iter(drives.items()))
-    wheels: Mapping[str, Any] = {"color": style.PURPLE, "label": f"wheels of {name}"}
-    angle.plot(first.s, np.rad2deg(first.delta), linewidth=0.8, **wheels)
+    angle.plot(
+        first.s,
+        np.rad2deg(first.delta),
+        linewidth=0.8,
+        color=style.PURPLE,
+        label=f"wheels of {name}",
+    )
     speed = np.rad2deg(np.diff(first.command) / np.diff(first.t))
     rate.plot(first.s[1:], speed, **(tire_look(name) | {"linewidth": 0.7, "linestyle": "-"}))
     for axes, limit, label in (

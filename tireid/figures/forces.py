@@ -21,7 +21,7 @@ from models.recordings import Recording
 from models.rules import require_kind
 from models.vehicle import Vehicle
 from tireid.figures import style
-from tireid.figures.thinned import Signal, drawn_times, shown
+from tireid.figures.thinned import drawn_times, shown
 
 _Curve = tuple[Array, Mapping[str, Any]]  # forces of both axles (n, 2) [N], and their look
 _RESIDUAL: Mapping[str, Any] = {  # noise for the most part, which would make a drawing large
@@ -47,9 +47,8 @@ def _force_panels(
     ends = (recording.t[0], recording.t[-1]) if window is None else window
     curves = [force for _, row in rows for force, _ in row]
     reference = curves[0] if known is None else known
-    signals: list[Signal] = [force.__getitem__ for force in (reference, *curves)]
-    signals += [_missed(force, reference) for force in curves]
-    part = shown(recording.t, ends, *signals)
+    errors = [force - reference for force in curves]
+    part = shown(recording.t, ends, reference, *curves, *errors)
     t, unit = drawn_times(recording, recording.t[part]), style.force_unit_of(reference[part])
 
     def scaled(force: Array) -> Array:
@@ -75,10 +74,6 @@ def _force_panels(
         panels[-1, 0].set_ylim(style.force_range(np.zeros(1), *within))
     style.label_forces(panels, unit, residual=bool(residuals))
     return figure, panels, unit
-
-
-def _missed(force: Array, reference: Array) -> Signal:
-    return lambda at: force[at] - reference[at]
 
 
 @style.styled
@@ -179,7 +174,7 @@ def inputs_figure(recording: Recording) -> Figure:
     }
     signals = {label: (one, k) for label, (one, k) in logged.items() if one is not None}
     drawn = [recording.delta_r, *(signal for signal, _ in signals.values())]
-    part = shown(recording.t, ends, *(signal.__getitem__ for signal in drawn))
+    part = shown(recording.t, ends, *drawn)
     t = drawn_times(recording, recording.t[part])
     figure = style.new_figure(0.5 + 1.05 * len(signals))
     panels = figure.subplots(len(signals), 1, sharex=True)

@@ -193,8 +193,9 @@ def locus_figure(loop: Loop, dt: float) -> Figure:
     span = 1.3 * float(np.abs(1.0 - design).max())
     views = (-1.1, 1.1, 1.1), (1.0 - 1.5 * span, 1.0 + 0.5 * span, span)
     for axes, (left, right, height) in zip(panels, views, strict=True):
-        limit: Mapping[str, Any] = {"color": style.BLACK, "label": "stability limit"}
-        axes.plot(circle.real, circle.imag, linewidth=0.9, **limit)
+        axes.plot(
+            circle.real, circle.imag, linewidth=0.9, color=style.BLACK, label="stability limit"
+        )
         axes.plot(locus.real, locus.imag, ".", color=style.GREY, markersize=1.0, label="any gain")
         axes.plot(design.real, design.imag, "o", color=style.BLUE, markersize=4.5, label="design")
         if 0.0 < margin.factor < np.inf:

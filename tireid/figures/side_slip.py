@@ -64,7 +64,7 @@ def _draw(
 ) -> None:
     """Draw the side slip of a recording, with the band of the first estimate."""
     truth, ends, first = recording.logged_v_y, recording.t[[0, -1]], next(iter(given.values()))
-    part = shown(recording.t, ends, *(one.v_y.__getitem__ for one in given.values()))
+    part = shown(recording.t, ends, *(one.v_y for one in given.values()))
     t = drawn_times(recording, recording.t[part])
 
     def slip(v_y: Array) -> Array:

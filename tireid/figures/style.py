@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, ParamSpec
 
 import numpy as np
-from matplotlib import font_manager, get_data_path, rc_params_from_file, style
+from matplotlib import rc_params_from_file, style
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -96,8 +96,9 @@ def axle_panels(
     room : above and below them [in].
     """
     figure = new_figure(room + sum(heights))
-    ratios: Mapping[str, Any] = {"height_ratios": heights, "squeeze": False}
-    panels = figure.subplots(len(heights), 2, sharex=sharex, sharey="row", **ratios)
+    panels = figure.subplots(
+        len(heights), 2, sharex=sharex, sharey="row", height_ratios=heights, squeeze=False
+    )
     for axes, name in zip(panels[0], AXLES, strict=True):
         axes.set_title(name)
     return figure, panels
@@ -110,29 +111,13 @@ def label_forces(panels: NDArray[Any], unit: "ForceUnit", *, residual: bool) -> 
         axes.set_ylabel(f"{'residual' if missed else 'lateral force'} [{unit.name}]")
 
 
-def _with_own_fonts() -> None:
-    """List the fonts that Matplotlib brings, where the list it keeps on this machine lacks them.
-
-    A list that was made while an environment was being removed knows the fonts of the system only,
-    for ever: formulas then lose their signs, and every figure complains.
-    """
-    fonts = font_manager.fontManager
-    listed = {entry.name for entry in fonts.ttflist}
-    if not {"DejaVu Sans Display", "STIXGeneral", "cmr10"} <= listed:
-        for path in sorted(Path(get_data_path(), "fonts", "ttf").glob("*.ttf")):
-            fonts.addfont(path)
-
-
-_with_own_fonts()
-
-
 @contextmanager
-def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
+def laid_out(figure: Figure) -> Iterator[None]:
     """Lay a figure out, and let it be drawn in the look of the project meanwhile.
 
     It is laid out once: it is drawn more than once, and this takes as long as that.
     """
-    with style.context(["default", dict(look)]):
+    with style.context(["default", LOOK]):
         engine = figure.get_layout_engine()
         if engine is not None:
             # At fewer dots letters are less exact.
@@ -150,15 +135,10 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     return buffer.getvalue()
 
 
-# Glyphs as outlines and names of parts from a fixed salt: a drawing looks alike wherever it is
-# opened, and the same figure has the same bytes.
-_VECTOR: dict[str, Any] = {"svg.fonttype": "path", "svg.hashsalt": "tireid"}
-
-
 def figure_svg(figure: Figure) -> bytes:
     """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels."""
     buffer = BytesIO()
-    with laid_out(figure, {**LOOK, **_VECTOR}):
+    with laid_out(figure):
         figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
 
@@ -217,8 +197,14 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
     """
     first, last = axes.get_xlim()
     if prediction and t_freeze < last:
-        shade: Mapping[str, Any] = {"facecolor": "#F1EDE4", "edgecolor": "none", "zorder": 0}
-        axes.axvspan(max(t_freeze, first), last, label=_PREDICTION, **shade)
+        axes.axvspan(
+            max(t_freeze, first),
+            last,
+            label=_PREDICTION,
+            facecolor="#F1EDE4",
+            edgecolor="none",
+            zorder=0,
+        )
     if first <= t_freeze <= last:
         axes.axvline(t_freeze, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=_FREEZE)
 
@@ -250,16 +236,30 @@ def legend_above(figure: Figure, *, columns: int | None = None, last: Sequence[s
         if label in entries:
             entries[label] = entries.pop(label)
     if entries:
-        place: Mapping[str, Any] = {"loc": "outside upper center", "borderaxespad": 0.2}
         columns = columns or (len(entries) if len(entries) < 6 else 3)
-        _bolder(figure.legend(list(entries.values()), list(entries), ncols=columns, **place))
+        _bolder(
+            figure.legend(
+                list(entries.values()),
+                list(entries),
+                ncols=columns,
+                loc="outside upper center",
+                borderaxespad=0.2,
+            )
+        )
 
 
 def legend_beside(axes: Axes) -> None:
     """Put the legend of one panel to its right, where it covers no data."""
     entries = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    place: Mapping[str, Any] = {"bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
-    _bolder(axes.legend(list(entries.values()), list(entries), loc="upper left", **place))
+    _bolder(
+        axes.legend(
+            list(entries.values()),
+            list(entries),
+            loc="upper left",
+            bbox_to_anchor=(1.01, 1.0),
+            borderaxespad=0.0,
+        )
+    )
 
 
 def _bolder(legend: Legend) -> None:

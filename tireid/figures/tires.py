@@ -49,13 +49,10 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         known, color, label = online.axle_force, style.BLUE, "online"
     against = force if known is None else known
 
-    def slip(at: Any) -> Array:
-        return np.rad2deg(recording.alpha(vehicle.l_f, vehicle.l_r, at))
-
-    heights = [force.__getitem__, against.__getitem__, lambda at: force[at] - against[at]]
-    part = cloud(recording.t, slip, *heights)
+    slip = np.rad2deg(recording.alpha(vehicle.l_f, vehicle.l_r))
+    part = cloud(recording.t, slip, force, against, force - against)
     part = part[recording.v_x[part] >= model.min_speed]
-    alpha, frozen, reference = slip(part), force[part], against[part]
+    alpha, frozen, reference = slip[part], force[part], against[part]
     unit = style.force_unit_of(reference)
     frozen, reference = frozen / unit.newtons, reference / unit.newtons
     limits = style.force_range(reference, frozen)
@@ -98,12 +95,26 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
     degrees = np.linspace(float(ends[0]), float(ends[1]), 200)
     slip = np.deg2rad(degrees)
     if model.band is not None:  # under the points, which it would make grey
-        edge: Mapping[str, Any] = {"edgecolor": style.BLUE, "linewidth": 0.4, "zorder": 1.5}
         low, high = (force[:, axle] / newtons for force in model.band.at(slip))
-        axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=_BAND, **edge)
+        axes.fill_between(
+            degrees,
+            low,
+            high,
+            facecolor=(style.SKY, 0.6),
+            label=_BAND,
+            edgecolor=style.BLUE,
+            linewidth=0.4,
+            zorder=1.5,
+        )
     label = f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}"
-    look: Mapping[str, Any] = {"color": style.BLUE, "linewidth": 1.2, "zorder": 4, "label": label}
-    axes.plot(degrees, model.force(slip)[:, axle] / newtons, **look)
+    axes.plot(
+        degrees,
+        model.force(slip)[:, axle] / newtons,
+        color=style.BLUE,
+        linewidth=1.2,
+        zorder=4,
+        label=label,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,8 +133,9 @@ class TireCurve:
 def axle_slip(drive: "Drive") -> Array:
     """Return the slip angles δ - atan2(v_y ± l r, v_x) in the paper's sign [rad], (n, 2)."""
     car = drive.vehicle
-    motion = {"v_x": drive.v_x, "v_y": drive.v_y, "r": drive.r}
-    return measured_slip(car.l_f, car.l_r, **motion, delta_f=drive.delta)
+    return measured_slip(
+        car.l_f, car.l_r, v_x=drive.v_x, v_y=drive.v_y, r=drive.r, delta_f=drive.delta
+    )
 
 
 _REACH = 1.25  # curves go on this far beyond the slip of the drive
@@ -171,8 +183,9 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
         label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values
         for axle, color in enumerate((style.GREEN, style.PURPLE)):
-            look: Mapping[str, Any] = {"color": color, "label": style.AXLES[axle].lower()}
-            axes.plot(at, values[:, axle], linewidth=1.0, **look)
+            axes.plot(
+                at, values[:, axle], linewidth=1.0, color=color, label=style.AXLES[axle].lower()
+            )
         axes.set(ylabel=label, xlim=(t[0], t[-1]))
         axes.set_ylim(0.0, 1.1 * float(values.max()) or 1.0)
         for freeze in freeze_times:
