@@ -147,8 +147,7 @@ def drive_errors_figure(
     last = max(float(drive.s[-1]) for drive in drives.values())
     panels[-1].set(xlabel=ARC, xlim=(0.0, last))
     figure.align_ylabels(panels)
-    order = (*drives, _REPLANNED, *(friction_label(mu) for _, mu in drops))
-    style.legend_above(figure, last=order)
+    style.legend_above(figure, last=(*drives, _REPLANNED))
     return figure
 
 
@@ -159,7 +158,7 @@ def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
     """
     for place, mu in drops:
         axes.axvline(
-            place, label=friction_label(mu), color=style.GREY, linewidth=0.8, linestyle=(0, (4, 2))
+            place, label=f"friction {mu:g}", color=style.GREY, linewidth=0.8, linestyle=(0, (4, 2))
         )
 
 
@@ -194,14 +193,6 @@ def _mark_road(
                     linewidth=1.2,
                     linestyle=(0, (1, 1)),
                 )
-
-
-def friction_label(mu: float) -> str:
-    """Return what a legend calls a friction of the road.
-
-    mu : over that of the tire's measurement [-].
-    """
-    return f"friction {mu:g}"
 
 
 @style.styled

@@ -163,24 +163,23 @@ def prediction_figure(replay: Replay | Prediction, online: History | None = None
 def inputs_figure(recording: Recording) -> Figure:
     """Draw the signals of a recording; rear steering and a_y only where there are any."""
     require_kind(Recording, "as of read_recording, or run.recording", recording=recording)
-    ends = float(recording.t[0]), float(recording.t[-1])
+    ends = recording.t[0], recording.t[-1]
     estimated = ", estimated" if recording.estimated else ""
     logged = {
-        "$v_x$ [m/s]": (recording.v_x, 1.0),
-        "steering [deg]": (recording.delta_f, np.degrees(1.0)),
-        f"$v_y$ [m/s]{estimated}": (recording.v_y, 1.0),
-        "$r$ [deg/s]": (recording.r, np.degrees(1.0)),
-        "$a_y$ [m/s²]": (recording.a_y, 1.0),
+        "$v_x$ [m/s]": recording.v_x,
+        "steering [deg]": np.degrees(recording.delta_f),
+        f"$v_y$ [m/s]{estimated}": recording.v_y,
+        "$r$ [deg/s]": np.degrees(recording.r),
+        "$a_y$ [m/s²]": recording.a_y,
     }
-    signals = {label: (one, k) for label, (one, k) in logged.items() if one is not None}
-    drawn = [recording.delta_r, *(signal for signal, _ in signals.values())]
-    part = shown(recording.t, ends, *drawn)
+    signals = {label: one for label, one in logged.items() if one is not None}
+    part = shown(recording.t, ends, recording.delta_r, *signals.values())
     t = drawn_times(recording, recording.t[part])
     figure = style.new_figure(0.5 + 1.05 * len(signals))
     panels = figure.subplots(len(signals), 1, sharex=True)
     panels[0].set_xlim(ends)
-    for axes, (label, (signal, scale)) in zip(panels, signals.items(), strict=True):
-        values = scale * signal[part]
+    for axes, (label, signal) in zip(panels, signals.items(), strict=True):
+        values = signal[part]
         axes.plot(t, values, color=style.BLUE, linewidth=0.9)
         axes.set_ylabel(label)
         span = float(np.ptp(values))

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -137,7 +136,6 @@ def comparison_figure(
     columns = list(dict.fromkeys(name for row in results.values() for name in row))
     figure = style.new_figure(2.9)
     axes = figure.subplots()
-    drawn: list[float] = []
     order: list[str] = []
     for number, (law, row) in enumerate(results.items()):
         if not row:
@@ -145,24 +143,38 @@ def comparison_figure(
         label = VARIANTS[law].title.replace("eta/lambda", "η/λ")
         color, marker = _MARKS[law]
         order += [label, f"{label} (paper)"]
-        shift = _OFFSET * (number - (len(results) - 1) / 2)
-        middle, low, high = np.array(list(row.values()), dtype=np.float64).T
-        middle = np.where(np.isfinite(middle), middle, np.nan)
-        whiskers = [np.where(np.isfinite(end), abs(middle - end), 0.0) for end in (low, high)]
-        at = [columns.index(name) + shift for name in row]
-        look: Mapping[str, Any] = {"color": color, "ms": 4.5, "elinewidth": 1.2, "capsize": 3.0}
-        axes.errorbar(at, middle, yerr=whiskers, fmt=marker, label=label, **look)
+        places = {name: k + _OFFSET * (number - 1) for k, name in enumerate(columns)}
+        middle, *ends = np.array(list(row.values()), dtype=np.float64).T
+        middle[~np.isfinite(middle)] = np.nan
+        whiskers = np.nan_to_num(np.abs(middle - ends), nan=0.0, posinf=0.0)
+        axes.errorbar(
+            [places[name] for name in row],
+            middle,
+            yerr=whiskers,
+            fmt=marker,
+            label=label,
+            color=color,
+            ms=4.5,
+            elinewidth=1.2,
+            capsize=3.0,
+        )
         printed = {name: value for name, value in paper.get(law, {}).items() if name in row}
         if printed:
-            at = [columns.index(name) + shift + 0.07 for name in printed]
-            look = {"ms": 5.0, "mfc": "white", "mec": color, "mew": 1.1}
-            axes.plot(at, list(printed.values()), marker, label=f"{label} (paper)", **look)
-        drawn += [*middle, *(middle - whiskers[0]), *(middle + whiskers[1]), *printed.values()]
-    positive = [value for value in drawn if value > 0.0]
-    if positive and max(positive) > _WIDE * min(positive):
-        axes.set(yscale="log", ylim=(min(positive) / 1.5, max(positive) * 1.5))
+            axes.plot(
+                [places[name] + 0.07 for name in printed],
+                list(printed.values()),
+                marker,
+                label=f"{label} (paper)",
+                ms=5.0,
+                mfc="white",
+                mec=color,
+                mew=1.1,
+            )
+    low, high = axes.dataLim.minposy, axes.dataLim.ymax
+    if high > _WIDE * low:
+        axes.set(yscale="log", ylim=(low / 1.5, 1.5 * high))
     else:
-        axes.set_ylim(0.0, 1.08 * max(positive, default=1.0))
+        axes.set_ylim(0.0, 1.08 * high if high > 0.0 else 1.0)
     axes.set_xticks(range(len(columns)), columns)
     axes.tick_params(axis="x", length=0.0)
     axes.grid(visible=False, axis="x")

@@ -63,7 +63,8 @@ def _draw(
     looks: Mapping[str, Mapping[str, Any]],
 ) -> None:
     """Draw the side slip of a recording, with the band of the first estimate."""
-    truth, ends, first = recording.logged_v_y, recording.t[[0, -1]], next(iter(given.values()))
+    truth, first = recording.logged_v_y, next(iter(given.values()))
+    ends = recording.t[0], recording.t[-1]
     part = shown(recording.t, ends, *(one.v_y for one in given.values()))
     t = drawn_times(recording, recording.t[part])
 
@@ -98,7 +99,9 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     v_y, band = drive.estimates["v_y"], SIGMAS * drive.estimates["v_y_sd"]
     figure = style.new_figure(3.6)
     panels = figure.subplots(2, 1, sharex=True)
-    for axes, scale, zero in zip(panels, (1.0, 1e3), (0.0, drive.v_y), strict=True):  # m/s, mm/s
+    for axes, scale, zero in zip(
+        panels, (1.0, 1e3), (np.zeros_like(v_y), drive.v_y), strict=True
+    ):  # m/s, mm/s
         for curve, look in (
             (drive.estimates["inertial_v_y"], _ALONE),
             (drive.v_y, style.TRUTH),

@@ -61,16 +61,15 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     learnt: Mapping[str, Any] = {**_CLOUD, "color": style.ORANGE, "label": "frozen weights"}
     figure, panels = style.axle_panels([3.2] if known is None else [3.2, 1.3], sharex="col")
     for axle, (axes, lowest) in enumerate(zip(panels[0], panels[-1], strict=True)):
+        x, y, truth = alpha[:, axle], frozen[:, axle], reference[:, axle]
         if known is not None:
             look = {**_CLOUD, "color": color, "label": label, "markersize": 3.0, "alpha": 0.35}
-            axes.plot(alpha[:, axle], style.drawable(reference[:, axle], limits), **look)
-            missed = np.clip(frozen[:, axle] - reference[:, axle], *limits)
+            axes.plot(x, style.drawable(truth, limits), **look)
             lowest.axhline(0.0, color=color, linewidth=0.6)
-            lowest.plot(alpha[:, axle], missed, **learnt)
-        axes.plot(alpha[:, axle], style.drawable(frozen[:, axle], limits), **learnt)
-        low, high = float(alpha[:, axle].min()), float(alpha[:, axle].max())
-        margin = 0.04 * (high - low) or 1.0
-        ends = np.array([low - margin, high + margin])
+            lowest.plot(x, np.clip(y - truth, *limits), **learnt)
+        axes.plot(x, style.drawable(y, limits), **learnt)
+        margin = 0.04 * float(np.ptp(x)) or 1.0
+        ends = np.array([x.min() - margin, x.max() + margin])
         axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **style.LINEAR)
         if model.known_slip is not None:
             _draw_curve(axes, model, axle, ends, unit.newtons)
@@ -147,19 +146,21 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
     unit = style.force_unit_of(drive.axle_force)
     alpha, force = np.rad2deg(axle_slip(drive)), drive.axle_force / unit.newtons
     reach = _REACH * float(np.abs(alpha).max())
-    shown = [np.abs(np.rad2deg(curve.alpha)) <= reach for curve in curves]
-    within = [c.force[part] / unit.newtons for c, part in zip(curves, shown, strict=True)]
-    steep = [f for c, f in zip(curves, within, strict=True) if not c.label.startswith("linear")]
-    low, high = style.force_range(force, *steep)
+    near = [
+        curve.force[np.abs(np.rad2deg(curve.alpha)) <= reach] / unit.newtons
+        for curve in curves
+        if not curve.label.startswith("linear")
+    ]
+    limits = style.force_range(force, *near)
     cloud = {**_CLOUD, "markersize": 3.0, "alpha": 0.6, "label": "this drive, true forces"}
     figure, panels = style.axle_panels([3.3])
     for axle, axes in enumerate(panels[0]):
         axes.plot(alpha[:, axle], force[:, axle], color=style.SKY, **cloud)
-        for curve, part, values in zip(curves, shown, within, strict=True):
-            drawn = style.drawable(values[:, axle], (low, high))
-            look = {**tire_look(curve.label), "label": curve.label}
-            axes.plot(np.rad2deg(curve.alpha[part]), drawn, **look)
-        axes.set(xlim=(-reach, reach), ylim=(low, high))
+        for curve in curves:
+            drawn = style.drawable(curve.force[:, axle] / unit.newtons, limits)
+            look = tire_look(curve.label)
+            axes.plot(np.rad2deg(curve.alpha), drawn, label=curve.label, **look)
+        axes.set(xlim=(-reach, reach), ylim=limits)
         _label_slip(axes, axle)
     style.label_forces(panels, unit, residual=False)
     return figure
