@@ -192,7 +192,7 @@ def test_a_car_that_would_spin_ends_the_drive_to_learn_on_before():
         (["--path", "nowhere"], "--path: there is no path 'nowhere'; iso-3888-1, iso-3888-2"),
         (["--path", "nowhere.csv"], "nowhere.csv"),
         (["--speed", "17"], "--speed 17 has no unit"),
-        (["--mu", "0"], "--mu must lie between 0.05 and 1.5, it is 0"),
+        (["--mu", "0"], "friction must lie between 0.05 and 1.5, it is 0"),
         (["--mu-drop", "500:0.5"], "--mu-drop 500 is beyond the path"),
         (["--delay", "15"], "--delay must be 0 to 100 ms in steps of 10 ms, it is 15"),
         (["--laps", "2"], "laps are of a closed path"),

@@ -87,7 +87,7 @@ def test_caution_is_a_share_and_zero_by_default():
 
     assert conditions_of(told()).caution == 0.0
     assert conditions_of(told("--caution", "0.5")).caution == 0.5
-    with pytest.raises(ValueError, match="--caution must lie between 0 and 1, it is 2"):
+    with pytest.raises(ValueError, match="caution must lie between 0 and 1, it is 2"):
         conditions_of(told("--caution", "2"))
 
 
