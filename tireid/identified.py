@@ -24,7 +24,6 @@ from identifier.reproducibility import (
     reproduce,
 )
 from identifier.run import History
-from identifier.setup import Block
 from identifier.tire_model import TireModel
 from identifier.verdict import Verdict, calibrated, judge, judge_prediction
 from models.recordings import Recording
@@ -201,7 +200,14 @@ class Results:
             write_csv(folder / f"forces{end}.csv", self._force_columns(run))
             progress(_WRITING * (k + 1) / len(self.runs))
         if _OBSERVED in learnt.outputs:
-            found = (_error_columns(learnt, one) for one in learnt.blocks())
+            found = (
+                {
+                    "t_s": learnt.recording.t[one.part],
+                    **axle_columns("xi_tilde_{}_Us", one.outputs[_OBSERVED]),
+                    **axle_columns("z_{}_Us2", one.before["z"]),
+                }
+                for one in learnt.blocks()
+            )
             write_long_csv(folder / "errors.csv", found)
         if learnt.online:
             write_long_csv(folder / "weights.csv", _weight_columns(learnt))
@@ -266,14 +272,6 @@ def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str
         for newtons, force in zip(astuple(error), astuple(size) if size else (0, 0), strict=True)
     )
     return front, rear
-
-
-def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
-    return {
-        "t_s": learnt.recording.t[block.part],
-        **axle_columns("xi_tilde_{}_Us", block.outputs[_OBSERVED]),
-        **axle_columns("z_{}_Us2", block.before["z"]),
-    }
 
 
 def _weight_columns(learnt: History) -> Iterator[dict[str, Array]]:

@@ -3,10 +3,10 @@
 Grip is that of the true tire in steady cornering on the friction of the start.
 """
 
-from collections.abc import Hashable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,6 +26,9 @@ BRAKING = 3.0  # on a closed course at friction 1 [m/s²]
 PERIOD = 0.01  # control period [s]
 
 PLANT = "double-track"
+
+
+_oracle: Callable[..., PredictionTire] = cache(oracle_tire)
 
 
 class SpeedWish(NamedTuple):
@@ -61,8 +64,7 @@ class Setup:
 
         mu : its friction; None is that of the start.
         """
-        tire = cast(Hashable, self._tire())
-        return _oracle(self.vehicle, tire, self.mu if mu is None else mu)
+        return _oracle(self.vehicle, self._tire(), self.mu if mu is None else mu)
 
     def _tire(self) -> Tire:
         return self.car(open_field=True).tire
@@ -126,8 +128,3 @@ class Setup:
     @property
     def _runs_along_x(self) -> bool:
         return not self.path.closed and bool(np.all(np.cos(self.path.psi) > 0.2))
-
-
-@cache
-def _oracle(vehicle: Vehicle, tire: Hashable, mu: float) -> PredictionTire:
-    return oracle_tire(vehicle, cast(Tire, tire), mu)

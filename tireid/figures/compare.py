@@ -1,9 +1,8 @@
 """Methods side by side: how far off online, frozen where learnt, and frozen elsewhere."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from codegen.escape import mathtext
@@ -49,7 +48,13 @@ def methods_figure(comparison: Comparison) -> Figure:
     axes.set(xscale="log", xlim=(low / 1.2, high * 1.2))
     style.few_ticks(axes.xaxis)
     for position, (label, errors) in enumerate(rows.items()):
-        _draw_row(axes, position, errors)
+        for kind, values in errors.items():
+            if values:
+                color, marker, shift = _KINDS[kind]
+                y, shown = position + shift, np.minimum(values, _FARTHEST * 1.1)
+                axes.hlines(y, shown.min(), shown.max(), color=color, linewidth=1.0, alpha=0.6)
+                mean = min(float(np.mean(values)), _FARTHEST * 1.1)
+                axes.plot(mean, y, marker, color=color, ms=4.5, clip_on=False, label=kind)
         if label in lost:
             axes.text(
                 0.995,
@@ -76,15 +81,3 @@ def _method_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
     online = [course.share(rec, error) for rec, error in sane.items()]
     frozen = zip((_OWN, _OTHER), same_and_other(trial.frozen or {}), strict=True)
     return {ONLINE: online} | {kind: [course.share(*one) for one in some] for kind, some in frozen}
-
-
-def _draw_row(axes: Axes, position: int, errors: Mapping[str, list[float]]) -> None:
-    for kind, values in errors.items():
-        if not values:
-            continue
-        color, marker, shift = _KINDS[kind]
-        shown = np.minimum(values, _FARTHEST * 1.1)
-        y = position + shift
-        axes.plot([shown.min(), shown.max()], [y, y], color=color, linewidth=1.0, alpha=0.6)
-        mean = min(float(np.mean(values)), _FARTHEST * 1.1)
-        axes.plot(mean, y, marker, color=color, ms=4.5, clip_on=False, label=kind)
