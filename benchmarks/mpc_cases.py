@@ -15,7 +15,7 @@ import numpy as np
 
 from identifier.tire_model import TireModel
 from tireid.cli import build_parser
-from tireid.commands.drive_case import conditions_of, frozen_tires
+from tireid.commands.drive import conditions_of, frozen_tires
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, run_drive
 
 TIRES = {"linear": LINEAR, "paper": FROZEN, "axle": FROZEN, "learning": LEARNING, "oracle": ORACLE}

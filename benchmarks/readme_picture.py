@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 
 from tireid.cli import main as tireid
-from tireid.commands.demo_parts import LANE_CHANGE, drive_story
+from tireid.commands.demo import LANE_CHANGE, drive_story
 from tireid.commands.demo_story import run_story
 
 FILM, CURVES = "drive.webp", "tires.webp"

@@ -124,10 +124,8 @@ def export(
         method, car = source, vehicle or sedan()
     parts = [word for word, on in (("mpc", mpc), ("fmu", fmu), ("onnx", onnx)) if on]
     lasts = {title: seconds for title, seconds, wanted in _PARTS if wanted in ("", *parts)}
-    with (
-        Progress("export", lasts, long=True) as progress,
-        output_folder(target, force=overwrite) as scratch,
-    ):
+    with output_folder(target, force=overwrite) as scratch:
+        progress = Progress("export", lasts, long=True)
         package = build_package(
             method, car, start, name=name, single=single, with_a_y=with_a_y, with_band=band
         )

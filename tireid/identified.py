@@ -1,7 +1,7 @@
 """What `tireid identify` found, and its files: numbers as JSON, curves as CSV, figures as PNG."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,8 @@ from identifier.reproducibility import (
     reproduce,
 )
 from identifier.run import History
-from identifier.setup import Block
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict
+from identifier.verdict import Verdict, calibrated, judge, judge_prediction
 from models.recordings import Recording
 from tireid import __version__
 from tireid.figures.forces import force_figure, inputs_figure, prediction_figure
@@ -34,6 +33,7 @@ from tireid.figures.paper import error_figure, weights_figure
 from tireid.figures.side_slip import side_slip_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import learnt_axles_figure, slip_figure
+from tireid.learning import with_v_y
 from tireid.output import (
     axle_columns,
     force_columns,
@@ -82,24 +82,33 @@ class Results:
         method: str,
         runs: Sequence[History],
         times: Sequence[float],
-        tire: TireModel,
-        verdict: Verdict,
-        asked: Mapping[str, Verdict],
+        others: Sequence[Recording],
         parts: Sequence[History] = (),
+        noted: Callable[[Verdict], Verdict] = lambda verdict: verdict,
     ) -> "Results":
-        """Return what the first run learnt.
+        """Return what the first run learnt, and what it is worth over it and over others.
 
-        times : of freezes, rising [s].   tire : that of the last.
+        times : of freezes, rising [s].   others : the recordings of the other runs, as read.
+        noted : adds to the verdict what others know of the log.
         """
-        learnt, others = runs[0], [*parts, *runs[1:]]
+        learnt, last = runs[0], times[-1]
+        verdict, model = noted(judge(learnt, last)), learnt.freeze(last)
+        asked = {one.name: judge_prediction(model, with_v_y(one, model)) for one in others}
         models = {freeze_key(t): learnt.freeze(t) for t in times[:-1]}
-        models[freeze_key(times[-1])] = tire
+        models[freeze_key(last)] = calibrated(learnt, last, verdict)
         frozen: dict[str, dict[str, Replay]] = {}
         for t, (key, model) in zip(times, models.items(), strict=True):
             frozen[key] = {learnt.recording.name: reproduce(learnt, t)}
-            frozen[key] |= {run.recording.name: replay(model, run) for run in others}
-        found: Any = {"models": models, "frozen": frozen, "verdict": verdict, "asked": asked}
-        return cls(method=method, runs=runs, parts=parts, **found)
+            frozen[key] |= {run.recording.name: replay(model, run) for run in (*parts, *runs[1:])}
+        return cls(
+            method=method,
+            runs=runs,
+            models=models,
+            frozen=frozen,
+            verdict=verdict,
+            asked=asked,
+            parts=parts,
+        )
 
     @property
     def model(self) -> TireModel:
@@ -191,7 +200,14 @@ class Results:
             write_csv(folder / f"forces{end}.csv", self._force_columns(run))
             progress(_WRITING * (k + 1) / len(self.runs))
         if _OBSERVED in learnt.outputs:
-            found = (_error_columns(learnt, one) for one in learnt.blocks())
+            found = (
+                {
+                    "t_s": learnt.recording.t[one.part],
+                    **axle_columns("xi_tilde_{}_Us", one.outputs[_OBSERVED]),
+                    **axle_columns("z_{}_Us2", one.before["z"]),
+                }
+                for one in learnt.blocks()
+            )
             write_long_csv(folder / "errors.csv", found)
         if learnt.online:
             write_long_csv(folder / "weights.csv", _weight_columns(learnt))
@@ -256,14 +272,6 @@ def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str
         for newtons, force in zip(astuple(error), astuple(size) if size else (0, 0), strict=True)
     )
     return front, rear
-
-
-def _error_columns(learnt: History, block: Block) -> dict[str, Array]:
-    return {
-        "t_s": learnt.recording.t[block.part],
-        **axle_columns("xi_tilde_{}_Us", block.outputs[_OBSERVED]),
-        **axle_columns("z_{}_Us2", block.before["z"]),
-    }
 
 
 def _weight_columns(learnt: History) -> Iterator[dict[str, Array]]:

@@ -170,28 +170,19 @@ def _read_marker(folder: Path) -> _Written | None:
 
 
 def foreign(folder: Path) -> str | None:
-    """Return the first thing below a folder that is not as a run of tireid wrote it, or None."""
-    written = _read_marker(folder) or _Written({}, frozenset())
-
-    def first(inside: Path) -> str | None:
-        with os.scandir(inside) as found:
-            entries = sorted(found, key=lambda entry: entry.name)
-        for entry in entries:
-            path = Path(entry.path)
-            name = path.relative_to(folder).as_posix()
-            if entry.is_symlink():
-                return name
-            if entry.is_dir():
-                strange = first(path) if name in written.folders else name
-            elif name == MARKER:
-                strange = name if _read_marker(folder) is None else None
-            else:
-                strange = None if _is_as_written(path, written.files.get(name)) else name
-            if strange is not None:
-                return strange
-        return None
-
-    return first(folder)
+    """Return a thing below a folder that is not as a run of tireid wrote it, or None."""
+    marked = _read_marker(folder)
+    written = marked or _Written({}, frozenset())
+    for path in folder.rglob("*"):
+        name = path.relative_to(folder).as_posix()
+        ours = _is_as_written(path, written.files.get(name))
+        if path.is_dir():
+            ours = name in written.folders
+        elif name == MARKER:
+            ours = marked is not None
+        if path.is_symlink() or not ours:
+            return name
+    return None
 
 
 def _is_as_written(path: Path, written: tuple[int, str] | None) -> bool:

@@ -5,6 +5,7 @@ on, by its own anchor. Styles are inline, without scripts or links to other file
 mailed, archived and printed.
 """
 
+import math
 import re
 from base64 import b64encode
 from collections.abc import Sequence
@@ -119,21 +120,14 @@ class Picture:
         object.__setattr__(self, "image", data)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Subheading:
-    """A heading inside a section."""
-
-    text: str
-
-
-Block = Paragraph | Table | Picture | Subheading
+Block = Paragraph | Table | Picture
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
     """A part of a report under one heading.
 
-    blocks : paragraphs, tables, pictures and smaller headings in order.
+    blocks : paragraphs, tables and pictures in order.
     folded : whether only the heading is seen until a reader opens it.
     """
 
@@ -174,8 +168,7 @@ def report_html(report: Report) -> str:
             return _table(block, next(tables))
         if isinstance(block, Picture):
             return _picture(block, next(figures))
-        tag = "h3" if isinstance(block, Subheading) else "p"
-        return f"<{tag}>{_inline(block.text)}</{tag}>"
+        return f"<p>{_inline(block.text)}</p>"
 
     lead = [written(block) for block in report.lead]
     entries, parts = [], []
@@ -296,23 +289,19 @@ def _of(cell: Cell) -> Marked:
 
 def _is_number(cell: Cell) -> bool:
     """Return whether a cell is a number or a text that begins with one: "0.43 (0.41 to 0.45)"."""
-    cell = cell.text if isinstance(cell, Marked) else cell
-    if not isinstance(cell, str):
-        return cell is not None
-    first = cell.split(" ", 1)[0].replace("\N{MINUS SIGN}", "-")
+    first = _text(cell).split(" ", 1)[0].replace("\N{MINUS SIGN}", "-")
     try:
         float(first)
     except ValueError:
-        return False
+        return isinstance(cell, float)  # one that is not finite
     return True
 
 
 def _text(cell: Cell) -> str:
-    if cell is None:
-        return "\N{EN DASH}"
-    if isinstance(cell, str | Marked):
-        return cell if isinstance(cell, str) else cell.text
-    if isinstance(cell, int):
+    if isinstance(cell, Marked):
+        return cell.text
+    if isinstance(cell, str | int):
         return str(cell)
-    finite = abs(cell) < float("inf")
-    return f"{cell:.4g}".replace("-", "\N{MINUS SIGN}") if finite else "\N{EN DASH}"
+    if cell is None or not math.isfinite(cell):
+        return "\N{EN DASH}"
+    return f"{cell:.4g}".replace("-", "\N{MINUS SIGN}")

@@ -144,6 +144,17 @@ def verdict_warnings(verdict: Verdict, prefix: str = "") -> list[str | Marked]:
     ]
 
 
+def verdicts_warnings(verdicts: Mapping[str, Verdict], prefix: str) -> list[str | Marked]:
+    """Return the findings of verdicts on several drives, each behind the name of the drive.
+
+    prefix : in which {} stands for the name.
+    """
+    said: list[str | Marked] = []
+    for name, verdict in verdicts.items():
+        said += verdict_warnings(verdict, prefix.format(name))
+    return said
+
+
 def verdict_section(verdict: Verdict) -> Section:
     """Return the section of a report that holds a verdict; its findings are the warnings above."""
     rows: list[list[Cell]] = [

@@ -15,7 +15,6 @@ Name = tuple[str, str]  # module, name in it
 
 # Formulas that a benchmark checks against another road; no number of a user comes from them.
 CHECKED = {
-    ("tireid.commands.demo_parts", "drive_story"),  # `demo` calls it by its module
     ("models.recordings.reader", "runs"),  # of the library, for a user's own loop over them
 }
 

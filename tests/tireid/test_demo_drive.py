@@ -9,8 +9,8 @@ import pytest
 from codegen import find_compiler
 from models.vehicle import sedan
 from mpc.tires.tire import curves_at
-from tireid.commands import demo_parts as demo_drive
-from tireid.commands.demo_parts import NOT_DRIVEN, drive_section, drive_story, drive_text
+from tireid.commands import demo as demo_drive
+from tireid.commands.demo import NOT_DRIVEN, drive_section, drive_story, drive_text
 from tireid.commands.demo_story import run_story
 from tireid.driving import results as drive_results
 from tireid.driving.results import Drives

@@ -6,8 +6,8 @@ import pytest
 
 from codegen import find_compiler
 from tireid import exporting
-from tireid.commands import demo_parts as demo_package
-from tireid.commands.demo_parts import NOT_BUILT, package_section, ship, shipped_text
+from tireid.commands import demo as demo_package
+from tireid.commands.demo import NOT_BUILT, package_section, ship, shipped_text
 from tireid.commands.demo_story import run_story
 from tireid.exporting import SelfTestError
 

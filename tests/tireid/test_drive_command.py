@@ -21,7 +21,6 @@ from tests.tireid.conftest import refusal
 from tireid.cli import main
 from tireid.driving import learn as drive_learn
 from tireid.driving import runs as drive_runs
-from tireid.driving.chosen import CHOSEN as DRIVING_CHOSEN
 from tireid.figures import film
 from tireid.learning import identify
 
@@ -44,8 +43,8 @@ def result(bend, tmp_path_factory):
     out = tmp_path_factory.mktemp("result") / "out"
     words = ["drive", "--path", str(bend), "--tires", "frozen", "linear", "--out", str(out)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drive_learn, "CHOSEN", drive_learn.CHOSEN._replace(duration=15.0))
-        patch.setattr(drive_learn, "CHOSEN", drive_learn.CHOSEN._replace(grows=10.0))
+        patch.setattr(drive_learn, "DURATION", 15.0)
+        patch.setattr(drive_learn, "_GROWS", 10.0)
         patch.setattr(film, "MOST", 20)
         assert main(words) == 0
     return out
@@ -165,7 +164,7 @@ def test_the_drive_to_learn_on_slides_but_neither_spins_nor_tips():
     recording = drive_learn.learning_drive(
         car, CarSensors(), np.random.default_rng(0), grip=grip, seed=3
     )
-    assert recording.duration == pytest.approx(DRIVING_CHOSEN.duration, abs=0.02)
+    assert recording.duration == pytest.approx(drive_learn.DURATION, abs=0.02)
     slip = np.abs(recording.alpha(car.vehicle.l_f, car.vehicle.l_r)).max(axis=0)
     assert (slip > np.radians(3.5)).all()
     assert np.abs(recording.a_y).max() > 0.9 * grip
@@ -183,7 +182,7 @@ def test_a_car_that_would_spin_ends_the_drive_to_learn_on_before():
     recording = drive_learn.learning_drive(
         plant, CarSensors(), np.random.default_rng(0), grip=8.0, seed=0
     )
-    assert recording.duration < DRIVING_CHOSEN.duration - 1.0
+    assert recording.duration < drive_learn.DURATION - 1.0
     assert np.abs(np.arctan2(recording.v_y, recording.v_x)).max() < np.radians(15.0)
 
 
@@ -193,11 +192,11 @@ def test_a_car_that_would_spin_ends_the_drive_to_learn_on_before():
         (["--path", "nowhere"], "--path: there is no path 'nowhere'; iso-3888-1, iso-3888-2"),
         (["--path", "nowhere.csv"], "nowhere.csv"),
         (["--speed", "17"], "--speed 17 has no unit"),
-        (["--mu", "0"], "--mu must lie between 0.05 and 1.5, it is 0"),
+        (["--mu", "0"], "friction must lie between 0.05 and 1.5, it is 0"),
         (["--mu-drop", "500:0.5"], "--mu-drop 500 is beyond the path"),
         (["--delay", "15"], "--delay must be 0 to 100 ms in steps of 10 ms, it is 15"),
-        (["--laps", "2"], "--laps is for a closed path"),
-        (["--laps", "nan"], "--laps must be positive"),
+        (["--laps", "2"], "laps are of a closed path"),
+        (["--laps", "nan"], "laps must be positive"),
         (["--seed", "-1"], "--seed must not be negative"),
         (["--weights", "nowhere.json"], "nowhere.json"),
         (["--weights", "a.json", "--paper"], "give only one of --weights, --paper"),
@@ -215,7 +214,7 @@ def test_without_a_compiler_it_says_so_before_it_learns(bend, tmp_path, capsys, 
         raise AssertionError("it has begun to learn")
 
     monkeypatch.setattr(drive_runs, "find_compiler", lambda: None)
-    monkeypatch.setattr("tireid.commands.drive_case.learning_drive", learns)
+    monkeypatch.setattr("tireid.commands.drive.learning_drive", learns)
     words = ["drive", "--path", bend, "--out", tmp_path / "out"]
     assert "no C compiler found: the tracker cannot be built" in refusal(capsys, words)
     assert list(tmp_path.iterdir()) == []

@@ -259,20 +259,6 @@ def test_a_broken_sensor_is_shaded_and_where_it_was_noticed_is_marked():
     assert "v_y biased" not in [text.get_text() for text in labels.get_texts()]
 
 
-def test_below_the_tires_stands_what_each_curve_misses_of_the_true_one_of_its_road():
-    frozen, _, oracle = CURVES
-    worn = replace(frozen, label="learning at the end", force=0.4 * frozen.force)
-    truth = replace(oracle, force=0.9 * oracle.force)
-    halved = replace(oracle, label="oracle at the end", force=0.5 * oracle.force)
-    figure = drive_tires_figure(ON_LANE["frozen"], [frozen, worn, truth, halved])
-    for axle, axes in enumerate(figure.axes[2:]):
-        drawn = [np.column_stack(line.get_data()) for line in axes.lines]
-        missed = frozen.force - truth.force, worn.force - halved.force
-        for line, expected in zip(drawn, missed, strict=True):
-            part = np.isin(np.rad2deg(ALPHA), line[:, 0])
-            np.testing.assert_allclose(1e3 * line[:, 1], expected[part, axle], atol=1e-9)
-
-
 def curves(axes):
     """Drawn data by label."""
     return {line.get_label(): np.column_stack(line.get_data()) for line in axes.get_lines()}

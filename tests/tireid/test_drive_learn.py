@@ -36,10 +36,10 @@ def measure(state, rng):
     return Measured(*(values.get(name, 0.0) for name in Measured._fields))
 
 
-def learnt_on(car, progress=None):
+def learnt_on(car):
     sensors = SimpleNamespace(measure=measure)
     rng = np.random.default_rng(1)
-    return learning_drive(car, sensors, rng, grip=GRIP, seed=4, progress=progress)
+    return learning_drive(car, sensors, rng, grip=GRIP, seed=4)
 
 
 def test_steering_grows_to_the_bend_at_the_limit_plus_slip_and_swings_within_its_frequency():
@@ -62,9 +62,3 @@ def test_half_a_second_before_a_spin_or_a_tip_is_not_learnt_from():
     for trouble in ({"spins_at": 12.0}, {"tips_at": 12.0}):
         recording = learnt_on(Recorder(**trouble))
         assert recording.t[-1] == pytest.approx(11.5, abs=0.03)
-
-
-def test_progress_ends_at_one():
-    told = []
-    learnt_on(Recorder(), told.append)
-    assert told[-1] == 1.0 and np.all(np.diff(told) > 0.0)

@@ -8,7 +8,7 @@ import pytest
 
 from models.faults import SensorFault
 from tireid.cli import build_parser
-from tireid.commands.drive_case import _parse_drop, _parse_speed, conditions_of, parse_fault
+from tireid.commands.drive import _parse_drop, _parse_speed, conditions_of, parse_fault
 from tireid.driving.runs import _BacksOff
 from tireid.driving.setup import SpeedWish
 
@@ -87,7 +87,7 @@ def test_caution_is_a_share_and_zero_by_default():
 
     assert conditions_of(told()).caution == 0.0
     assert conditions_of(told("--caution", "0.5")).caution == 0.5
-    with pytest.raises(ValueError, match="--caution must lie between 0 and 1, it is 2"):
+    with pytest.raises(ValueError, match="caution must lie between 0 and 1, it is 2"):
         conditions_of(told("--caution", "2"))
 
 

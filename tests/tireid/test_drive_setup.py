@@ -5,7 +5,7 @@ import pytest
 
 from models.vehicle import sedan
 from mpc.path import Path
-from tireid.commands.drive_case import parse_fault
+from tireid.commands.drive import parse_fault
 from tireid.driving.results import headline
 from tireid.driving.runs import Conditions
 from tireid.driving.setup import Setup, SpeedWish

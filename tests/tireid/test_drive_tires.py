@@ -10,12 +10,14 @@ from identifier.paper.network import Network, NetworkModel, Weights
 from models.vehicle import sedan
 from mpc.path import Path
 from mpc.tires import prediction_tire
-from tireid.driving.results import _known_curves, steady_curve
+from mpc.tires.tire import curves_at
+from tireid.driving.results import _known_curves
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.figures.drive import AT_THE_END
 
 CAR = sedan()
+ALPHA = np.linspace(-0.35, 0.35, 281)
 X = np.linspace(0.0, 120.0, 81)
 LANE = Path.from_waypoints(X, 2.0 * np.tanh((X - 40.0) / 6.0), name="lane")
 
@@ -32,10 +34,10 @@ def setup():
 
 
 def test_the_linear_tire_is_a_line_of_its_stiffness():
-    curve = steady_curve("linear", prediction_tire(CAR), 16.0)
+    force = curves_at(prediction_tire(CAR), ALPHA, 16.0).T
     slope = [CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear]
-    small = np.abs(curve.alpha) < 0.02
-    np.testing.assert_allclose(curve.force[small], curve.alpha[small, None] * slope, rtol=1e-6)
+    small = np.abs(ALPHA) < 0.02
+    np.testing.assert_allclose(force[small], ALPHA[small, None] * slope, rtol=1e-6)
 
 
 def test_the_true_tire_is_shown_on_the_first_and_on_the_last_friction(setup):
@@ -66,9 +68,9 @@ def test_a_network_is_shown_sliding_sideways_as_fast_as_the_slip_says(v_x):
         force_unit=1500.0,
         min_speed=1.0,
     )
-    curve = steady_curve("network", prediction_tire(model), v_x)
-    v_y = -v_x * np.tan(curve.alpha)
+    v_y = -v_x * np.tan(ALPHA)
     slope = np.array([CAR.cornering_stiffness_front, CAR.cornering_stiffness_rear])
     learnt = 1500.0 * W @ np.tanh(V * v_y / 4.0)
-    expected = curve.alpha[:, None] * slope + learnt.T
-    np.testing.assert_allclose(curve.force, expected, rtol=1e-6, atol=1e-3)
+    expected = ALPHA[:, None] * slope + learnt.T
+    force = curves_at(prediction_tire(model), ALPHA, v_x).T
+    np.testing.assert_allclose(force, expected, rtol=1e-6, atol=1e-3)

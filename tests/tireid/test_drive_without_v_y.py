@@ -10,7 +10,7 @@ from tests.pages import faults_of, outline
 from tests.tireid.conftest import refusal
 from tests.tireid.test_drive_command import bend, summary_of  # noqa: F401
 from tireid.cli import main
-from tireid.commands.drive_case import parse_fault
+from tireid.commands.drive import parse_fault
 from tireid.driving import learn as drive_learn
 
 TOLD = ("v_y_estimated_m_s", "v_y_estimated_sd_m_s", "side_slip_observable", "a_y_level_m_s2")
@@ -22,8 +22,8 @@ def result(bend, tmp_path_factory):  # noqa: F811
     out = tmp_path_factory.mktemp("imu") / "out"
     words = ["drive", "--sensors", "imu", "--path", str(bend), "--tires", "learning", "linear"]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drive_learn, "CHOSEN", drive_learn.CHOSEN._replace(duration=20.0))
-        patch.setattr(drive_learn, "CHOSEN", drive_learn.CHOSEN._replace(grows=15.0))
+        patch.setattr(drive_learn, "DURATION", 20.0)
+        patch.setattr(drive_learn, "_GROWS", 15.0)
         assert main([*words, "--film", "none", "--out", str(out)]) == 0
     return out
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 import pytest
-from matplotlib import font_manager
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator
 from matplotlib.transforms import Bbox
@@ -26,11 +25,9 @@ from tireid.figures.forces import (
     force_figure,
     inputs_figure,
     prediction_figure,
-    side_by_side_figure,
 )
 from tireid.figures.paper import comparison_figure, error_figure, weights_figure
 from tireid.figures.style import (
-    _with_own_fonts,
     figure_png,
     force_unit_of,
     save_figures,
@@ -338,23 +335,6 @@ def test_a_comparison_draws_medians_with_quartiles_on_their_own_sides() -> None:
     assert spans == [pytest.approx((0.2, 1.1)), pytest.approx((0.1, 0.6))]
 
 
-@pytest.mark.parametrize("scale", [5000.0, 5.0])
-def test_models_side_by_side_are_drawn_in_the_unit_of_the_axis_with_what_they_miss(scale) -> None:
-    history = made_up(scale)
-    truth = history.recording.axle_force
-    assert truth is not None
-    near = replace(replayed(history), axle_force=0.9 * truth)
-    figure = side_by_side_figure({"near": near})
-    newtons = 1000.0 if scale > 100.0 else 1.0
-    assert f"[{'kN' if newtons > 1.0 else 'N'}]" in figure.axes[0].get_ylabel()
-    for axle in (0, 1):
-        upper, lower = figure.axes[axle], figure.axes[2 + axle]
-        drawn = {line.get_label(): np.asarray(line.get_ydata()) for line in upper.get_lines()}
-        assert drawn["near"] == pytest.approx(0.9 * truth[:, axle] / newtons)
-        _, missed = lower.get_lines()
-        assert np.asarray(missed.get_ydata()) == pytest.approx(-0.1 * truth[:, axle] / newtons)
-
-
 @pytest.mark.parametrize("truth", [True, False])
 def test_below_the_forces_stands_what_is_missed_of_them(truth: bool) -> None:
     history = made_up(truth=truth)
@@ -398,23 +378,6 @@ def test_times_of_a_clock_that_began_long_ago_fit_their_titles_and_axes() -> Non
     assert figure.axes[-1].get_xlabel() == "time since 1700000000 s [s]"
     shown = [text.get_text() for text in figure.axes[-1].get_xticklabels()]
     assert {"20", "22"} <= {one.split(".")[0] for one in shown}
-
-
-def test_fonts_of_matplotlib_are_found_where_the_list_of_the_machine_lacks_them(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    fonts = font_manager.fontManager
-    system = [entry for entry in fonts.ttflist if "mpl-data" not in entry.fname]
-    monkeypatch.setattr(fonts, "ttflist", system)
-    for name in ("DejaVu Sans Display", "STIXGeneral", "cmr10"):
-        with pytest.raises(ValueError, match=name):
-            fonts.findfont(name, fallback_to_default=False)
-    _with_own_fonts()
-    for name in ("DejaVu Sans Display", "STIXGeneral", "cmr10"):
-        assert Path(fonts.findfont(name, fallback_to_default=False)).is_file()
-    listed = len(fonts.ttflist)
-    _with_own_fonts()
-    assert len(fonts.ttflist) == listed
 
 
 def test_a_tire_is_no_recording_to_plot():

@@ -36,7 +36,7 @@ def test_no_peak_is_lost_and_few_points_are_drawn(signal, rng):
     spikes = rng.choice(N, 20, replace=False)
     signal[spikes] = rng.choice([-1.0, 1.0], 20) * rng.uniform(8.0, 9.0, 20)
     other = np.column_stack([signal[::-1], np.zeros(N)])
-    part = shown(t, (t[0], t[-1]), signal.__getitem__, other.__getitem__)
+    part = shown(t, (t[0], t[-1]), signal, other)
     assert len(part) < 8 * thinned.COLUMNS
     assert (np.diff(part) > 0).all()
     assert (part[0], part[-1]) == (0, N - 1)
@@ -48,7 +48,7 @@ def test_no_peak_is_lost_and_few_points_are_drawn(signal, rng):
 
 def test_a_window_of_a_long_recording_is_drawn_within_its_ends(signal):
     t = 0.01 * np.arange(N)
-    few, many = (shown(t, (10.0, end), signal.__getitem__) for end in (20.0, 3010.0))
+    few, many = (shown(t, (10.0, end), signal) for end in (20.0, 3010.0))
     np.testing.assert_array_equal(few, np.arange(1000, 2001))
     assert (many[0], many[-1]) == (1000, 301_000)
 
@@ -78,7 +78,7 @@ def test_a_cloud_shows_what_is_outermost(rng):
     slip = 0.1 * rng.standard_normal((N, 2))
     force = np.tanh(10.0 * slip) + 0.01 * rng.standard_normal((N, 2))
     moving = np.arange(N) > 1000
-    part = cloud(0.01 * np.arange(N), slip.__getitem__, force.__getitem__)
+    part = cloud(0.01 * np.arange(N), slip, force)
     part = part[moving[part]]
     assert len(part) < N / 5
     assert part.min() > 1000

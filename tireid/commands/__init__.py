@@ -1,13 +1,14 @@
 """The commands of tireid, in the order in which a person meets them.
 
-Each lies in a module of its name, `tireid.commands.NAME` with `add_parser` and `run`, which is
-imported when the command is named: the list alone costs nothing. An installed distribution adds
-commands by entry points of the group `tireid.commands`: a name and such a module, whose docstring
-begins with one line of help. Fleets come in that way, too.
+Each lies in a module of its name, `tireid.commands.NAME`, which is imported when the command is
+named: the list alone costs nothing. There `declare` makes its parser, and `run` runs it. An
+installed distribution adds commands by entry points of the group `tireid.commands`: a name and a
+module with `add_parser`, whose docstring begins with one line of help. Fleets come in that way.
 """
 
 import ast
 from collections.abc import Mapping
+from functools import partial
 from importlib import import_module
 from importlib.abc import InspectLoader
 from importlib.machinery import ModuleSpec
@@ -71,7 +72,9 @@ def add_command(name: str, commands: Any) -> None:
         Where a distribution's command cannot be imported.
     """
     if name in COMMANDS:
-        import_module(f"tireid.commands.{name}").add_parser(commands)
+        module = import_module(f"tireid.commands.{name}")
+        module.declare(partial(commands.add_parser, name, help=COMMANDS[name]))
+        commands.choices[name].set_defaults(run=module.run)
         return
     point = installed(GROUP)[name]
     try:

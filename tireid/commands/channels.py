@@ -20,7 +20,7 @@ from models.recordings import LogMap, choice, split_log_argument
 from models.recordings.assembly import wheel_scales, wheel_units
 from models.recordings.map import CUT
 from models.recordings.wheels import scale_text, wheel_factor, with_scales
-from tireid.commands import COMMANDS, DONE, FAILS
+from tireid.commands import DONE, FAILS
 from tireid.commands.options import add_force, add_log_map, given_map, require_toml
 from tireid.output import require_free, text_table
 from tireid.progress import say, tell
@@ -31,10 +31,8 @@ _LONGEST_NAME = 48  # letters of a channel in the table
 _NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "channels",
-        help=COMMANDS["channels"],
+def declare(new: Any) -> None:
+    parser = new(
         description="List the channels of LOG with unit, rate, samples and range, and what each "
         "probably is; say what is missing. --write FILE writes the log.toml by which every command "
         "reads such logs (--log FILE). Exit code 1 where something is missing or not sure.",
@@ -43,7 +41,6 @@ def add_parser(commands: Any) -> None:
     add_log_map(parser)
     parser.add_argument("--write", type=Path, metavar="FILE", help="write the map, .toml")
     add_force(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:

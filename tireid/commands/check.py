@@ -20,7 +20,7 @@ from identifier.stability.certificate import judged_loop
 from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import proven_bounds
 from models.vehicle import Vehicle
-from tireid.commands import COMMANDS, DONE, FAILS
+from tireid.commands import DONE, FAILS
 from tireid.commands import options as shared
 from tireid.commands.certificate_table import certificate_text, method_text, unit_text
 from tireid.commands.demo_story import drive_to_learn
@@ -53,27 +53,22 @@ def draw_check(
     )
 
 
-_CONDITIONS = {"v_x": "speed"} | {  # field of the declared driving, and the option of it
-    name: name
-    for name in (
-        "slip",
-        "friction",
-        "bandwidth",
-        "noise_v_x",
-        "noise_v_y",
-        "noise_r",
-        "noise_delta",
-    )
+_CONDITIONS = {  # by field of the declared driving: its option, and what that says
+    "bandwidth": ("--bandwidth HZ", f"of the steering ({BANDWIDTH:g} Hz)"),
+    "v_x": ("--speed M/S", "(4 sqrt(g wheelbase))"),
+    "slip": ("--slip RAD", "largest (twice sliding)"),
+    "friction": ("--friction MU", "of the road (1)"),
+    "noise_v_x": ("--noise-v-x M/S", "largest error of v-x"),
+    "noise_v_y": ("--noise-v-y M/S", "largest error of v-y"),
+    "noise_r": ("--noise-r RAD/S", "largest error of r"),
+    "noise_delta": ("--noise-delta RAD", "largest error of delta"),
 }
 _OF_ALL = ("v_x", "friction")  # conditions of which not gains alone are judged
-_OF_GAINS = tuple(option for field, option in _CONDITIONS.items() if field not in _OF_ALL)
 _TEXT, _NUMBERS, _DESIGN = "certificate.txt", "certificate.json", "design.toml"
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "check",
-        help=COMMANDS["check"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Certify an identifier; with no option the axle identifier, the default in "
         "a car: limits, curve, jumps, the time to follow a drop of friction. Gains of the paper's "
         "laws (--paper, --method NAME, --design FILE) are judged at the worst regressor: poles, "
@@ -82,20 +77,9 @@ def add_parser(commands: Any) -> None:
     )
     shared.add_vehicle(parser)
     shared.add_method(parser, LIVE)
-    numbers = {
-        "--bandwidth HZ": f"of the steering ({BANDWIDTH:g} Hz)",
-        "--speed M/S": "(4 sqrt(g wheelbase))",
-        "--slip RAD": "largest (twice sliding)",
-        "--friction MU": "of the road (1)",
-        "--noise-v-x M/S": "largest error of v-x",
-        "--noise-v-y M/S": "largest error of v-y",
-        "--noise-r RAD/S": "largest error of r",
-        "--noise-delta RAD": "largest error of delta",
-    }
-    shared.add_options(parser, float, numbers)
+    shared.add_options(parser, float, dict(_CONDITIONS.values()))
     shared.add_options(parser, bool, {"--json": "print the certificate as JSON"})
     shared.add_output(parser, None)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -104,10 +88,15 @@ def run(options: argparse.Namespace) -> int:
     vehicle = shared.read_vehicle(options)
     name, method = shared.chosen_method(options, vehicle, online=True)
     paper = method if isinstance(method, PaperIdentifier) else None
-    if paper is None:
-        _refuse_gains(options, name)
+    given = _overrides(options)
+    for field in given if paper is None else ():
+        if field not in _OF_ALL:
+            raise ValueError(
+                f"{_option(field)} is for the gains of the paper's laws, which {name} has not: "
+                f"add --paper, --method {'|'.join(VARIANTS)} or --design FILE"
+            )
     declared = None if paper is None else paper.driving
-    driving = replace(declared or natural_driving(vehicle), **_overrides(options))
+    driving = replace(declared or natural_driving(vehicle), **given)
     if paper is not None and options.design is None:
         method = paper = replace(paper, driving=driving)
     certificate = certify(method, vehicle, driving)
@@ -141,35 +130,29 @@ def run(options: argparse.Namespace) -> int:
     return FAILS if certificate.verdict == "fail" else DONE
 
 
-def _refuse_gains(options: argparse.Namespace, name: str) -> None:
-    for option in _OF_GAINS:
-        if getattr(options, option) is not None:
-            raise ValueError(
-                f"--{option.replace('_', '-')} is for the gains of the paper's laws, which "
-                f"{name} has not: add --paper, --method {'|'.join(VARIANTS)} or --design FILE"
-            )
+def _option(field: str) -> str:
+    return _CONDITIONS[field][0].split()[0]
+
+
+def _overrides(options: argparse.Namespace) -> dict[str, float]:
+    """Return the given conditions by their field."""
+    given = {f: getattr(options, _option(f)[2:].replace("-", "_")) for f in _CONDITIONS}
+    return {field: value for field, value in given.items() if value is not None}
 
 
 def _require_sense(options: argparse.Namespace) -> None:
     shared.method_is_given(options)
-    for name in _CONDITIONS.values():
-        value, noise = getattr(options, name), name.startswith("noise")
-        if value is not None and not (0.0 < value < math.inf or (noise and value == 0.0)):
+    for field, value in _overrides(options).items():
+        noise = field.startswith("noise")
+        if not (0.0 < value < math.inf or (noise and value == 0.0)):
             rule = "not be negative" if noise else "be positive"
-            raise ValueError(f"--{name.replace('_', '-')} must {rule}, it is {value:g}")
+            raise ValueError(f"{_option(field)} must {rule}, it is {value:g}")
     if options.slip is not None and options.slip > 1.0:
         raise ValueError(f"--slip must be in rad and below 1, it is {options.slip:g}")
 
 
-def _overrides(options: argparse.Namespace) -> dict[str, float]:
-    given = {field: getattr(options, option) for field, option in _CONDITIONS.items()}
-    return {field: value for field, value in given.items() if value is not None}
-
-
 def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving) -> str:
-    changed = ", ".join(
-        f"--{_CONDITIONS[field].replace('_', '-')}" for field in _overrides(options)
-    )
+    changed = ", ".join(map(_option, _overrides(options)))
     stored = options.design is not None and design.driving is not None
     origin = "none stored in the design, those of the car" if options.design else "of the car"
     said = f"conditions: {'as stored in the design' if stored else origin}"

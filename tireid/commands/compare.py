@@ -11,7 +11,7 @@ from identifier.methods import DEFAULT, INSTALL, RIVALS, methods, require_method
 from identifier.run import History
 from identifier.verdict import Verdict, judge
 from models.recordings import RecordingError
-from tireid.commands import COMMANDS, DONE
+from tireid.commands import DONE
 from tireid.commands import compare_results as results
 from tireid.commands import options as shared
 from tireid.commands.demo_story import plant_recordings
@@ -22,10 +22,8 @@ from tireid.verdicts import verdicts_text
 _FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "compare",
-        help=COMMANDS["compare"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Identify on each recording, freeze at its end and replay on all of them, "
         "with every method; write report.html, compare.json, compare.csv, tables.txt and "
         "figures. Methods that estimate lateral velocity are judged on side slip too. Where a "
@@ -46,7 +44,6 @@ def add_parser(commands: Any) -> None:
     shared.add_log_reading(parser)
     shared.add_accept(parser)
     shared.add_output(parser, "compare")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -62,12 +59,9 @@ def run(options: argparse.Namespace) -> int:
     watch = Stopwatch()
     vehicle = shared.read_vehicle(options)
     parts = {"methods": 9.0, "step times, tables and figures": 1.0}
-    with (
-        output_folder(options.out, force=options.force) as folder,
-        Progress("compare", parts, long=True) as work,
-    ):
-        log_map, check = shared.given_map(options), not options.no_check
-        recordings = [shared.read_log(log, vehicle, log_map, check=check) for log in options.logs]
+    with output_folder(options.out, force=options.force) as folder:
+        work = Progress("compare", parts, long=True)
+        recordings = [shared.read_log(log, vehicle, options) for log in options.logs]
         if not recordings:
             say(f"driving the plant of {vehicle.name} with noisy sensors")
             recordings = [*plant_recordings(vehicle, np.random.default_rng(seed))]

@@ -12,7 +12,8 @@ Errors are {"front", "rear"} in N; null stands for what diverged or is not there
 
 import csv
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict
+from dataclasses import astuple
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from codegen.writing import naming, write_file
-from identifier.compare.course import Trial, same_and_other
+from identifier.compare.course import INFINITE, same_and_other
 from identifier.compare.study import Comparison, ranking
 from identifier.frozen import vehicle_numbers
 from identifier.methods import make_method, methods
@@ -34,15 +35,15 @@ from tireid.output import text_table, write_json
 from tireid.progress import say
 from tireid.report import Block, Headline, Report, Section, Table, write_report
 from tireid.reports.common import REPORT, drawings, origin
-from tireid.verdicts import verdict_warnings, verdicts_headline
+from tireid.verdicts import verdicts_headline, verdicts_warnings
 
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:
     """Return the means over recordings of every method, best on other recordings first."""
-    lines = [["method", "online", "frozen, same drive", "frozen, elsewhere", *_SLIP, "step"]]
+    lines = [["method", "online", "frozen, same drive", "frozen, elsewhere"]]
+    lines[0] += ["side slip [deg]", "within 2 sigma", "step"]  # of methods that estimate v_y
     for name in ranking(comparison):
-        trial = comparison.trials[name]
-        time = _NOT_GIVEN
+        trial, time = comparison.trials[name], "-"
         if name in comparison.step_times:
             time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
         pairs = same_and_other(trial.frozen or {})
@@ -50,24 +51,15 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
         if trial.diverged_at:
             means = ["diverged"] * 3
         cells = means if trial.frozen is not None else [means[0], "a signal, no model", ""]
-        lines.append([name, *cells, *_slip_cells(trial), time])
+        errors = [one.rms for one in trial.side_slip.values() if one.rms is not None]
+        shares = [one.within for one in trial.side_slip.values() if one.within is not None]
+        cells.append(f"{np.mean(errors):.3f}" if errors else "-")
+        cells.append(f"{np.mean(shares):.0f} %" if shares else "-")
+        lines.append([name, *cells, time])
     return lines
 
 
-_SLIP = ("side slip [deg]", "within 2 sigma")  # columns of methods that estimate v_y
-_NOT_GIVEN = "-"
 _NOT_SHOWN = "get no v_y; they estimate it, and side slip is judged by the recorded one"
-
-
-def _slip_cells(trial: Trial) -> list[str]:
-    """Return the mean error of side slip and the mean share within two sigma, as text."""
-    notes = trial.side_slip.values()
-    errors = [one.rms for one in notes if one.rms is not None]
-    shares = [one.within for one in notes if one.within is not None]
-    return [
-        f"{np.mean(errors):.3f}" if errors else _NOT_GIVEN,
-        f"{np.mean(shares):.0f} %" if shares else _NOT_GIVEN,
-    ]
 
 
 def summary_table(comparison: Comparison) -> str:
@@ -93,17 +85,15 @@ def remarks(comparison: Comparison) -> list[str]:
 
 def pair_tables(comparison: Comparison) -> str:
     blocks = []
-    for learnt in comparison.names:
-        for replayed in comparison.names:
-            lines = []
-            for name in ranking(comparison):
-                frozen = comparison.trials[name].frozen
-                if frozen is not None:
-                    error = frozen.get(learnt, {}).get(replayed)
-                    cell = "diverged" if error is None else _mean(comparison, [(replayed, error)])
-                    lines.append([name, cell])
-            title = f"identified on {learnt}, frozen, replayed on {replayed}"
-            blocks += [_text(title, lines)] if lines else []
+    for learnt, replayed in product(comparison.names, repeat=2):
+        lines = []
+        for name in ranking(comparison):
+            frozen = comparison.trials[name].frozen
+            if frozen is not None:
+                error = frozen.get(learnt, {}).get(replayed, INFINITE)
+                lines.append([name, _mean(comparison, [(replayed, error)])])
+        title = f"identified on {learnt}, frozen, replayed on {replayed}"
+        blocks += [_text(title, lines)] if lines else []
     return "\n".join(blocks)
 
 
@@ -111,13 +101,12 @@ def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:
     """Return a mean of errors as percent of the rms force and in newtons, front / rear."""
     if not pairs:
         return ""
-    sizes = {rec.name: comparison.course.size(rec) for rec in comparison.course.recordings}
-    newtons = np.mean([(error.front, error.rear) for _, error in pairs], axis=0)
+    newtons = np.array([astuple(error) for _, error in pairs])
+    sizes = _sizes(comparison)
+    parts = np.mean(newtons / [astuple(sizes[name]) for name, _ in pairs], axis=0)
+    newtons = newtons.mean(axis=0)
     if not np.isfinite(newtons).all():
         return "diverged"
-    parts = np.mean(
-        [(e.front / sizes[name].front, e.rear / sizes[name].rear) for name, e in pairs], axis=0
-    )
     front, rear = (
         f"{100.0 * p:.1f} ({n:{'.0f' if n >= 100.0 else '.3g'}})"  # three digits, or more
         for p, n in zip(parts, newtons, strict=True)
@@ -125,11 +114,13 @@ def _mean(comparison: Comparison, pairs: list[tuple[str, AxleRmse]]) -> str:
     return f"{front} / {rear}"
 
 
+def _sizes(comparison: Comparison) -> dict[str, AxleRmse]:
+    """Return the rms force of each recording [N]."""
+    return {one.name: comparison.course.size(one) for one in comparison.course.recordings}
+
+
 def _text(title: str, lines: list[list[str]]) -> str:
     return "\n".join([title, text_table(lines, indent="  "), ""])
-
-
-_Row = tuple[str | float | int, ...]
 
 
 def write_comparison(
@@ -158,44 +149,37 @@ def write_comparison(
 
 
 def _comparison_numbers(comparison: Comparison) -> dict[str, Any]:
-    course = comparison.course
+    course, sizes, methods = comparison.course, _sizes(comparison), dict[str, Any]()
+    for name, trial in comparison.trials.items():
+        timed = name in comparison.step_times
+        methods[name] = {
+            "online_N": trial.online,
+            "frozen_N": trial.frozen,
+            "diverged_at_s": trial.diverged_at,
+            "percent": comparison.shares(name)._asdict(),
+            "side_slip": {
+                recording: {"rms_deg": one.rms, "within_two_sigma_percent": one.within}
+                for recording, one in trial.side_slip.items()
+            },
+            "step_s": comparison.step_times[name] if timed else None,
+            "step_ratio": comparison.time_ratio(name) if timed else None,
+        }
     return {
         "recordings": {
-            recording.name: {
-                "samples": len(recording),
-                "duration_s": recording.duration,
-                "rms_force_N": asdict(course.size(recording)),
+            one.name: {
+                "samples": len(one),
+                "duration_s": one.duration,
+                "rms_force_N": sizes[one.name],
             }
-            for recording in course.recordings
+            for one in course.recordings
         },
         "judged_by": "motion" if course.by_motion else "truth",
-        "methods": {name: _method_numbers(comparison, name) for name in comparison.trials},
-        "left_out": dict(comparison.left_out),
+        "methods": methods,
+        "left_out": comparison.left_out,
         "vehicle": vehicle_numbers(course.vehicle),
         "min_speed_m_s": course.min_speed,
         "seed": comparison.seed,
         "version": __version__,
-    }
-
-
-def _method_numbers(comparison: Comparison, name: str) -> dict[str, Any]:
-    trial, timed = comparison.trials[name], name in comparison.step_times
-    return {
-        "online_N": {recording: asdict(error) for recording, error in trial.online.items()},
-        "frozen_N": None
-        if trial.frozen is None
-        else {
-            learnt: {recording: asdict(error) for recording, error in replays.items()}
-            for learnt, replays in trial.frozen.items()
-        },
-        "diverged_at_s": dict(trial.diverged_at),
-        "percent": comparison.shares(name)._asdict(),
-        "side_slip": {
-            recording: {"rms_deg": one.rms, "within_two_sigma_percent": one.within}
-            for recording, one in trial.side_slip.items()
-        },
-        "step_s": comparison.step_times[name] if timed else None,
-        "step_ratio": comparison.time_ratio(name) if timed else None,
     }
 
 
@@ -205,20 +189,16 @@ _ERROR_COLUMNS = (
 )
 
 
-def _error_rows(comparison: Comparison) -> Iterator[_Row]:
-    sizes = {rec.name: comparison.course.size(rec) for rec in comparison.course.recordings}
-
-    def row(method: str, kind: str, learnt: str, name: str, error: AxleRmse) -> _Row:
-        front, rear = error.front / sizes[name].front, error.rear / sizes[name].rear
-        both = comparison.course.share(name, error)
-        return method, kind, learnt, name, error.front, error.rear, 100 * front, 100 * rear, both
-
+def _error_rows(comparison: Comparison) -> Iterator[tuple[str | float, ...]]:
+    sizes = _sizes(comparison)
     for method, trial in comparison.trials.items():
-        for name, error in trial.online.items():
-            yield row(method, "online", name, name, error)
+        found = [("online", name, name, error) for name, error in trial.online.items()]
         for learnt, replays in (trial.frozen or {}).items():
-            for name, error in replays.items():
-                yield row(method, "frozen", learnt, name, error)
+            found += [("frozen", learnt, name, error) for name, error in replays.items()]
+        for kind, learnt, name, error in found:
+            size, both = sizes[name], comparison.course.share(name, error)
+            shares = 100 * error.front / size.front, 100 * error.rear / size.rear
+            yield method, kind, learnt, name, error.front, error.rear, *shares, both
 
 
 def write_compare_report(
@@ -247,19 +227,13 @@ def write_compare_report(
         *drawings(figures, captions),
     ]
     learnt = "recordings with a valid model of the default"
+    of_each = verdicts_warnings(verdicts, "The default identified on {}: ")
     report = Report(
         title=f"Methods compared on {course.vehicle.name}",
         summary="Each method is identified on each recording, frozen at its end and replayed on "
         "all.",
         numbers=[*verdicts_headline(verdicts, learnt, "good"), *_compare_headlines(comparison)],
-        warnings=[
-            *_compare_warnings(comparison),
-            *(
-                one
-                for name, verdict in verdicts.items()
-                for one in verdict_warnings(verdict, f"The default identified on {name}: ")
-            ),
-        ],
+        warnings=[*_compare_warnings(comparison), *of_each],
         sections=[
             Section(heading="Errors of the methods", blocks=blocks),
             origin(command, course.vehicle, course.recordings, seed=str(comparison.seed)),
@@ -270,15 +244,14 @@ def write_compare_report(
 
 def _compare_headlines(comparison: Comparison) -> list[Headline]:
     numbers = []
-    elsewhere = len(comparison.names) > 1
+    kind, where = "in_sample", "frozen, same drive"
+    if len(comparison.names) > 1:
+        kind, where = "other", "frozen, on other recordings"
     for name in ranking(comparison):
-        shares = comparison.shares(name)
-        value = shares.other if elsewhere else shares.in_sample
+        value = getattr(comparison.shares(name), kind)
         if value is not None and np.isfinite(value):
-            where = "frozen, on other recordings" if elsewhere else "frozen, same drive"
-            numbers.append(
-                Headline(f"{value:.1f} %", f"error in % of the rms force, {name}, {where}")
-            )
+            meaning = f"error in % of the rms force, {name}, {where}"
+            numbers.append(Headline(f"{value:.1f} %", meaning))
     return numbers[:4]
 
 

@@ -1,18 +1,23 @@
 """`tireid demo`: the whole story on the built-in car, in a minute, with a report."""
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 from matplotlib.figure import Figure
 
+from codegen import find_compiler
+from identifier.export.compiled import CompiledPackage
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
+from identifier.run import identify
 from identifier.tire_model import TireModel
 from identifier.verdict import Verdict
+from mpc.path import BUILT_IN
 from tireid import report as page
-from tireid.commands import COMMANDS, certificate_table, demo_parts
+from tireid.commands import certificate_table
 from tireid.commands import options as shared
 from tireid.commands.check import draw_check
 from tireid.commands.demo_story import FREEZE, SPEED, STORY, Story, run_story
@@ -24,7 +29,12 @@ from tireid.commands.paper import (
     table_text,
     write_study,
 )
-from tireid.figures.forces import side_by_side_figure
+from tireid.driving.results import SCORES, Drives, headline, known_blocks, score_rows
+from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
+from tireid.driving.setup import Setup, SpeedWish
+from tireid.exporting import Exported, export, self_test
+from tireid.exporting import Verdict as SelfTest
+from tireid.figures.film import FORMATS
 from tireid.figures.paper import SCHEME
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, tell
@@ -43,6 +53,173 @@ from tireid.verdicts import (
     verdict_warnings,
 )
 
+LANE_CHANGE, _SLIPPERY = "drive", "drive_slippery"  # folders beside the report
+_FILM = FORMATS[0]
+_CASES = {  # path, share of the grip, drops of friction [m] and to what, tires; in a number's words
+    LANE_CHANGE: (
+        "iso-3888-2",
+        0.9,
+        (),
+        (FROZEN, LINEAR, ORACLE),
+        "in the lane change at 90 % of the grip",
+    ),
+    _SLIPPERY: (
+        "slalom",
+        0.57,
+        ((110.0, 0.5),),
+        (LEARNING, FROZEN, LINEAR),
+        "where friction drops to half",
+    ),
+}
+NOT_DRIVEN = "No C compiler (gcc) was found: the tracker cannot be built, the car did not drive."
+
+
+class Driven(NamedTuple):
+    """Drives along one path, and their figures."""
+
+    drives: Drives
+    figures: Mapping[str, Figure]
+
+
+def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
+    """Drive the cases of the demo and write what `tireid drive` writes; nothing without a
+    compiler.
+    """
+    found: dict[str, Driven] = {}
+    for name, (path, share, drops, labels, _) in _CASES.items() if find_compiler() else ():
+        wish = SpeedWish(share, None)
+        setup = Setup(path=BUILT_IN[path](), vehicle=story.car, mu=1.0, drops=drops, wish=wish)
+        conditions = Conditions(setup=setup, delay=2, noise=True, seed=0, laps=1.0)
+        source = "frozen ones identified on the slalom"
+        drives = Drives.driven(conditions, labels, story.axle.model, source)
+        (folder / name).mkdir()
+        found[name] = Driven(drives, drives.write(folder / name, _FILM))
+    return found
+
+
+def drive_text(driven: Mapping[str, Driven]) -> str:
+    blocks = [one.drives.text() for one in driven.values()]
+    return "\n\n".join(["Driving on the identified tires:", *blocks]) if blocks else NOT_DRIVEN
+
+
+def drive_section(driven: Mapping[str, Driven], folder: Path) -> page.Section:
+    heading = "The car drives on the identified tires"
+    if not driven:
+        return page.Section(heading=heading, blocks=[page.Paragraph(text=NOT_DRIVEN)])
+    slippery = driven[_SLIPPERY]
+    blocks: list[page.Block] = [
+        page.Paragraph(
+            text="A model predictive tracker steers the car around the cones. It plans 2 s ahead, "
+            "100 times a second, with noisy sensors and 20 ms of delay. In the middle of the "
+            "slalom the friction drops to half, which is the limit of this path, and no tracker "
+            "gets this friction. One tracker goes on identifying: its tire is replaced where "
+            "recent innovations require it and the new one explains the last seconds better. The "
+            "others keep the tires that were frozen before, or the linear ones."
+        ),
+        page.Picture(
+            image=folder / _SLIPPERY / f"drive.{_FILM}",
+            caption="The drive of the learning car; outlines are the others.",
+            read=READ["film"],
+        ),
+        *_scores(slippery, "Deviation and the rest along the path."),
+        *known_blocks(slippery.drives.runs, slippery.figures),
+        page.Paragraph(
+            text="The lane change of ISO 3888-2 at 90 % of the lateral acceleration that the tires "
+            "can give: with the frozen model the tracker drives as well as with the true tires. "
+            f"The film is {LANE_CHANGE}/drive.{_FILM}."
+        ),
+        *_scores(driven[LANE_CHANGE], "Deviation and the rest along the lane change."),
+    ]
+    return page.Section(heading=heading, blocks=blocks)
+
+
+def _scores(one: Driven, caption: str) -> list[page.Block]:
+    case = f"{headline(one.drives.conditions)}."
+    return [
+        page.Table(caption=case, header=SCORES, rows=score_rows(one.drives.runs)),
+        drawing(one.figures["errors"], caption, READ["errors"]),
+    ]
+
+
+def drive_numbers(driven: Mapping[str, Driven]) -> list[page.Headline]:
+    numbers = []
+    for name, one in driven.items():
+        first, second = one.drives.runs[:2]
+        off = f"{first.scores.rms_e_y_m:.3f} / {second.scores.rms_e_y_m:.3f} m"
+        meaning = f"rms off the path {_CASES[name][-1]}, {first.label} / {second.label} tires"
+        numbers.append(page.Headline(off, meaning))
+    return numbers
+
+
+FOLDER = "package"
+NOT_BUILT = (
+    "No C compiler (gcc) was found: the package was written, but neither compiled nor tested."
+)
+
+
+class _Check(NamedTuple):
+    """A build of the package on this machine.
+
+    precision : float or double.   verdict : of its self-test.   difference : largest of a force
+    from the one that Python computes over the slalom [N].   refused, samples : of the slalom.
+    """
+
+    precision: str
+    verdict: SelfTest
+    difference: float
+    refused: int
+    samples: int
+
+
+class Shipped(NamedTuple):
+    """What was exported, and its builds here: none without a compiler."""
+
+    exported: Exported
+    checks: Sequence[_Check]
+
+
+def ship(story: Story, folder: Path) -> Shipped:
+    """Export what the axle identifier learnt, as `tireid export` does, compile it and test it."""
+    learnt, model = story.axle.runs[0], story.axle.model
+    exported = export(learnt.method, folder, start=model, vehicle=story.car)
+    name, checks = exported.package.specialized.name, list[_Check]()
+    if find_compiler() is not None:
+        expected = identify(learnt.recording, story.car, learnt.method, model).axle_force
+        for precision, single in (("double", False), ("float", True)):
+            verdict = self_test(folder, name, single=single)
+            assert verdict is not None
+            run = CompiledPackage.from_folder(folder, single=single).run(learnt.recording)
+            difference = float(np.abs(run.axle_force - expected).max())
+            refused = int(np.count_nonzero(run.status))
+            checks.append(_Check(precision, verdict, difference, refused, len(run.status)))
+    return Shipped(exported, checks)
+
+
+def shipped_text(shipped: Shipped) -> str:
+    lines = [f"As a C package ({FOLDER}/, hash {shipped.exported.package.about['hash']}):"]
+    lines += [
+        f"  {check.precision:8} self-test {check.verdict.verdict}; over the slalom within "
+        f"{check.difference:.2g} N of Python, {check.refused} samples refused"
+        for check in shipped.checks
+    ] or [f"  {NOT_BUILT}"]
+    costs = [one for one in shipped.exported.costs if one.single]
+    lines += [f"  {one.processor}, {one.precision}: {one.words}" for one in costs]
+    return "\n".join(lines)
+
+
+def package_section(shipped: Shipped) -> page.Section:
+    name = shipped.exported.package.specialized.name
+    intro = (
+        "The axle identifier, beginning with the weights of this drive, is written as a C99 "
+        f"package to the folder {FOLDER}/ beside this report: library, example, self-test and "
+        f"README with its costs, every symbol begins with {name}_. It is what tireid export "
+        "writes; here it is compiled, tested and run over the slalom, beside Python."
+    )
+    lines = (intro, *shipped_text(shipped).splitlines())
+    blocks = [page.Paragraph(text=line) for line in lines]
+    return page.Section(heading="The identifier as C for a controller", blocks=blocks)
+
+
 _REFERENCE = (
     'Hong and Choi, "Integral Error-Based Adaptive Neural Identifier for Nonlinear Lateral Tire '
     'Forces"'
@@ -51,9 +228,9 @@ _REFERENCE = (
 
 def _demo_report(
     story: Story,
-    shipped: demo_parts.Shipped,
+    shipped: Shipped,
     study: Study,
-    driven: Mapping[str, demo_parts.Driven],
+    driven: Mapping[str, Driven],
     figures: Mapping[str, Mapping[str, Figure]],
     folder: Path,
     command: str,
@@ -68,15 +245,15 @@ def _demo_report(
             *missed_headline(verdict),
             *number_headlines(verdict),
             *identify_headlines(story.axle),
-            *demo_parts.drive_numbers(driven),
+            *drive_numbers(driven),
         ],
         warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
         sections=[
             verdict_section(verdict),
-            demo_parts.drive_section(driven, folder),
+            drive_section(driven, folder),
             _learn(figures["identify"], model, verdict),
-            _predict(story),
-            demo_parts.package_section(shipped),
+            _predict(story, figures["identify"]),
+            package_section(shipped),
             _paper_study(story, study, figures["paper"]),
             origin(command, story.car, [run.recording for run in runs]),
         ],
@@ -114,7 +291,7 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
     )
 
 
-def _predict(story: Story) -> page.Section:
+def _predict(story: Story, figures: Mapping[str, Figure]) -> page.Section:
     columns = ["frozen", "of rms"]
     blocks: list[page.Block] = [
         page.Paragraph(
@@ -129,15 +306,9 @@ def _predict(story: Story) -> page.Section:
             rows=[[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
-    methods = {
-        "axle identifier (curves of slip)": story.axle,
-        "paper (network, integral law)": story.paper,
-    }
-    for run in story.axle.runs[1:]:
-        name = run.recording.name
-        figure = side_by_side_figure({title: one.replays[name] for title, one in methods.items()})
-        caption = f"Both methods, frozen after the slalom, on the {name.replace('_', ' ')}."
-        blocks.append(drawing(figure, caption, READ["replay"]))
+    for name in list(STORY)[1:]:
+        caption = f"The axle identifier, frozen after the slalom, on the {name.replace('_', ' ')}."
+        blocks.append(drawing(figures[f"replay_{name}"], caption, READ["replay"]))
     return page.Section(heading="Prediction of validation drives", blocks=blocks)
 
 
@@ -194,25 +365,20 @@ _PARTS = {
 }  # about s
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "demo",
-        help=COMMANDS["demo"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Drive the built-in sedan, learn its tires, freeze them, test them on another "
         "maneuver, export them as a C package that is compiled and tested, repeat the paper's "
         "tables, and steer the car along a path on the identified tires; leaves one report.html to "
         "read.",
     )
     shared.add_output(parser, "demo")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
     watch = Stopwatch()
-    with (
-        output_folder(options.out, force=options.force) as folder,
-        Progress("demo", _PARTS, long=True) as work,
-    ):
+    with output_folder(options.out, force=options.force) as folder:
+        work = Progress("demo", _PARTS, long=True)
         story = run_story(partial(work.begin(_LEARNING).step, 2 * len(STORY)))
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
@@ -224,11 +390,11 @@ def run(options: argparse.Namespace) -> None:
         operation = story.design.operation(story.car)
         draw_check(folders["paper_network"], story.paper.runs[0], operation, story.certificate)
         work.begin(_EXPORTING)
-        shipped = demo_parts.ship(story, folder / demo_parts.FOLDER)
+        shipped = ship(story, folder / FOLDER)
         study = run_study(SEEDS, partial(work.begin(_TESTING).step, STEPS))
         figures["paper"] = write_study(folders["paper"], study)
         work.begin(_DRIVING)
-        driven = demo_parts.drive_story(story, folder)
+        driven = drive_story(story, folder)
         work.begin(_REPORTING)
         report = _demo_report(story, shipped, study, driven, figures, folder, options.words)
         page.write_report(folder / REPORT, report)
@@ -236,8 +402,8 @@ def run(options: argparse.Namespace) -> None:
             *(table_text(maneuver, study) for maneuver in study.errors),
             f"{certificate_table.certificate_text(story.certificate, story.design.force_unit)}\n",
             f"{story.text()}\n",
-            f"{demo_parts.shipped_text(shipped)}\n",
-            demo_parts.drive_text(driven),
+            f"{shipped_text(shipped)}\n",
+            drive_text(driven),
         ]
     tell("\n".join(columns))
     tell(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")

@@ -7,7 +7,7 @@ from identifier.doctor import diagnose
 from models.recordings import Repair
 from models.recordings.reader import repair_text
 from tireid import __version__
-from tireid.commands import COMMANDS, DONE, NOT_VALID
+from tireid.commands import DONE, NOT_VALID
 from tireid.commands import options as shared
 from tireid.diagnoses import add_repair, diagnosis_text, write_doctor_report, write_repair
 from tireid.figures.forces import draw_diagnosis
@@ -16,10 +16,8 @@ from tireid.output import output_folder, require_free, write_json
 from tireid.progress import say, tell
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "doctor",
-        help=COMMANDS["doctor"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Find faults of LOG, or of its car as declared by --vehicle, in the log "
         "alone: units, signs, steering-wheel angle, offsets, delays, sensors at other places or "
         "angles, frozen or lost samples, another car. Exit code 3 where something was found "
@@ -32,7 +30,6 @@ def add_parser(commands: Any) -> None:
     add_repair(parser, "and write it to")
     shared.add_accept(parser)
     shared.add_output(parser, None)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -41,7 +38,7 @@ def run(options: argparse.Namespace) -> int:
         shared.require_toml(options.repair)
         require_free(options.repair, force=options.force)
     vehicle, log_map = shared.read_vehicle(options), shared.given_map(options)
-    recording = shared.read_log(options.log, vehicle, log_map, check=False)
+    recording = shared.read_log(options.log, vehicle, options, check=False)
     say("the doctor looks at it")
     diagnosis = diagnose(recording, vehicle)
     repair = diagnosis.repair if options.repair is not None else Repair()

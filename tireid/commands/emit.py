@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from identifier.tire_model import load_model
-from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.emitting import WANTED, emit
 from tireid.output import text_table
@@ -13,10 +12,8 @@ from tireid.progress import say, tell
 from tireid.verdicts import warn_of_stored
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "emit",
-        help=COMMANDS["emit"],
+def declare(new: Any) -> None:
+    parser = new(
         description=f"Write MODEL as other tools read it. Ask for one or more of {WANTED}; all are "
         "written, or none.",
     )
@@ -32,7 +29,6 @@ def add_parser(commands: Any) -> None:
     text = "print the understeer gradient over speed and a_y, with its standard deviation"
     shared.add_options(parser, bool, {"--understeer": text})
     shared.add_force(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -5,16 +5,13 @@ from typing import Any
 
 from identifier.methods import LIVE, WITHOUT_V_Y, continuing
 from models.rules import require_within
-from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.exporting import export
 from tireid.progress import say
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "export",
-        help=COMMANDS["export"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Write a C99 package: library, example, self-test, CMakeLists.txt, "
         "README with its cost on Arm processors where the tools are there, and a JSON file of all "
         "that went in.",
@@ -38,7 +35,6 @@ def add_parser(commands: Any) -> None:
     )
     shared.add_options(parser, float, {"--caution SHARE": (0.0, text)})
     shared.add_output(parser, "export")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -135,7 +135,8 @@ def _learn(options: argparse.Namespace) -> int:
     store = Store(options.out)
     store.require(begun=False)
     there: Any = cluster(options.scheduler) if options.scheduler else nullcontext()
-    with there as elsewhere, Progress("fleet learn", long=True) as progress:
+    with there as elsewhere:
+        progress = Progress("fleet learn", long=True)
 
         def done(ready: int) -> None:
             progress(ready / max(len(tasks), 1), f"{ready} of {len(tasks)} logs")

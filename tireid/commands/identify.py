@@ -1,6 +1,7 @@
 """`tireid identify LOG --vehicle FILE --out DIR`: learn the tires of a recording, freeze them."""
 
 import argparse
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -11,16 +12,13 @@ from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
 from identifier.reproducibility import counted_samples, freeze_key
 from identifier.run import History, check_recording
-from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, calibrated, judge, judge_prediction
 from models.recordings import Recording, Repair, check_against_vehicle, check_physics, joined
 from models.vehicle import Vehicle
-from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.commands.certificate_table import verdict_line
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.identified import Results, file_name
-from tireid.learning import identify, with_v_y
+from tireid.learning import identify
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
@@ -29,10 +27,8 @@ from tireid.verdicts import verdict_text, verdicts_text
 _LEARNING, _JUDGING, _DRAWING = "learning", "replays and verdict", "curves and figures"
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "identify",
-        help=COMMANDS["identify"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Identify the axle forces of LOG, freeze the model, replay LOG and other "
         "recordings; write report.html, summary.json, weights.json, curves as CSV and figures.",
         epilog="LOG is a log of any format with the columns t [s], vx, vy [m/s], r [rad/s], "
@@ -57,7 +53,6 @@ def add_parser(commands: Any) -> None:
     shared.add_seed(parser, "the initial weights of the paper's network")
     shared.add_accept(parser)
     shared.add_output(parser, "identify")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -96,10 +91,8 @@ def run(options: argparse.Namespace) -> int:
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     count = 1.0 + len(others)
     parts = {_LEARNING: 1.0 + count, _JUDGING: count, _DRAWING: 2.0 + 3.0 * count}
-    with (
-        output_folder(options.out, force=options.force) as folder,
-        Progress("identify", parts) as progress,
-    ):
+    with output_folder(options.out, force=options.force) as folder:
+        progress = Progress("identify", parts)
         runs: list[History] = []
         for k, one in enumerate((recording, *others)):
             if design.whole and runs:
@@ -115,10 +108,9 @@ def run(options: argparse.Namespace) -> int:
         for t in freeze_times:
             _require_tires(learnt, t)
         pieces = learnt.parts(logs) if len(logs) > 1 else []
-        verdict = with_doctor(judge(learnt, last), diagnosis, repair)
-        asked = _asked(learnt.freeze(last), others)
-        tire = calibrated(learnt, last, verdict)
-        found = Results.learnt(law, runs, freeze_times, tire, verdict, asked, pieces)
+        noted = partial(with_doctor, diagnosis=diagnosis, repair=repair)
+        found = Results.learnt(law, runs, freeze_times, others, pieces, noted)
+        verdict, asked = found.verdict, found.asked
         figures = found.write(folder, progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(folder, found, figures, diagnosis, options.words)
@@ -135,11 +127,6 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join(part for part in given if part))
     say(f"wrote {options.out}/")
     return max(shared.exit_code(one, options) for one in (verdict, *asked.values()))
-
-
-def _asked(model: TireModel, others: list[Recording]) -> dict[str, Verdict]:
-    """Return the verdict of `tireid predict` on a model over each replayed log, by its name."""
-    return {one.name: judge_prediction(model, with_v_y(one, model)) for one in others}
 
 
 def _require_model(law: str, design: Method, vehicle: Vehicle) -> None:
@@ -186,8 +173,8 @@ def _read(log: str, vehicle: Vehicle, design: Method, options: argparse.Namespac
     recording = shared.read_log(
         log,
         vehicle,
-        shared.given_map(options),
-        check=not options.no_check and options.repair is None,  # else once it is repaired
+        options,
+        check=options.repair is None,  # else once it is repaired
         dt=design.dt,
     )
     counted_samples(recording, design.min_speed)  # refuses a car that never drives

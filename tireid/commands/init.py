@@ -6,23 +6,19 @@ from typing import Any
 
 from models.files import write_atomically
 from models.vehicle import vehicle_template
-from tireid.commands import COMMANDS
 from tireid.commands.options import add_force, require_toml
 from tireid.output import require_free
 from tireid.progress import say
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "init",
-        help=COMMANDS["init"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Write a commented vehicle file: what is needed, its unit and where to find "
         "it; yaw inertia and cornering stiffnesses may be left out and are estimated then; "
         "[chassis], which only a simulated car needs, is there behind comment signs.",
     )
     parser.add_argument("file", type=Path, metavar="FILE", help="file to write, .toml")
     add_force(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -46,9 +46,10 @@ def add_options(parser: Any, kind: type, table: Mapping[str, str | tuple[Any, st
         if kind is bool:
             parser.add_argument(word, action="store_true", help=text)
         else:
-            more: Mapping[str, Any] = {"default": default, "metavar": metavar or None}
             read = None if kind is str else kind
-            parser.add_argument(word, type=read, help=text, **more)
+            parser.add_argument(
+                word, type=read, help=text, default=default, metavar=metavar or None
+            )
 
 
 def add_vehicle(
@@ -279,15 +280,17 @@ def given_map(options: argparse.Namespace) -> LogMap:
 def read_log(
     log: str,
     vehicle: Vehicle,
-    declared: LogMap,
+    options: argparse.Namespace,
     *,
     check: bool = True,
     dt: float = 0.01,
 ) -> Recording:
     """Read a recording, repair it where the map says so, and say what was read and done.
 
+    check : refuse what contradicts physics, without --no-check.
     dt : sampling interval that it is brought to [s].
     """
+    declared, check = given_map(options), check and not options.no_check
     path, named = split_log_argument(log)
     recording, _ = read_repaired(path, vehicle, run=named, dt=dt, check=check, log_map=declared)
     say(f"read {recording.name}: {recording.t.size} samples, {recording.duration:.1f} s")

@@ -17,7 +17,6 @@ from identifier.paper.network import Network
 from identifier.reproducibility import freeze_key
 from models.schema import require_few
 from models.vehicle import sedan
-from tireid.commands import COMMANDS
 from tireid.commands.certificate_table import verdict_line
 from tireid.commands.options import add_output
 from tireid.figures.forces import force_figure
@@ -225,16 +224,13 @@ def _compared(maneuver: str) -> dict[str, str]:
 _STUDY, _DRAWING = "the study", "figures"
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "paper",
-        help=COMMANDS["paper"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Repeat the paper's step steer and slalom on the built-in plant with both laws "
         "and the control 'instantaneous at eta/lambda'; write tables and figures.",
     )
     parser.add_argument("--seeds", type=int, default=20, help="seeds of the weights (%(default)s)")
     add_output(parser, "paper")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -242,10 +238,8 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--seeds must be at least 1, it is {options.seeds}")
     require_few(ValueError, "--seeds", options.seeds, "runs", "runs")
     parts = {_STUDY: float(options.seeds), _DRAWING: 10.0}
-    with (
-        output_folder(options.out, force=options.force) as folder,
-        Progress("paper", parts, long=True) as progress,
-    ):
+    with output_folder(options.out, force=options.force) as folder:
+        progress = Progress("paper", parts, long=True)
         study = paper_study.run_study(
             options.seeds, partial(progress.begin(_STUDY).step, paper_study.STEPS)
         )

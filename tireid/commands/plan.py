@@ -11,7 +11,6 @@ from identifier.plan import SHARE, TIME, PlanError, Planned, plan
 from identifier.tire_model import AXLES, GRIP, RELAXATION, STIFFNESS
 from models.files import digest
 from tireid import __version__
-from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.figures.plan import plan_figure
 from tireid.figures.style import save_figures
@@ -29,10 +28,8 @@ HEADER = (
 )  # fmt: skip
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "plan",
-        help=COMMANDS["plan"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Rank maneuvers by what one drive of each leaves: the expected error of the "
         "forces on another drive, random steering up to the same share of the grip, over their "
         "rms. Beside it stand the standard deviations of stiffness, grip and relaxation over their "
@@ -54,7 +51,6 @@ def add_parser(commands: Any) -> None:
     shared.add_options(parser, float, numbers)
     shared.add_seed(parser, "random steering")
     shared.add_output(parser, "plan")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -20,7 +20,6 @@ from identifier.verdict.verdict import PERCENT
 from models.files import digest
 from tireid import __version__, output
 from tireid import report as page
-from tireid.commands import COMMANDS
 from tireid.commands import options as shared
 from tireid.figures.forces import prediction_figure
 from tireid.figures.predict import friction_figure, motion_figure
@@ -49,10 +48,8 @@ from tireid.verdicts import (
 )
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "predict",
-        help=COMMANDS["predict"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Predict the axle forces of LOG with a stored model, which stays as it is; "
         "write report.html, figures, forces.csv, summary.json and, where observable, "
         "friction.csv: friction of the road over that of the identification drive. Where LOG "
@@ -65,14 +62,12 @@ def add_parser(commands: Any) -> None:
     shared.add_log_reading(parser)
     shared.add_accept(parser)
     shared.add_output(parser, "predict")
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where the model does not give back the drive's motion."""
     model = _model(options)
-    log_map, check = shared.given_map(options), not options.no_check
-    recording = shared.read_log(options.log, model.vehicle, log_map, check=check)
+    recording = shared.read_log(options.log, model.vehicle, options)
     prediction = replay(recording, model)
     recording, verdict = prediction.recording, prediction.verdict
     if recording.estimated:

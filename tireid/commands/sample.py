@@ -5,17 +5,14 @@ from pathlib import Path
 from typing import Any
 
 from models.recordings import write_recording
-from tireid.commands import COMMANDS
 from tireid.commands.options import add_force, add_seed, add_vehicle, read_vehicle, seed_of
 from tireid.driving.learn import sample_recording
 from tireid.output import require_free
 from tireid.progress import say
 
 
-def add_parser(commands: Any) -> None:
-    parser = commands.add_parser(
-        "sample",
-        help=COMMANDS["sample"],
+def declare(new: Any) -> None:
+    parser = new(
         description="Write the sensor signals of a simulated car on an open field, steered at "
         "random and ever harder until it slides, with the true axle forces: a log for tireid "
         "identify.",
@@ -27,7 +24,6 @@ def add_parser(commands: Any) -> None:
     )
     add_seed(parser, "steering and noise")
     add_force(parser)
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> None:

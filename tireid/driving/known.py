@@ -50,12 +50,11 @@ class Witness:
         """Ask the learner; return what it said."""
         said = self._learner.observe(measured, tracker)
         if self._samples % _EVERY == 0:
-            self._look(tracker.tire)
+            self.known.append(self._seen(tracker.tire))
         self._samples += 1
         return said
 
-    def _look(self, steering: PredictionTire) -> None:
-        t = self._samples * self._period
+    def _seen(self, steering: PredictionTire) -> Known:
         try:
             model = self._learner.supervisor.identifier.model()
         except (DivergedError, CannotFreezeError, ValueError):  # as the supervisor: no model now
@@ -63,4 +62,4 @@ class Witness:
         else:
             slip = np.full(2, np.nan) if model.known_slip is None else model.known_slip
             learnt = prediction_tire(model).weights
-        self.known.append(Known(t, steering.weights.copy(), learnt, slip))
+        return Known(self._samples * self._period, steering.weights.copy(), learnt, slip)

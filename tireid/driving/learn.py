@@ -1,6 +1,5 @@
 """A drive to learn tires on, of a simulated car."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,8 +10,17 @@ from models.vehicle import Vehicle, sedan
 from mpc.cars import DoubleTrackCar
 from mpc.loop.lateral import LateralVelocity
 from mpc.loop.sensing import Measured, Measures, cornering_limit, inertial_unit
-from tireid.driving.chosen import CHOSEN
+from tireid.driving.setup import PERIOD
 from tireid.progress import Progress
+
+DURATION = 40.0  # s
+_SPEED = 20.0  # m/s
+_FREQUENCY = 0.6  # Hz, of the fastest swings
+_GENTLE = 0.3  # share of the angles at the start
+_GROWS = 30.0  # s, in which angles grow by their whole size
+_TIPS = 1.2  # times the grip: a car that is said to have more is falling over
+_FORGOTTEN = 0.5  # s before a car spins or tips that are not learnt from
+_RATE_LIMIT = 1.0  # rad/s at the road wheels
 
 _SLIP = np.radians(3.5)  # of the front axle, at the limit of grip
 _SPUN = np.tan(np.radians(15.0))  # of the side slip
@@ -26,7 +34,6 @@ def learning_drive(
     grip: float,
     seed: int,
     lateral: LateralVelocity | None = None,
-    progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Drive a car without a path and return what its sensors saw; a car that spins or tips ends it.
 
@@ -35,31 +42,31 @@ def learning_drive(
     what they measure.
     """
     # Angle of a bend at that acceleration, and the slip that the front axle needs beyond it.
-    amplitude = car.vehicle.wheelbase * grip / CHOSEN.speed**2 + _SLIP
+    amplitude = car.vehicle.wheelbase * grip / _SPEED**2 + _SLIP
     maneuver = RandomSteer(
         amplitude=amplitude,
-        frequency=min(CHOSEN.frequency, 0.9 * CHOSEN.rate_limit / (2.0 * np.pi * amplitude)),
+        frequency=min(_FREQUENCY, 0.9 * _RATE_LIMIT / (2.0 * np.pi * amplitude)),
         seed=seed,
         onset=1.0,
-        rate_limit=CHOSEN.rate_limit,
-        duration=CHOSEN.duration,
+        rate_limit=_RATE_LIMIT,
+        duration=DURATION,
     )
-    t = car.period * np.arange(round(CHOSEN.duration / car.period), dtype=np.float64)
-    steering = maneuver.steering(t)[:, 0] * np.minimum(CHOSEN.gentle + t / CHOSEN.grows, 1.0)
-    state, samples, forces = car.start(CHOSEN.speed), [], []
+    t = car.period * np.arange(round(DURATION / car.period), dtype=np.float64)
+    steering = maneuver.steering(t)[:, 0] * np.minimum(_GENTLE + t / _GROWS, 1.0)
+    progress = Progress("the drive to learn on")
+    state, samples, forces = car.start(_SPEED), [], []
     for k, angle in enumerate(steering):
         measured = sensors.measure(state, rng)
         if lateral is not None:
             measured = lateral.tell(measured).in_place_of(measured)
         samples.append(measured)
         forces.append(state.axle_force)
-        state = car.step(state, float(angle), CHOSEN.speed)
-        if abs(state.v_y) > _SPUN * state.v_x or abs(state.a_y) > CHOSEN.tips * grip:
-            kept = max(len(samples) - round(CHOSEN.forgotten / car.period), 10)
+        state = car.step(state, float(angle), _SPEED)
+        if abs(state.v_y) > _SPUN * state.v_x or abs(state.a_y) > _TIPS * grip:
+            kept = max(len(samples) - round(_FORGOTTEN / car.period), 10)
             samples, forces = samples[:kept], forces[:kept]
             break
-        if progress is not None:
-            progress((k + 1) / t.size)
+        progress((k + 1) / t.size)
     signals = dict(zip(Measured._fields, np.array(samples).T, strict=True))
     return Recording(
         name="learning drive",
@@ -85,9 +92,8 @@ def sample_recording(vehicle: Vehicle | None = None, *, seed: int = 0) -> Record
     VehicleError
         Where the vehicle has no chassis.
     """
-    car = DoubleTrackCar(sedan() if vehicle is None else vehicle, period=CHOSEN.period)
+    car = DoubleTrackCar(sedan() if vehicle is None else vehicle, period=PERIOD)
     grip = cornering_limit(car.vehicle, car.tire)
     rng = np.random.default_rng([seed, 1])
-    with Progress("the drive to learn on") as progress:
-        driven = learning_drive(car, inertial_unit(), rng, grip=grip, seed=seed, progress=progress)
+    driven = learning_drive(car, inertial_unit(), rng, grip=grip, seed=seed)
     return replace(driven, name=f"sample {seed}")

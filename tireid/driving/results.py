@@ -13,13 +13,11 @@ from codegen.arrays import Array
 from identifier.frozen import vehicle_numbers
 from identifier.tire_model import TireModel
 from models.files import digest
-from models.vehicle import Vehicle
 from mpc.handover.rules import Verdict
 from mpc.loop.record import Drive, estimate_scores
 from mpc.tires import CurveFitError, prediction_tire
 from mpc.tires.tire import curves_at
 from tireid import __version__
-from tireid.driving.chosen import CHOSEN
 from tireid.driving.runs import (
     FROZEN,
     FULL,
@@ -31,7 +29,7 @@ from tireid.driving.runs import (
     Conditions,
     run_drive,
 )
-from tireid.driving.setup import PLANT, Setup
+from tireid.driving.setup import PERIOD, PLANT, WIDEST, Setup
 from tireid.figures.drive import (
     AT_THE_END,
     drive_errors_figure,
@@ -65,50 +63,9 @@ def headline(conditions: Conditions) -> str:
     noise += "".join(f", {fault}" for fault in conditions.faults)
     return (
         f"{setup.path.name} at {speed}{share}; friction {setup.mu:g}{drops}; "
-        f"{PLANT} {setup.vehicle.name}, {1e3 * CHOSEN.period * conditions.delay:g} ms delay, "
+        f"{PLANT} {setup.vehicle.name}, {1e3 * PERIOD * conditions.delay:g} ms delay, "
         f"{noise}, seed {conditions.seed}"
     )
-
-
-def inputs_of(
-    conditions: Conditions, labels: Sequence[str], source: str, learnt: TireModel | None
-) -> dict[str, Any]:
-    """Return all that goes into drives, ready for JSON."""
-    setup = conditions.setup
-    v = setup.speeds()
-    return {
-        "path": setup.path.name,
-        "path_hash": digest([setup.path.X.tolist(), setup.path.Y.tolist()]),
-        "length_m": setup.path.length,
-        "closed": setup.path.closed,
-        "laps": conditions.laps,
-        "speed": {"share": setup.wish.share, "m_s": setup.wish.speed},
-        "speed_m_s": {"min": float(v.min()), "max": float(v.max())},
-        "grip_m_s2": setup.grip,
-        "mu": setup.mu,
-        "mu_drops": [{"s_m": s, "mu": mu} for s, mu in setup.drops],
-        "tires": list(labels),
-        "frozen": source,
-        "weights_hash": None if learnt is None else digest(learnt.to_dict()),
-        "plant": PLANT,
-        "vehicle": vehicle_numbers(setup.vehicle),
-        "chassis": _chassis(setup.vehicle),
-        "delay_ms": 1e3 * CHOSEN.period * conditions.delay,
-        "period_ms": 1e3 * CHOSEN.period,
-        "noise": conditions.noise,
-        **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
-        **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
-        "faults": [finite(asdict(fault)) for fault in conditions.faults],
-        "seed": conditions.seed,
-    }
-
-
-def _chassis(vehicle: Vehicle) -> dict[str, Any]:
-    """Return the chassis, with a hash in place of the file of its tire."""
-    chassis = vehicle.require_chassis()
-    path = None if chassis.tire is None else Path(chassis.tire)
-    tire = None if path is None else digest(path.read_text(errors="replace", encoding="utf-8"))
-    return {**asdict(chassis), "tire": tire}
 
 
 class Drives(NamedTuple):
@@ -132,8 +89,37 @@ class Drives(NamedTuple):
 
     @property
     def inputs(self) -> dict[str, Any]:
-        labels = [run.label for run in self.runs]
-        return inputs_of(self.conditions, labels, self.source, self.learnt)
+        """All that goes into the drives, ready for JSON."""
+        conditions, setup = self.conditions, self.conditions.setup
+        v, chassis = setup.speeds(), setup.vehicle.require_chassis()
+        tire = None
+        if chassis.tire is not None:  # a hash in place of its file
+            tire = digest(Path(chassis.tire).read_text(errors="replace", encoding="utf-8"))
+        return {
+            "path": setup.path.name,
+            "path_hash": digest([setup.path.X.tolist(), setup.path.Y.tolist()]),
+            "length_m": setup.path.length,
+            "closed": setup.path.closed,
+            "laps": conditions.laps,
+            "speed": {"share": setup.wish.share, "m_s": setup.wish.speed},
+            "speed_m_s": {"min": float(v.min()), "max": float(v.max())},
+            "grip_m_s2": setup.grip,
+            "mu": setup.mu,
+            "mu_drops": [{"s_m": s, "mu": mu} for s, mu in setup.drops],
+            "tires": [run.label for run in self.runs],
+            "frozen": self.source,
+            "weights_hash": None if self.learnt is None else digest(self.learnt.to_dict()),
+            "plant": PLANT,
+            "vehicle": vehicle_numbers(setup.vehicle),
+            "chassis": {**asdict(chassis), "tire": tire},
+            "delay_ms": 1e3 * PERIOD * conditions.delay,
+            "period_ms": 1e3 * PERIOD,
+            "noise": conditions.noise,
+            **({"sensors": conditions.kind} if conditions.kind != FULL else {}),
+            **({"caution": conditions.caution} if conditions.caution > 0.0 else {}),
+            "faults": [finite(fault) for fault in conditions.faults],
+            "seed": conditions.seed,
+        }
 
     def write(self, folder: Path, film: str) -> dict[str, Figure]:
         """Write everything about the drives; return the figures by the name of their file.
@@ -142,7 +128,10 @@ class Drives(NamedTuple):
         """
         first, setup, faults = self.runs[0], self.conditions.setup, self.conditions.faults
         curves = _known_curves(self.runs, setup, self.learnt)
-        write_json(folder / "summary.json", _summarize_drives(self.runs, self.inputs))
+        scores = {run.label: _scores(run) for run in self.runs}
+        facts = {"tires": first.label, "drives": scores, "inputs": self.inputs}
+        facts |= {"hash": digest(self.inputs), "version": __version__}
+        write_json(folder / "summary.json", scores[first.label] | facts)
         for run in self.runs:
             name = "drive.csv" if run is first else f"drive_{run.label}.csv"
             write_csv(folder / name, _drive_columns(run.drive))
@@ -152,7 +141,7 @@ class Drives(NamedTuple):
         limits = first.problem.limits
         figures = {
             "path": drive_path_figure(drives),
-            "errors": drive_errors_figure(drives, off_path=CHOSEN.widest, **on_the_way),
+            "errors": drive_errors_figure(drives, off_path=WIDEST, **on_the_way),
             "steering": drive_steering_figure(
                 drives, angle_limit=limits.steering, rate_limit=limits.steering_rate, **on_the_way
             ),
@@ -170,9 +159,15 @@ class Drives(NamedTuple):
 
     def text(self) -> str:
         lines = [headline(self.conditions), text_table([SCORES, *score_rows(self.runs)], "<>><>>")]
-        lines += [
-            f"{run.label}: {_estimate_words(run)}" for run in self.runs if run.drive.estimates
-        ]
+        for run in self.runs:
+            got = estimate_scores(run.drive)
+            if got is not None:
+                lines.append(
+                    f"{run.label}: v_y estimated to {got.rms_error_m_s:.3f} m/s, side slip to "
+                    f"{got.rms_error_deg:.2f} of {got.rms_deg:.2f} degrees rms; "
+                    f"{100.0 * got.within_two_sd:.0f} % of the errors within two standard "
+                    "deviations"
+                )
         for run in self.runs:
             lines += [f"{run.label} at {t:.2f} s: {note}" for t, note in run.drive.notes]
         return "\n".join(lines)
@@ -191,19 +186,6 @@ def score_rows(runs: Sequence[ClosedLoop]) -> list[list[str]]:
         completed = "yes" if score.completed else end
         rows.append([run.label, *off, completed, failures, f"{times} ms"])
     return rows
-
-
-def _summarize_drives(runs: Sequence[ClosedLoop], inputs: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what summary.json holds: scores of the first drive and of each, and what went in."""
-    by_label = {run.label: _scores(run) for run in runs}
-    return {
-        **by_label[runs[0].label],
-        "tires": runs[0].label,
-        "drives": by_label,
-        "inputs": dict(inputs),
-        "hash": digest(inputs),
-        "version": __version__,
-    }
 
 
 def _scores(run: ClosedLoop) -> dict[str, Any]:
@@ -236,14 +218,14 @@ _SIGNALS = (
 
 def _drive_columns(drive: Drive) -> dict[str, Array]:
     """Return every signal of a drive by the name of its column, with its unit."""
-    slip, measured = axle_slip(drive), [(name, drive.measured[name]) for name in drive.measured]
+    measured = [(name, values) for name, values in drive.measured.items() if name != "t"]
     return {
         **{f"{name}_{_UNITS[name]}": getattr(drive, name) for name in _SIGNALS},
-        **axle_columns("alpha_{}_rad", slip),
+        **axle_columns("alpha_{}_rad", axle_slip(drive)),
         **axle_columns("Fy{}_N", drive.axle_force),
         "status": drive.status.astype(np.float64),
         "solve_time_s": drive.solve_time,
-        **{f"{name}_measured_{_UNITS[name]}": values for name, values in measured if name != "t"},
+        **{f"{name}_measured_{_UNITS[name]}": values for name, values in measured},
         **{_COLUMNS_ESTIMATED[name]: values for name, values in drive.estimates.items()},
     }
 
@@ -269,16 +251,6 @@ def _known_curves(
         TireCurve(label=label, alpha=slip, force=curves_at(model, slip, v_x).T)
         for label, model in models.items()
     ]
-
-
-def _estimate_words(run: ClosedLoop) -> str:
-    got = estimate_scores(run.drive)
-    assert got is not None
-    return (
-        f"v_y estimated to {got.rms_error_m_s:.3f} m/s, side slip to {got.rms_error_deg:.2f} of "
-        f"{got.rms_deg:.2f} degrees rms; {100.0 * got.within_two_sd:.0f} % of the errors within "
-        f"two standard deviations"
-    )
 
 
 def write_drive_report(
@@ -312,38 +284,20 @@ def write_drive_report(
 
 
 def _drive_headlines(runs: Sequence[ClosedLoop]) -> list[Headline]:
-    first = runs[0].scores
-    numbers = [
-        Headline(
-            f"{first.rms_e_y_m:.3f} m",
-            f"rms deviation from the path, {runs[0].label}{_end(runs[0])}",
-            "" if first.completed else "bad",
-        ),
-        Headline(f"{first.peak_e_y_m:.3f} m", f"largest deviation, {runs[0].label}"),
-    ]
-    numbers += [
-        Headline(
-            f"{run.scores.rms_e_y_m:.3f} m",
-            f"rms deviation, {run.label}{_end(run)}",
-            "" if run.scores.completed else "bad",
-        )
-        for run in runs[1:]
-    ]
-    given = estimate_scores(runs[0].drive)
+    first, numbers = runs[0], list[Headline]()
+    for run in runs:
+        end = "" if run.scores.completed else f", who {run.drive.ending}"
+        meaning = f"rms deviation from the path, {run.label}{end}"
+        numbers.append(Headline(f"{run.scores.rms_e_y_m:.3f} m", meaning, "bad" if end else ""))
+    peak = f"{first.scores.peak_e_y_m:.3f} m"
+    numbers.insert(1, Headline(peak, f"largest deviation, {first.label}"))
+    given = estimate_scores(first.drive)
     if given is not None:
-        numbers.append(
-            Headline(
-                f"{given.rms_error_deg:.2f}°",
-                f"rms error of the estimated side slip, of {given.rms_deg:.2f}°",
-            )
-        )
-    median, p99 = first.solve_ms["median"], first.solve_ms["p99"]
-    numbers.append(Headline(f"{median:.2g} / {p99:.2g} ms", "a step: median / 99 of 100"))
-    return numbers
-
-
-def _end(run: ClosedLoop) -> str:
-    return "" if run.scores.completed else f", who {run.drive.ending}"
+        meaning = f"rms error of the estimated side slip, of {given.rms_deg:.2f}°"
+        numbers.append(Headline(f"{given.rms_error_deg:.2f}°", meaning))
+    times = first.scores.solve_ms
+    took = f"{times['median']:.2g} / {times['p99']:.2g} ms"
+    return [*numbers, Headline(took, "a step: median / 99 of 100")]
 
 
 def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
@@ -356,18 +310,12 @@ def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
         if scores.failures:
             counted = ", ".join(f"{n} {name}" for name, n in scores.failures.items())
             said.append(f"{run.label}: steps of the tracker failed: {counted}.")
-        if scores.solve_ms["p99"] > 1e3 * CHOSEN.period:
+        if scores.solve_ms["p99"] > 1e3 * PERIOD:
             said.append(f"{run.label}: one step in a hundred takes longer than the period.")
-        said += [
-            f"{run.label} at {t:.2f} s: {printed(text)}."
-            for t, text in run.drive.notes
-            if _bad(text)
-        ]
+        for t, text in run.drive.notes:
+            if text.startswith(Verdict.FAULT.value) or "dead reckoning" in text:
+                said.append(f"{run.label} at {t:.2f} s: {printed(text)}.")
     return said
-
-
-def _bad(text: str) -> bool:
-    return text.startswith(Verdict.FAULT.value) or "dead reckoning" in text
 
 
 def _drive_blocks(

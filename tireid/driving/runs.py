@@ -14,7 +14,6 @@ from identifier.methods import continuing
 from identifier.run import OnlineIdentifier
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
-from models.friction import Friction
 from models.rules import require_within
 from models.vehicle import Vehicle
 from mpc.handover.learner import Learner
@@ -35,10 +34,14 @@ from mpc.path import Path
 from mpc.problem import Problem
 from mpc.realtime import NoCompilerError, Tracker
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.driving.chosen import CHOSEN
 from tireid.driving.known import Known, Witness
-from tireid.driving.setup import Setup, SpeedWish
+from tireid.driving.setup import PERIOD, WIDEST, Setup, SpeedWish
 from tireid.progress import Progress
+
+_NOTED = 0.1  # change of the grip that is worth a note
+_PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
+# least and most friction of a road over that of the measured tire [-]
+FRICTIONS = (0.05, 1.5)
 
 
 class _Informer:
@@ -49,7 +52,10 @@ class _Informer:
 
     def observe(self, measured: Measured, tracker: Any) -> str | None:
         """Change the tire where the friction has changed; return that it was done."""
-        mu = _friction_now(self._friction, measured)
+        mu = self._friction.scale
+        for change in self._friction.changes:  # steps
+            here = measured.t if change.at_time is not None else measured.X
+            mu = change.scale if here >= change.start else mu
         if mu == self._mu:
             return None
         self._mu = mu
@@ -71,29 +77,11 @@ class _BacksOff:
     def observe(self, measured: Measured, tracker: Any) -> str | None:
         """Ask what learns; return what it said, and the grip where that changed."""
         said = None if self._beside is None else self._beside.observe(measured, tracker)
-        if abs(tracker.grip - self._noted) < CHOSEN.noted:
+        if abs(tracker.grip - self._noted) < _NOTED:
             return said
         self._noted = tracker.grip
         grip = f"plans with {tracker.grip:.2f} of the grip"
         return grip if said is None else f"{said}; {grip}"
-
-
-def _friction_now(friction: Friction, measured: Measured) -> float:
-    """Return the friction where the car is, of a road whose changes are steps [-]."""
-    mu = friction.scale
-    for change in friction.changes:
-        here = measured.t if change.at_time is not None else measured.X
-        if here >= change.start:
-            mu = change.scale
-    return mu
-
-
-def lateral_velocity(vehicle: Vehicle, learnt: TireModel | None = None) -> LateralVelocity:
-    """Return what estimates v_y where no sensor shows it, on the tires of a fit or while it learns
-    them.
-    """
-    method, start = InertialIdentifier.beginning_with(learnt, vehicle, dt=CHOSEN.period)
-    return LateralVelocity(OnlineIdentifier(method, vehicle, CHOSEN.period, start))
 
 
 def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
@@ -103,12 +91,12 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     """
     learnt = begun(learnt)
     try:
-        method = continuing(learnt, vehicle, CHOSEN.period)
+        method = continuing(learnt, vehicle, PERIOD)
     except ValueError as error:
         raise ValueError(f"--tires learning: {error}") from None
     if learnt.kind == AxleModel.kind:
-        method = AxleIdentifier.for_vehicle(vehicle, dt=CHOSEN.period)
-    identifier = OnlineIdentifier(method, vehicle, CHOSEN.period, learnt)
+        method = AxleIdentifier.for_vehicle(vehicle, dt=PERIOD)
+    identifier = OnlineIdentifier(method, vehicle, PERIOD, learnt)
     return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)))
 
 
@@ -135,18 +123,33 @@ class Conditions:
     kind: str = FULL
     caution: float = 0.0
 
+    def __post_init__(self) -> None:
+        path = self.setup.path
+        if not 0.0 < self.laps <= 100.0:
+            raise ValueError(f"laps must be positive and at most 100, they are {self.laps:g}")
+        if self.laps != 1.0 and not path.closed:
+            raise ValueError(f"laps are of a closed path, {path.name} is not")
+        if self.kind not in SENSORS:
+            raise ValueError(f"sensors must be one of {', '.join(SENSORS)}, not {self.kind!r}")
+        require_within(ValueError, *FRICTIONS, friction=self.setup.mu)
+        require_within(ValueError, 0.0, 1.0, caution=self.caution)
+        self.setup.vehicle.require_chassis()
+
     @property
     def sensors(self) -> CarSensors:
         """The sensors of the car, in order; those of one seed are the same unit."""
         if self.kind == IMU:
-            return imu_and_localization(
-                np.random.default_rng([self.seed, 3]) if self.noise else None
-            )
+            rng = np.random.default_rng([self.seed, 3]) if self.noise else None
+            return imu_and_localization(rng)
         return inertial_unit() if self.noise else CarSensors()
 
     def lateral(self, learnt: TireModel | None = None) -> LateralVelocity | None:
         """Return what estimates v_y on a drive, None where a sensor measures it."""
-        return None if self.kind == FULL else lateral_velocity(self.setup.vehicle, learnt)
+        if self.kind == FULL:
+            return None
+        car, period = self.setup.vehicle, PERIOD
+        method, start = InertialIdentifier.beginning_with(learnt, car, dt=period)
+        return LateralVelocity(OnlineIdentifier(method, car, period, start))
 
     @property
     def driving_sensors(self) -> Measures:
@@ -195,11 +198,10 @@ def delay_periods(delay: float, name: str = "delay") -> int:
 
     delay : a multiple of the period [s].   name : of the argument, in an error.
     """
-    periods = delay / CHOSEN.period
+    periods = delay / PERIOD
     if not (0.0 <= delay <= 0.1 and abs(periods - round(periods)) < 1e-9):
         raise ValueError(
-            f"{name} must be 0 to 100 ms in steps of {1e3 * CHOSEN.period:g} ms, it is "
-            f"{1e3 * delay:g}"
+            f"{name} must be 0 to 100 ms in steps of {1e3 * PERIOD:g} ms, it is {1e3 * delay:g}"
         )
     return round(periods)
 
@@ -223,32 +225,35 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         tracker = Tracker(
             model,
             problem,
-            period=CHOSEN.period,
-            delay=conditions.delay * CHOSEN.period + lag,
+            period=PERIOD,
+            delay=conditions.delay * PERIOD + lag,
             caution=conditions.caution,
         )
     except NoCompilerError as error:
         raise ValueError(str(error)) from None
-    learner = _learner(label, setup, learnt)
-    witness = Witness(learner, CHOSEN.period) if isinstance(learner, Learner) else None
-    beside: LearningTires | None = witness or learner
-    with Progress(f"driving on {label} tires") as progress:
-        driven = drive_tracker(
-            setup.path,
-            setup.car(),
-            tracker,
-            speed=setup.profile(),
-            sensors=conditions.driving_sensors,
-            delay=conditions.delay,
-            rng=np.random.default_rng([conditions.seed, 2]),
-            learner=_BacksOff(beside) if conditions.caution > 0.0 else beside,
-            lateral=conditions.lateral(learnt),
-            laps=conditions.laps,
-            widest=CHOSEN.widest,
-            plan_every=CHOSEN.plan_every,
-            name=f"{setup.path.name}, {label}",
-            progress=progress,
-        )
+    informed = label == ORACLE and setup.drops
+    learner: LearningTires | None = _Informer(setup) if informed else None
+    beside, witness = learner, None
+    if label == LEARNING:
+        assert learnt is not None
+        learner = make_learner(learnt, setup.vehicle)
+        beside = witness = Witness(learner, PERIOD)
+    driven = drive_tracker(
+        setup.path,
+        setup.car(),
+        tracker,
+        speed=setup.profile(),
+        sensors=conditions.driving_sensors,
+        delay=conditions.delay,
+        rng=np.random.default_rng([conditions.seed, 2]),
+        learner=_BacksOff(beside) if conditions.caution > 0.0 else beside,
+        lateral=conditions.lateral(learnt),
+        laps=conditions.laps,
+        widest=WIDEST,
+        plan_every=_PLAN_EVERY,
+        name=f"{setup.path.name}, {label}",
+        progress=Progress(f"driving on {label} tires"),
+    )
     return ClosedLoop(
         label=label,
         model=model,
@@ -259,15 +264,6 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         learner=learner,
         known=() if witness is None else tuple(witness.known),
     )
-
-
-def _learner(label: str, setup: Setup, learnt: TireModel | None) -> LearningTires | None:
-    if label == ORACLE and setup.drops:
-        return _Informer(setup)
-    if label == LEARNING:
-        assert learnt is not None
-        return make_learner(learnt, setup.vehicle)
-    return None
 
 
 def drive(
@@ -320,29 +316,16 @@ def drive(
         Where a number is not that of a drive, there is no tire to go on learning from, or no C
         compiler for the tracker.
     """
-    periods = delay_periods(delay)
-    for name, value in (("share", share), ("laps", laps), ("speed", speed)):
+    for name, value in (("share", share), ("speed", speed)):
         if value is not None and not value > 0.0:
             raise ValueError(f"{name} must be positive, it is {value:g}")
-    if sensors not in SENSORS:
-        raise ValueError(f"sensors must be one of {', '.join(SENSORS)}, not {sensors!r}")
-    if laps != 1.0 and not path.closed:
-        raise ValueError(f"laps are of a closed path, {path.name} is not")
     if learning and tire is None:
         raise ValueError("learning goes on from a tire: none is given")
-    require_within(ValueError, *CHOSEN.frictions, friction=friction)
-    require_within(ValueError, 0.0, 1.0, caution=caution)
-    vehicle.require_chassis()
-    setup = Setup(
-        path=path,
-        vehicle=vehicle,
-        mu=friction,
-        drops=(),
-        wish=SpeedWish(share if speed is None else None, speed),
-    )
+    wish = SpeedWish(share if speed is None else None, speed)
+    setup = Setup(path=path, vehicle=vehicle, mu=friction, drops=(), wish=wish)
     conditions = Conditions(
         setup=setup,
-        delay=periods,
+        delay=delay_periods(delay),
         noise=noise,
         seed=seed,
         laps=laps,

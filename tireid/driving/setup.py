@@ -3,10 +3,10 @@
 Grip is that of the true tire in steady cornering on the friction of the start.
 """
 
-from collections.abc import Hashable
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,9 +18,17 @@ from mpc.cars import DoubleTrackCar
 from mpc.loop.sensing import SpeedProfile, cornering_limit
 from mpc.path import Path, grip_speed, steady_speed
 from mpc.tires import PredictionTire, oracle_tire
-from tireid.driving.chosen import CHOSEN
+
+WIDEST = 2.0  # deviation at which a car is off the path [m]
+FASTEST = 30.0  # on a closed course [m/s]
+ACCELERATION = 2.0  # on a closed course at friction 1 [m/s²]
+BRAKING = 3.0  # on a closed course at friction 1 [m/s²]
+PERIOD = 0.01  # control period [s]
 
 PLANT = "double-track"
+
+
+_oracle: Callable[..., PredictionTire] = cache(oracle_tire)
 
 
 class SpeedWish(NamedTuple):
@@ -49,15 +57,14 @@ class Setup:
     def car(self, *, open_field: bool = False) -> DoubleTrackCar:
         """Return a car on the road, or on a field that has the friction of the start everywhere."""
         friction = Friction(scale=self.mu) if open_field else self.friction()
-        return DoubleTrackCar(self.vehicle, friction=friction, period=CHOSEN.period)
+        return DoubleTrackCar(self.vehicle, friction=friction, period=PERIOD)
 
     def oracle(self, mu: float | None = None) -> PredictionTire:
         """Return the true tire on a road.
 
         mu : its friction; None is that of the start.
         """
-        tire = cast(Hashable, self._tire())
-        return _oracle(self.vehicle, tire, self.mu if mu is None else mu)
+        return _oracle(self.vehicle, self._tire(), self.mu if mu is None else mu)
 
     def _tire(self) -> Tire:
         return self.car(open_field=True).tire
@@ -81,9 +88,9 @@ class Setup:
         return grip_speed(
             self.path,
             a_y_max=a_y,
-            v_max=CHOSEN.fastest,
-            a_accel=self.mu * CHOSEN.acceleration,
-            a_brake=self.mu * CHOSEN.braking,
+            v_max=FASTEST,
+            a_accel=self.mu * ACCELERATION,
+            a_brake=self.mu * BRAKING,
         )
 
     def profile(self) -> SpeedProfile:
@@ -121,8 +128,3 @@ class Setup:
     @property
     def _runs_along_x(self) -> bool:
         return not self.path.closed and bool(np.all(np.cos(self.path.psi) > 0.2))
-
-
-@cache
-def _oracle(vehicle: Vehicle, tire: Hashable, mu: float) -> PredictionTire:
-    return oracle_tire(vehicle, cast(Tire, tire), mu)

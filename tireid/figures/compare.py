@@ -1,17 +1,17 @@
 """Methods side by side: how far off online, frozen where learnt, and frozen elsewhere."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from codegen.escape import mathtext
 from identifier.compare.course import same_and_other
 from identifier.compare.study import Comparison, ranking
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
+
+_FARTHEST = 300.0  # [%], what is worse is drawn at the end of the axis
+_ROW = 0.3  # height of a method [in]
 
 
 def short_names(names: Sequence[str]) -> dict[str, str]:
@@ -40,25 +40,37 @@ def methods_figure(comparison: Comparison) -> Figure:
     """Draw a row for each method: means over recordings, lines from the best to the worst."""
     rows = {method_label(name): _method_errors(comparison, name) for name in ranking(comparison)}
     lost = {method_label(n) for n, trial in comparison.trials.items() if trial.diverged_at}
-    figure = style.new_figure(CHOSEN.page, 0.9 + CHOSEN.row * len(rows))
+    figure = style.new_figure(0.9 + _ROW * len(rows))
     axes = figure.subplots()
     every = [v for row in rows.values() for vs in row.values() for v in vs]
     finite = [value for value in every if np.isfinite(value)]
-    low, high = min(finite, default=1.0), min(max(finite, default=100.0), CHOSEN.compare_farthest)
+    low, high = min(finite, default=1.0), min(max(finite, default=100.0), _FARTHEST)
     axes.set(xscale="log", xlim=(low / 1.2, high * 1.2))
     style.few_ticks(axes.xaxis)
     for position, (label, errors) in enumerate(rows.items()):
-        _draw_row(axes, position, errors)
+        for kind, values in errors.items():
+            if values:
+                color, marker, shift = _KINDS[kind]
+                y, shown = position + shift, np.minimum(values, _FARTHEST * 1.1)
+                axes.hlines(y, shown.min(), shown.max(), color=color, linewidth=1.0, alpha=0.6)
+                mean = min(float(np.mean(values)), _FARTHEST * 1.1)
+                axes.plot(mean, y, marker, color=color, ms=4.5, clip_on=False, label=kind)
         if label in lost:
-            place: Mapping[str, Any] = {"transform": axes.get_yaxis_transform(), "va": "center"}
-            axes.text(0.995, position, "diverged", color=style.GREY, ha="right", **place)
+            axes.text(
+                0.995,
+                position,
+                "diverged",
+                color=style.GREY,
+                ha="right",
+                transform=axes.get_yaxis_transform(),
+                va="center",
+            )
         axes.axhline(position + 0.5, color="#DDDDDD", linewidth=0.5)
     axes.set_yticks(range(len(rows)), list(rows))
     axes.tick_params(axis="y", length=0.0)
     axes.grid(visible=False, axis="y")
     axes.set_ylim(len(rows) - 0.5, -0.5)
     axes.set_xlabel(f"{comparison.course.measure}, both axles [% of rms force]")
-    style.legend_above(figure)
     return figure
 
 
@@ -69,15 +81,3 @@ def _method_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
     online = [course.share(rec, error) for rec, error in sane.items()]
     frozen = zip((_OWN, _OTHER), same_and_other(trial.frozen or {}), strict=True)
     return {ONLINE: online} | {kind: [course.share(*one) for one in some] for kind, some in frozen}
-
-
-def _draw_row(axes: Axes, position: int, errors: Mapping[str, list[float]]) -> None:
-    for kind, values in errors.items():
-        if not values:
-            continue
-        color, marker, shift = _KINDS[kind]
-        shown = np.minimum(values, CHOSEN.compare_farthest * 1.1)
-        y = position + shift
-        axes.plot([shown.min(), shown.max()], [y, y], color=color, linewidth=1.0, alpha=0.6)
-        mean = min(float(np.mean(values)), CHOSEN.compare_farthest * 1.1)
-        axes.plot(mean, y, marker, color=color, ms=4.5, clip_on=False, label=kind)

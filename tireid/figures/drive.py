@@ -12,18 +12,37 @@ from codegen.arrays import Array
 from models.faults import SensorFault
 from models.vehicle import Vehicle
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
 
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
     from mpc.path import Path
+
+# dashes of tires as they are at the end of a drive [points]
+_LATER = (0, (2.5, 0.9))
+_NEAR = 0.75  # a limit is drawn where a command comes this close to it
+_FRONT_OVERHANG = 0.32  # of the wheelbase, beyond the front axle
+_REAR_OVERHANG = 0.36  # of the wheelbase, beyond the rear axle
+_TRACK = 0.57  # of the wheelbase, where no chassis says
+_BODY_BESIDE_TRACK = 0.1  # of the wheelbase: how much wider than the track the body is
+_WHEEL_LENGTH = 0.24  # of the wheelbase
+_WHEEL_WIDTH = 0.085  # of the wheelbase
+_CORNERS = 33  # points of the body
+_ROUNDING = 0.3  # of its corners: exponent of a circle that becomes a rectangle
+# a long and narrow path goes on in the next row after about this many meters
+_ROW_LENGTH = 80.0
+_MOST_ROWS = 5  # of a path
+_NARROW = 4.0  # from this ratio between its extents on a path is long and narrow
+_MARGIN = 3.0  # around the path [m]
+_RUN_UP = 16.0  # of the straights before and after the cones that is shown [m]
+_HIGHEST = 5.0  # panel [in]
+_CARS_EVERY = 2.6  # wheelbases between two outlines
 
 
 @style.styled
 def drive_solve_figure(drive: "Drive") -> Figure:
     """Draw the solve times of a drive, their median and the time that one of a hundred exceeds."""
     times = 1e3 * drive.solve_time  # ms
-    figure = style.new_figure(CHOSEN.page, 2.5)
+    figure = style.new_figure(2.5)
     axes = figure.subplots()
     axes.plot(
         drive.t, times, ".", ms=2.2, mew=0.0, color=style.BLUE, rasterized=True, label="a step"
@@ -40,7 +59,6 @@ def drive_solve_figure(drive: "Drive") -> Figure:
     period = f"largest {times.max():.3g} ms of a period of {1e3 * drive.period:g} ms"
     axes.set_title(period, loc="right")
     axes.set_title(f"{times.size} steps")
-    style.legend_above(figure)
     return figure
 
 
@@ -72,9 +90,7 @@ _TIRES: Mapping[str, Mapping[str, Any]] = {
 def tire_look(label: str) -> dict[str, Any]:
     """Return color, line style and width of a tire in every figure."""
     look = dict(_TIRES.get(label.split()[0], _TIRES["frozen"]))
-    return (
-        look | {"linestyle": CHOSEN.later, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
-    )
+    return look | {"linestyle": _LATER, "linewidth": 1.4} if label.endswith(AT_THE_END) else look
 
 
 _REPLANNED, _NOTICED = "plans with another tire or grip", "sensor fault noticed"
@@ -94,7 +110,7 @@ def drive_errors_figure(
     off_path : deviation [m] at which a car counts as off the path, drawn where it comes near.
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = style.new_figure(CHOSEN.page, 5.2)
+    figure = style.new_figure(5.2)
     panels = figure.subplots(4, 1, sharex=True)
     labels = ("deviation $e_y$\n[m]", "heading error\n[deg]", "lateral acc.\n[m/s²]")
     for label, drive in reversed(list(drives.items())):
@@ -104,8 +120,16 @@ def drive_errors_figure(
             axes.plot(drive.s, curve, label=label, **look)
         if drive.notes:
             at = np.searchsorted(drive.t, [t for t, _ in drive.notes]).clip(max=drive.t.size - 1)
-            mark: Mapping[str, Any] = {"color": look["color"], "ms": 3.2, "mfc": "white"}
-            panels[0].plot(drive.s[at], drive.e_y[at], "D", label=_REPLANNED, **mark, zorder=3.0)
+            panels[0].plot(
+                drive.s[at],
+                drive.e_y[at],
+                "D",
+                label=_REPLANNED,
+                color=look["color"],
+                ms=3.2,
+                mfc="white",
+                zorder=3.0,
+            )
     for axes, label in zip(panels, (*labels, "speed $v_x$\n[m/s]"), strict=True):
         axes.set_ylabel(label)
         _mark_road(axes, drives, drops, faults)
@@ -123,8 +147,7 @@ def drive_errors_figure(
     last = max(float(drive.s[-1]) for drive in drives.values())
     panels[-1].set(xlabel=ARC, xlim=(0.0, last))
     figure.align_ylabels(panels)
-    order = (*drives, _REPLANNED, *(friction_label(mu) for _, mu in drops))
-    style.legend_above(figure, order=order)
+    style.legend_above(figure, last=(*drives, _REPLANNED))
     return figure
 
 
@@ -133,9 +156,10 @@ def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
 
     drops : arc length [m] and friction from there on.
     """
-    look: Mapping[str, Any] = {"color": style.GREY, "linewidth": 0.8, "linestyle": (0, (4, 2))}
     for place, mu in drops:
-        axes.axvline(place, label=friction_label(mu), **look)
+        axes.axvline(
+            place, label=f"friction {mu:g}", color=style.GREY, linewidth=0.8, linestyle=(0, (4, 2))
+        )
 
 
 def _mark_road(
@@ -149,24 +173,26 @@ def _mark_road(
 
     mark_drops(axes, drops)
     first = next(iter(drives.values()))
-    shade: Mapping[str, Any] = {"facecolor": "#F6D9D5", "edgecolor": "none", "zorder": 0}
     for fault in faults:
         if fault.start <= first.t[-1]:
             span = np.interp([fault.start, fault.start + fault.duration], first.t, first.s)
-            axes.axvspan(*map(float, span), label=f"{fault.channel} {fault.kind}", **shade)
+            axes.axvspan(
+                *map(float, span),
+                label=f"{fault.channel} {fault.kind}",
+                facecolor="#F6D9D5",
+                edgecolor="none",
+                zorder=0,
+            )
     for label, drive in drives.items():
-        look = {"color": tire_look(label)["color"], "linewidth": 1.2, "linestyle": (0, (1, 1))}
         for t, text in drive.notes:
             if text.startswith(Verdict.FAULT.value):
-                axes.axvline(float(np.interp(t, drive.t, drive.s)), label=_NOTICED, **look)
-
-
-def friction_label(mu: float) -> str:
-    """Return what a legend calls a friction of the road.
-
-    mu : over that of the tire's measurement [-].
-    """
-    return f"friction {mu:g}"
+                axes.axvline(
+                    float(np.interp(t, drive.t, drive.s)),
+                    label=_NOTICED,
+                    color=tire_look(label)["color"],
+                    linewidth=1.2,
+                    linestyle=(0, (1, 1)),
+                )
 
 
 @style.styled
@@ -183,14 +209,19 @@ def drive_steering_figure(
     angle_limit : that the tracker keeps [rad].   rate_limit : that the tracker keeps [rad/s].
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = style.new_figure(CHOSEN.page, 3.4)
+    figure = style.new_figure(3.4)
     angle, rate = figure.subplots(2, 1, sharex=True)
     for label, drive in reversed(list(drives.items())):
         look = tire_look(label)
         angle.plot(drive.s, np.rad2deg(drive.command), label=label, **look)
     name, first = next(iter(drives.items()))
-    wheels: Mapping[str, Any] = {"color": style.PURPLE, "label": f"wheels of {name}"}
-    angle.plot(first.s, np.rad2deg(first.delta), linewidth=0.8, **wheels)
+    angle.plot(
+        first.s,
+        np.rad2deg(first.delta),
+        linewidth=0.8,
+        color=style.PURPLE,
+        label=f"wheels of {name}",
+    )
     speed = np.rad2deg(np.diff(first.command) / np.diff(first.t))
     rate.plot(first.s[1:], speed, **(tire_look(name) | {"linewidth": 0.7, "linestyle": "-"}))
     for axes, limit, label in (
@@ -199,14 +230,14 @@ def drive_steering_figure(
     ):
         axes.set_ylabel(label)
         most = float(np.rad2deg(limit))
-        if max(np.abs(axes.get_ylim())) > CHOSEN.near * most:
+        if max(np.abs(axes.get_ylim())) > _NEAR * most:
             for side in (-most, most):
                 look = {"color": "#AA4499", "linewidth": 0.8, "linestyle": (0, (4, 2))}
                 axes.axhline(side, label="limit", **look)
         _mark_road(axes, drives, drops, faults)
     rate.set(xlabel=ARC, xlim=(0.0, max(float(drive.s[-1]) for drive in drives.values())))
     figure.align_ylabels([angle, rate])
-    style.legend_above(figure, order=tuple(drives))
+    style.legend_above(figure, last=tuple(drives))
     return figure
 
 
@@ -232,21 +263,19 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
     """
     long = vehicle.wheelbase
     chassis = vehicle.chassis
-    tracks = (
-        (CHOSEN.track * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
-    )
-    half = 0.5 * (max(tracks) + CHOSEN.body_beside_track * long)
+    tracks = (_TRACK * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
+    half = 0.5 * (max(tracks) + _BODY_BESIDE_TRACK * long)
     front, rear = (
-        vehicle.l_f + CHOSEN.front_overhang * long,
-        -vehicle.l_r - CHOSEN.rear_overhang * long,
+        vehicle.l_f + _FRONT_OVERHANG * long,
+        -vehicle.l_r - _REAR_OVERHANG * long,
     )
-    angle = np.linspace(0.0, 2.0 * np.pi, CHOSEN.corners)
+    angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
     round_ = np.column_stack([np.cos(angle), np.sin(angle)])
-    body = np.sign(round_) * np.abs(round_) ** CHOSEN.rounding * (0.5 * (front - rear), half)
+    body = np.sign(round_) * np.abs(round_) ** _ROUNDING * (0.5 * (front - rear), half)
     body += (0.5 * (front + rear), 0.0)
     glass = np.array([(0.37, 0.6), (0.23, 0.78), (0.23, -0.78), (0.37, -0.6)]) * (long, half)
     corners = np.array([(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)])
-    wheel = 0.5 * long * corners * (CHOSEN.wheel_length, CHOSEN.wheel_width)
+    wheel = 0.5 * long * corners * (_WHEEL_LENGTH, _WHEEL_WIDTH)
     wheels = np.stack(
         [
             wheel @ _turn(angle).T + (x, 0.5 * side * track)
@@ -263,7 +292,7 @@ def _turn(angle: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
-_INNER_WIDTH = CHOSEN.page - 0.75  # what labels leave of the page [in]
+_INNER_WIDTH = style.PAGE - 0.75  # what labels leave of the page [in]
 
 
 @style.styled
@@ -273,11 +302,11 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
     low, high = _extent(path, drives)
     width, height = high - low
     rows = 1
-    if width > CHOSEN.narrow * height:
-        rows = min(CHOSEN.most_rows, max(1, round(width / CHOSEN.row_length)))
+    if width > _NARROW * height:
+        rows = min(_MOST_ROWS, max(1, round(width / _ROW_LENGTH)))
     step = width / rows
-    inch = min(_INNER_WIDTH / step, CHOSEN.highest / height)  # of a meter
-    figure = style.new_figure(CHOSEN.page, rows * (height * inch + 0.3) + 0.6)
+    inch = min(_INNER_WIDTH / step, _HIGHEST / height)  # of a meter
+    figure = style.new_figure(rows * (height * inch + 0.3) + 0.6)
     panels = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for row, axes in enumerate(panels):
         ends = float(low[0] + row * step), float(low[0] + (row + 1) * step)
@@ -286,21 +315,19 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
         axes.set_yticks(axes.get_yticks()[1:-1:1])
         axes.set_ylim(low[1], high[1])
     panels[-1].set_xlabel("X [m]")
-    style.legend_above(figure, order=tuple(drives))
+    style.legend_above(figure, last=tuple(drives))
     return figure
 
 
 def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
     """Corners of what is shown: the path with its cones, and the tracks as far as not absurd."""
-    places = np.column_stack([path.X, path.Y])
-    low, high = places.min(axis=0) - CHOSEN.margin, places.max(axis=0) + CHOSEN.margin
+    places = np.vstack([np.column_stack([path.X, path.Y]), path.cones])
+    low, high = places.min(axis=0) - _MARGIN, places.max(axis=0) + _MARGIN
     if len(path.cones):
-        first, last = path.cones.min(axis=0), path.cones.max(axis=0)
-        low, high = np.minimum(low, first - CHOSEN.margin), np.maximum(high, last + CHOSEN.margin)
-        low[0] = max(low[0], first[0] - CHOSEN.run_up)
-        high[0] = min(high[0], last[0] + CHOSEN.run_up)
+        X = path.cones[:, 0]
+        low[0], high[0] = max(low[0], X.min() - _RUN_UP), min(high[0], X.max() + _RUN_UP)
     driven = np.concatenate([drive.Y for drive in drives.values()])
-    room = 2.0 * CHOSEN.margin
+    room = 2.0 * _MARGIN
     low[1] = np.clip(driven.min() - 2.0, low[1] - room, low[1])
     high[1] = np.clip(driven.max() + 2.0, high[1], high[1] + room)
     return low, high
@@ -311,7 +338,7 @@ def _draw(axes: Axes, path: "Path", drives: Mapping[str, "Drive"]) -> None:
     if len(path.cones):
         axes.plot(*path.cones.T, **CONES)
     label, drive = next(iter(drives.items()))
-    color, every = tire_look(label)["color"], CHOSEN.cars_every * drive.vehicle.wheelbase
+    color, every = tire_look(label)["color"], _CARS_EVERY * drive.vehicle.wheelbase
     at = np.searchsorted(drive.s, np.arange(drive.s[0], drive.s[-1], every))
     shapes = [
         car_shape(drive.vehicle, drive.X[k], drive.Y[k], drive.psi[k], drive.delta[k])

@@ -21,8 +21,7 @@ from models.recordings import Recording
 from models.rules import require_kind
 from models.vehicle import Vehicle
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
-from tireid.figures.thinned import Signal, drawn_times, shown
+from tireid.figures.thinned import drawn_times, shown
 
 _Curve = tuple[Array, Mapping[str, Any]]  # forces of both axles (n, 2) [N], and their look
 _RESIDUAL: Mapping[str, Any] = {  # noise for the most part, which would make a drawing large
@@ -37,7 +36,7 @@ def _force_panels(
     rows: Sequence[tuple[str, Sequence[_Curve]]],
     known: Array | None,
     missed: Sequence[_Curve],
-    window: style.Window = None,
+    window: tuple[float, float] | None = None,
     heights: tuple[float, float] = (2.0, 1.0),
 ) -> tuple[Figure, NDArray[Any], style.ForceUnit]:
     """Draw forces in rows, below them what some miss of those that are known.
@@ -45,12 +44,11 @@ def _force_panels(
     rows : title of each behind the axle's name, and its curves.
     known : (n, 2) [N]; None misses nothing.   heights : of a row of forces, of the residual [in].
     """
-    ends = style.time_window(recording.t, window)
+    ends = (recording.t[0], recording.t[-1]) if window is None else window
     curves = [force for _, row in rows for force, _ in row]
     reference = curves[0] if known is None else known
-    signals: list[Signal] = [force.__getitem__ for force in (reference, *curves)]
-    signals += [_missed(force, reference) for force in curves]
-    part = shown(recording.t, ends, *signals)
+    errors = [force - reference for force in curves]
+    part = shown(recording.t, ends, reference, *curves, *errors)
     t, unit = drawn_times(recording, recording.t[part]), style.force_unit_of(reference[part])
 
     def scaled(force: Array) -> Array:
@@ -78,16 +76,12 @@ def _force_panels(
     return figure, panels, unit
 
 
-def _missed(force: Array, reference: Array) -> Signal:
-    return lambda at: force[at] - reference[at]
-
-
 @style.styled
 def force_figure(
     history: History,
     replays: Mapping[float, Replay] | None = None,
     *,
-    window: style.Window = None,
+    window: tuple[float, float] | None = None,
     since: float | None = None,
 ) -> Figure:
     """Draw forces of front and rear axle over time: identified online, and replayed frozen.
@@ -130,7 +124,6 @@ def force_figure(
         if len(panels) > len(rows):
             against = "online" if truth is None else "truth"
             panels[-1, axle].set_title(f"{name}, residual to {against}")
-    style.legend_above(figure)
     return figure
 
 
@@ -163,24 +156,6 @@ def prediction_figure(replay: Replay | Prediction, online: History | None = None
     if known is not None:
         for axle, axes in enumerate(panels[0]):
             style.note(axes, _errors(replay, unit, axle))
-    style.legend_above(figure)
-    return figure
-
-
-@style.styled
-def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
-    """Draw forces of frozen models over one drive with true forces, and what each misses."""
-    recording = next(iter(replays.values())).recording
-    truth = recording.axle_force
-    assert truth is not None
-    colors = (style.ORANGE, *style.SERIES)
-    curves = [
-        (replay.axle_force, {"color": color, "linewidth": 1.1, "label": label})
-        for (label, replay), color in zip(replays.items(), colors, strict=False)
-    ]
-    row = [("", [(truth, style.TRUTH), *curves])]
-    figure, _, _ = _force_panels(recording, row, truth, curves)
-    style.legend_above(figure)
     return figure
 
 
@@ -188,25 +163,24 @@ def side_by_side_figure(replays: Mapping[str, Replay]) -> Figure:
 def inputs_figure(recording: Recording) -> Figure:
     """Draw the signals of a recording; rear steering and a_y only where there are any."""
     require_kind(Recording, "as of read_recording, or run.recording", recording=recording)
-    ends = float(recording.t[0]), float(recording.t[-1])
+    ends = recording.t[0], recording.t[-1]
     estimated = ", estimated" if recording.estimated else ""
     logged = {
-        "$v_x$ [m/s]": (recording.v_x, 1.0),
-        "steering [deg]": (recording.delta_f, np.degrees(1.0)),
-        f"$v_y$ [m/s]{estimated}": (recording.v_y, 1.0),
-        "$r$ [deg/s]": (recording.r, np.degrees(1.0)),
-        "$a_y$ [m/s²]": (recording.a_y, 1.0),
+        "$v_x$ [m/s]": recording.v_x,
+        "steering [deg]": np.degrees(recording.delta_f),
+        f"$v_y$ [m/s]{estimated}": recording.v_y,
+        "$r$ [deg/s]": np.degrees(recording.r),
+        "$a_y$ [m/s²]": recording.a_y,
     }
-    signals = {label: (one, k) for label, (one, k) in logged.items() if one is not None}
-    drawn = [recording.delta_r, *(signal for signal, _ in signals.values())]
-    part = shown(recording.t, ends, *(signal.__getitem__ for signal in drawn))
+    signals = {label: one for label, one in logged.items() if one is not None}
+    part = shown(recording.t, ends, recording.delta_r, *signals.values())
     t = drawn_times(recording, recording.t[part])
-    figure = style.new_figure(CHOSEN.page, 0.5 + 1.05 * len(signals))
+    figure = style.new_figure(0.5 + 1.05 * len(signals))
     panels = figure.subplots(len(signals), 1, sharex=True)
     panels[0].set_xlim(ends)
-    for axes, (label, (signal, scale)) in zip(panels, signals.items(), strict=True):
-        values = scale * signal[part]
-        axes.plot(t, values, color=style.BLUE, linewidth=0.9, label=label)
+    for axes, (label, signal) in zip(panels, signals.items(), strict=True):
+        values = signal[part]
+        axes.plot(t, values, color=style.BLUE, linewidth=0.9)
         axes.set_ylabel(label)
         span = float(np.ptp(values))
         middle = float(values.min()) + span / 2
@@ -242,5 +216,4 @@ def draw_diagnosis(
         panel.set_xlabel("slip angle [deg]")
         panel.axhline(0.0, color=style.GREY, linewidth=0.5)
     panels[0, 0].set_ylabel("force from the motion [load]")
-    style.legend_above(figure)
     return figure

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,8 +15,10 @@ from identifier.setup import force_unit_name
 from identifier.stability.loop import Loop, eigenvalues, root_locus
 from identifier.stability.margins import gain_margin, phase_margin
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
 from tireid.figures.thinned import shown_of_run
+
+_WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
+_OFFSET = 0.2  # between neighboring laws, as a share of the distance of columns
 
 SCHEME = Path(__file__).with_name("fig1_scheme.png")  # Fig. 1, and as .svg beside it
 
@@ -36,7 +37,6 @@ def error_figure(
     freeze_times : times at which weights were taken [s].
     """
     recording = history.recording
-    ends = style.time_window(recording.t, None)
     # A root of squares would overflow where a law diverges; hypot does not.
     t, (norm,) = shown_of_run(history, lambda block: [np.hypot(*block.outputs["xi_tilde"].T)])
     known = {name: bound for name, bound in (bounds or {}).items() if np.isfinite(bound)}
@@ -44,10 +44,10 @@ def error_figure(
     typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
     top = max(peak, *known.values()) if known else peak
 
-    figure = style.new_figure(CHOSEN.page, 2.6)
+    figure = style.new_figure(2.6)
     axes = figure.subplots()
-    axes.set_xlim(ends)
-    if top > CHOSEN.paper_wide * peak or peak > 100.0 * CHOSEN.paper_wide * typical:
+    axes.set_xlim(recording.t[0], recording.t[-1])
+    if top > _WIDE * peak or peak > 100.0 * _WIDE * typical:
         axes.set_yscale("log")
         axes.set_ylim(typical / 30.0, 2.0 * top)
     else:
@@ -62,7 +62,7 @@ def error_figure(
     unit = force_unit_name(style.paper_design(history).force_unit)
     axes.set(ylabel=rf"error norm $|\tilde{{\xi}}|$ [{unit} s]")
     style.label_time(axes, recording.t)
-    style.legend_above(figure, columns=min(4, 1 + len(known) + bool(freeze_times)))
+    style.legend_above(figure, columns=4)
     return figure
 
 
@@ -84,12 +84,11 @@ def weights_figure(history: History, freeze_times: Sequence[float] = ()) -> Figu
     freeze_times : times at which weights were taken [s].
     """
     recording, design = history.recording, style.paper_design(history)
-    ends = style.time_window(recording.t, None)
     t, (W, V) = shown_of_run(history, lambda block: [block.before["W"], block.before["V"]])
 
-    figure = style.new_figure(CHOSEN.page, 4.2)
+    figure = style.new_figure(4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)
-    upper.set_xlim(ends)
+    upper.set_xlim(recording.t[0], recording.t[-1])
     _lines(upper, t, W[:, 0, :], style.GREEN, "front axle")
     _lines(upper, t, W[:, 1, :], style.PURPLE, "rear axle")
     upper.set_ylabel(rf"weights $\hat{{W}}$ [{force_unit_name(design.force_unit)}]")
@@ -135,9 +134,8 @@ def comparison_figure(
     paper : by law, by column: the value that the paper prints [kN].
     """
     columns = list(dict.fromkeys(name for row in results.values() for name in row))
-    figure = style.new_figure(CHOSEN.page, 2.9)
+    figure = style.new_figure(2.9)
     axes = figure.subplots()
-    drawn: list[float] = []
     order: list[str] = []
     for number, (law, row) in enumerate(results.items()):
         if not row:
@@ -145,31 +143,45 @@ def comparison_figure(
         label = VARIANTS[law].title.replace("eta/lambda", "η/λ")
         color, marker = _MARKS[law]
         order += [label, f"{label} (paper)"]
-        shift = CHOSEN.offset * (number - (len(results) - 1) / 2)
-        middle, low, high = np.array(list(row.values()), dtype=np.float64).T
-        middle = np.where(np.isfinite(middle), middle, np.nan)
-        whiskers = [np.where(np.isfinite(end), abs(middle - end), 0.0) for end in (low, high)]
-        at = [columns.index(name) + shift for name in row]
-        look: Mapping[str, Any] = {"color": color, "ms": 4.5, "elinewidth": 1.2, "capsize": 3.0}
-        axes.errorbar(at, middle, yerr=whiskers, fmt=marker, label=label, **look)
+        places = {name: k + _OFFSET * (number - 1) for k, name in enumerate(columns)}
+        middle, *ends = np.array(list(row.values()), dtype=np.float64).T
+        middle[~np.isfinite(middle)] = np.nan
+        whiskers = np.nan_to_num(np.abs(middle - ends), nan=0.0, posinf=0.0)
+        axes.errorbar(
+            [places[name] for name in row],
+            middle,
+            yerr=whiskers,
+            fmt=marker,
+            label=label,
+            color=color,
+            ms=4.5,
+            elinewidth=1.2,
+            capsize=3.0,
+        )
         printed = {name: value for name, value in paper.get(law, {}).items() if name in row}
         if printed:
-            at = [columns.index(name) + shift + 0.07 for name in printed]
-            look = {"ms": 5.0, "mfc": "white", "mec": color, "mew": 1.1}
-            axes.plot(at, list(printed.values()), marker, label=f"{label} (paper)", **look)
-        drawn += [*middle, *(middle - whiskers[0]), *(middle + whiskers[1]), *printed.values()]
-    positive = [value for value in drawn if value > 0.0]
-    if positive and max(positive) > CHOSEN.paper_wide * min(positive):
-        axes.set(yscale="log", ylim=(min(positive) / 1.5, max(positive) * 1.5))
+            axes.plot(
+                [places[name] + 0.07 for name in printed],
+                list(printed.values()),
+                marker,
+                label=f"{label} (paper)",
+                ms=5.0,
+                mfc="white",
+                mec=color,
+                mew=1.1,
+            )
+    low, high = axes.dataLim.minposy, axes.dataLim.ymax
+    if high > _WIDE * low:
+        axes.set(yscale="log", ylim=(low / 1.5, 1.5 * high))
     else:
-        axes.set_ylim(0.0, 1.08 * max(positive, default=1.0))
+        axes.set_ylim(0.0, 1.08 * high if high > 0.0 else 1.0)
     axes.set_xticks(range(len(columns)), columns)
     axes.tick_params(axis="x", length=0.0)
     axes.grid(visible=False, axis="x")
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylabel="force RMSE [kN]")
     for boundary in range(1, len(columns)):
         axes.axvline(boundary - 0.5, color="#DDDDDD", linewidth=0.6)
-    style.legend_above(figure, columns=len(results), order=order)
+    style.legend_above(figure, columns=len(results), last=order)
     return figure
 
 
@@ -188,13 +200,14 @@ def locus_figure(loop: Loop, dt: float) -> Figure:
     design = 1.0 + eigenvalues(loop.matrix()) * dt
     margin = gain_margin(loop, dt)
     circle = np.exp(1j * np.linspace(-np.pi, np.pi, 2881))
-    figure = style.new_figure(CHOSEN.page, 3.5)
+    figure = style.new_figure(3.5)
     panels = figure.subplots(1, 2)
     span = 1.3 * float(np.abs(1.0 - design).max())
     views = (-1.1, 1.1, 1.1), (1.0 - 1.5 * span, 1.0 + 0.5 * span, span)
     for axes, (left, right, height) in zip(panels, views, strict=True):
-        limit: Mapping[str, Any] = {"color": style.BLACK, "label": "stability limit"}
-        axes.plot(circle.real, circle.imag, linewidth=0.9, **limit)
+        axes.plot(
+            circle.real, circle.imag, linewidth=0.9, color=style.BLACK, label="stability limit"
+        )
         axes.plot(locus.real, locus.imag, ".", color=style.GREY, markersize=1.0, label="any gain")
         axes.plot(design.real, design.imag, "o", color=style.BLUE, markersize=4.5, label="design")
         if 0.0 < margin.factor < np.inf:
@@ -207,5 +220,4 @@ def locus_figure(loop: Loop, dt: float) -> Figure:
     panels[0].set_title("Poles of the sampled loop")
     phase = phase_margin(loop, dt)
     panels[1].set_title(f"Near z = 1; phase margin {phase:.0f}°")
-    style.legend_above(figure)
     return figure

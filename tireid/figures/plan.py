@@ -5,13 +5,12 @@ from matplotlib.figure import Figure
 
 from identifier.plan import Planned
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
 
 
 @style.styled
 def plan_figure(best: Planned, ratio: float | None) -> Figure:
     """Draw the angle of the front wheels, the lateral acceleration, and the way."""
-    figure = style.new_figure(CHOSEN.page, 5.0)
+    figure = style.new_figure(5.0)
     steering, felt, way = figure.subplots(3, 1)
     steering.plot(best.log.t, np.degrees(best.log.delta_f), color=style.BLUE)
     steering.set(ylabel="front wheels [deg]", title=f"{best.name} at {best.speed:.3g} m/s")

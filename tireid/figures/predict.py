@@ -10,7 +10,6 @@ from codegen.arrays import thinning
 from identifier.verdict import RoadFriction, WindowForces
 from models.vehicle import Vehicle
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
 
 _POINTS: Mapping[str, Any] = {"linestyle": "", "marker": ".", "markersize": 3.0, "rasterized": True}
 
@@ -31,7 +30,6 @@ def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
         style.label_time(lower, shown.t)
     panels[0, 0].set_ylabel(f"mean force [{unit.name}]")
     panels[1, 0].set_ylabel(f"missed [{unit.name}]")
-    style.legend_above(figure)
     return figure
 
 
@@ -40,18 +38,23 @@ def friction_figure(friction: RoadFriction) -> Figure:
     """Draw the friction of a drive's road over that of the drive that taught, and its doubt."""
     some = slice(None, None, thinning(len(friction.t)))
     t, ratio, sd = friction.t[some], friction.ratio[some], friction.sd[some]
-    figure = style.new_figure(CHOSEN.page, 2.8)
+    figure = style.new_figure(2.8)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
     ends = ratio * np.exp(-sd), ratio * np.exp(sd)
-    shade: Mapping[str, Any] = {"color": style.SKY, "alpha": 0.5, "linewidth": 0.0}
-    upper.fill_between(t, *ends, label="one standard deviation", **shade)
+    upper.fill_between(
+        t, *ends, label="one standard deviation", color=style.SKY, alpha=0.5, linewidth=0.0
+    )
     upper.plot(t, ratio, color=style.BLUE, label="friction")
     upper.axhline(1.0, color=style.GREY, linewidth=0.8, linestyle="--", label="as taught")
     upper.set(ylabel="friction over that of\nthe identification drive", ylim=(0.0, None))
     lower.plot(t, friction.another[some], color=style.ORANGE, label="another road")
-    look: Mapping[str, Any] = {"color": style.BLACK, "linestyle": ":"}
-    lower.plot(t, friction.unexplained[some], label="no friction explains it", **look)
+    lower.plot(
+        t,
+        friction.unexplained[some],
+        label="no friction explains it",
+        color=style.BLACK,
+        linestyle=":",
+    )
     lower.set(ylabel="probability", ylim=(-0.05, 1.05))
     style.label_time(lower, friction.t)
-    style.legend_above(figure)
     return figure

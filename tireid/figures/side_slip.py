@@ -12,13 +12,15 @@ from codegen.arrays import Array
 from identifier.compare.course import SIGMAS, SideSlip
 from models.recordings import Recording
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
 from tireid.figures.compare import method_label, short_names
 from tireid.figures.drive import ARC
 from tireid.figures.thinned import drawn_times, shown
 
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
+
+_MOST = 4  # recordings that are drawn
+_BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
 
 _FIRST = "inertial"  # which has the band where several estimate v_y
 _OTHERS = (style.ORANGE, style.GREEN, style.PURPLE, style.AMBER, style.SKY, style.GREY)
@@ -35,7 +37,7 @@ def side_slip_figure(
 
     Where that is not there, it is of the first method that has one.
     """
-    drawn = list(recordings)[: CHOSEN.most]
+    drawn = list(recordings)[:_MOST]
     given = {name: by_name for name, by_name in given.items() if by_name}
     has_band = {n: any(one.v_y_sd is not None for one in given[n].values()) for n in given}
     first = max(given, key=lambda name: (name == _FIRST, has_band[name]))
@@ -44,14 +46,13 @@ def side_slip_figure(
     }  # above the others
     others = [name for name in given if name != first]
     looks |= {n: {"color": color} for n, color in zip(others, cycle(_OTHERS), strict=False)}
-    figure = style.new_figure(CHOSEN.page, 0.7 + 1.5 * len(drawn))
+    figure = style.new_figure(0.7 + 1.5 * len(drawn))
     panels = figure.subplots(len(drawn), 1, squeeze=False)[:, 0]
     names = short_names([recording.name for recording in recordings])
     for axes, recording in zip(panels, drawn, strict=True):
         axes.set_title(names[recording.name])
         _draw(axes, recording, {name: given[name][recording.name] for name in looks}, looks)
     figure.align_ylabels()
-    style.legend_above(figure, columns=CHOSEN.columns)
     return figure
 
 
@@ -62,15 +63,16 @@ def _draw(
     looks: Mapping[str, Mapping[str, Any]],
 ) -> None:
     """Draw the side slip of a recording, with the band of the first estimate."""
-    truth, ends, first = recording.logged_v_y, recording.t[[0, -1]], next(iter(given.values()))
-    part = shown(recording.t, ends, *(one.v_y.__getitem__ for one in given.values()))
+    truth, first = recording.logged_v_y, next(iter(given.values()))
+    ends = recording.t[0], recording.t[-1]
+    part = shown(recording.t, ends, *(one.v_y for one in given.values()))
     t = drawn_times(recording, recording.t[part])
 
     def slip(v_y: Array) -> Array:
         return _degrees(v_y[part], recording.v_x[part])
 
     main = slip(first.v_y if truth is None else truth)
-    limit = CHOSEN.beyond * max(float(np.abs(main).max()), 0.1)
+    limit = _BEYOND * max(float(np.abs(main).max()), 0.1)
     if first.v_y_sd is not None:
         room = SIGMAS * first.v_y_sd
         low, high = (slip(end).clip(-limit, limit) for end in (first.v_y - room, first.v_y + room))
@@ -95,9 +97,11 @@ def _degrees(v_y: Array, v_x: Array) -> Array:
 def drive_lateral_figure(drive: "Drive") -> Figure:
     """Draw the estimated v_y over the true one, and its error, each with the band of two sigma."""
     v_y, band = drive.estimates["v_y"], SIGMAS * drive.estimates["v_y_sd"]
-    figure = style.new_figure(CHOSEN.page, 3.6)
+    figure = style.new_figure(3.6)
     panels = figure.subplots(2, 1, sharex=True)
-    for axes, scale, zero in zip(panels, (1.0, 1e3), (0.0, drive.v_y), strict=True):  # m/s, mm/s
+    for axes, scale, zero in zip(
+        panels, (1.0, 1e3), (np.zeros_like(v_y), drive.v_y), strict=True
+    ):  # m/s, mm/s
         for curve, look in (
             (drive.estimates["inertial_v_y"], _ALONE),
             (drive.v_y, style.TRUTH),
@@ -110,5 +114,4 @@ def drive_lateral_figure(drive: "Drive") -> Figure:
     panels[0].set(ylabel="$v_y$\n[m/s]", xlim=drive.s[[0, -1]])
     panels[1].set(ylabel="error of it\n[mm/s]", xlabel=ARC, ylim=(-reach, reach))
     figure.align_ylabels(panels)
-    style.legend_above(figure)
     return figure

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, ParamSpec
 
 import numpy as np
-from matplotlib import font_manager, get_data_path, rc_params_from_file, style
+from matplotlib import rc_params_from_file, style
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -26,7 +26,15 @@ from codegen.writing import write_file
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse, freeze_key
 from identifier.run import History
-from tireid.figures.chosen import CHOSEN
+
+PAGE = 7.16  # width of both columns of a paper [in]
+RESOLUTION = 200  # [dots per inch]
+CLOUDS = 130  # dots per inch of what is pixels in a drawing
+# s: of a clock that begins later, as a Unix time does, only the last digits are shown
+FAR = 1e5
+DIGITS_SHOWN = 100.0  # s
+# an axis reaches at most this many times beyond the force it is compared with
+FARTHEST = 3.0
 
 _P = ParamSpec("_P")
 
@@ -47,12 +55,18 @@ LOOK: dict[str, Any] = dict(_look.items())
 
 
 def styled(draw: Callable[_P, Figure]) -> Callable[_P, Figure]:
-    """Return a drawing function that works in the look of the project, whatever the user's own."""
+    """Return a drawing function that works in the look of the project, whatever the user's own.
+
+    A figure that has no legend gets one above its panels.
+    """
 
     @wraps(draw)
     def wrapper(*args: _P.args, **kwargs: _P.kwargs) -> Figure:
         with style.context(["default", LOOK]):
-            return draw(*args, **kwargs)
+            figure = draw(*args, **kwargs)
+            if not any(one.get_legend() for one in figure.axes) and not figure.legends:
+                legend_above(figure)
+            return figure
 
     return wrapper
 
@@ -64,12 +78,12 @@ class _NotebookFigure(Figure):
         return figure_png(self, resolution=100)
 
 
-def new_figure(width: float, height: float) -> Figure:
+def new_figure(height: float) -> Figure:
     """Return an empty figure that fits its labels into its size when drawn.
 
-    width : of the figure [in].   height : of the figure [in].
+    height : of the figure [in].
     """
-    figure = _NotebookFigure(figsize=(width, height), layout="constrained")
+    figure = _NotebookFigure(figsize=(PAGE, height), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
@@ -81,9 +95,10 @@ def axle_panels(
 
     room : above and below them [in].
     """
-    figure = new_figure(CHOSEN.page, room + sum(heights))
-    ratios: Mapping[str, Any] = {"height_ratios": heights, "squeeze": False}
-    panels = figure.subplots(len(heights), 2, sharex=sharex, sharey="row", **ratios)
+    figure = new_figure(room + sum(heights))
+    panels = figure.subplots(
+        len(heights), 2, sharex=sharex, sharey="row", height_ratios=heights, squeeze=False
+    )
     for axes, name in zip(panels[0], AXLES, strict=True):
         axes.set_title(name)
     return figure, panels
@@ -96,58 +111,35 @@ def label_forces(panels: NDArray[Any], unit: "ForceUnit", *, residual: bool) -> 
         axes.set_ylabel(f"{'residual' if missed else 'lateral force'} [{unit.name}]")
 
 
-def _with_own_fonts() -> None:
-    """List the fonts that Matplotlib brings, where the list it keeps on this machine lacks them.
-
-    A list that was made while an environment was being removed knows the fonts of the system only,
-    for ever: formulas then lose their signs, and every figure complains.
-    """
-    fonts = font_manager.fontManager
-    listed = {entry.name for entry in fonts.ttflist}
-    if not {"DejaVu Sans Display", "STIXGeneral", "cmr10"} <= listed:
-        for path in sorted(Path(get_data_path(), "fonts", "ttf").glob("*.ttf")):
-            fonts.addfont(path)
-
-
-_with_own_fonts()
-
-
 @contextmanager
-def laid_out(figure: Figure, look: Mapping[str, Any] = LOOK) -> Iterator[None]:
+def laid_out(figure: Figure) -> Iterator[None]:
     """Lay a figure out, and let it be drawn in the look of the project meanwhile.
 
     It is laid out once: it is drawn more than once, and this takes as long as that.
     """
-    with style.context(["default", dict(look)]):
+    with style.context(["default", LOOK]):
         engine = figure.get_layout_engine()
         if engine is not None:
             # At fewer dots letters are less exact.
-            resolution, figure.dpi = figure.dpi, CHOSEN.resolution
+            resolution, figure.dpi = figure.dpi, RESOLUTION
             engine.execute(figure)
             figure.dpi = resolution
             figure.set_layout_engine(None)  # that of rcParams, where `LOOK` has none
         yield
 
 
-def figure_png(figure: Figure, *, resolution: int = CHOSEN.resolution) -> bytes:
+def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     buffer = BytesIO()
     with laid_out(figure):
         figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
     return buffer.getvalue()
 
 
-# Glyphs as outlines and names of parts from a fixed salt: a drawing looks alike wherever it is
-# opened, and the same figure has the same bytes.
-_VECTOR: dict[str, Any] = {"svg.fonttype": "path", "svg.hashsalt": "tireid"}
-
-
 def figure_svg(figure: Figure) -> bytes:
     """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels."""
     buffer = BytesIO()
-    with laid_out(figure, {**LOOK, **_VECTOR}):
-        figure.savefig(
-            buffer, format="svg", dpi=CHOSEN.clouds, metadata={"Date": None, "Creator": None}
-        )
+    with laid_out(figure):
+        figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
     return buffer.getvalue()
 
 
@@ -163,8 +155,6 @@ def save_figures(folder: Path, figures: dict[str, Figure]) -> dict[str, Figure]:
     return figures
 
 
-Window = tuple[float, float] | None
-
 TIME = "time [s]"
 AXLES = ("Front axle", "Rear axle")
 _FREEZE, _PREDICTION = "freeze", "after the freeze (prediction)"
@@ -176,11 +166,7 @@ def _clock_zero(t: Array) -> float:
     t : times of the samples (n,) [s].
     """
     first = float(t[0])
-    return (
-        0.0
-        if abs(first) < CHOSEN.far
-        else CHOSEN.digits_shown * float(np.floor(first / CHOSEN.digits_shown))
-    )
+    return 0.0 if abs(first) < FAR else DIGITS_SHOWN * float(np.floor(first / DIGITS_SHOWN))
 
 
 def frozen_title(t: Array, t_freeze: float) -> str:
@@ -202,16 +188,6 @@ def label_time(axes: Axes, t: Array) -> None:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value - zero:g}"))
 
 
-def time_window(t: Array, window: Window) -> tuple[float, float]:
-    """Return the ends of a time axis.
-
-    t : times of the samples (n,) [s].   window : first and last time to show [s], or None for all.
-    """
-    if window is None:
-        return float(t[0]), float(t[-1])
-    return max(window[0], float(t[0])), min(window[1], float(t[-1]))
-
-
 def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
     """Draw the freeze as a line and, where the replay goes on, shade what it predicts.
 
@@ -221,8 +197,14 @@ def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
     """
     first, last = axes.get_xlim()
     if prediction and t_freeze < last:
-        shade: Mapping[str, Any] = {"facecolor": "#F1EDE4", "edgecolor": "none", "zorder": 0}
-        axes.axvspan(max(t_freeze, first), last, label=_PREDICTION, **shade)
+        axes.axvspan(
+            max(t_freeze, first),
+            last,
+            label=_PREDICTION,
+            facecolor="#F1EDE4",
+            edgecolor="none",
+            zorder=0,
+        )
     if first <= t_freeze <= last:
         axes.axvline(t_freeze, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), label=_FREEZE)
 
@@ -241,30 +223,43 @@ def note(axes: Axes, text: str) -> None:
     axes.set_title(text, loc="right", color="#444444")
 
 
-def legend_above(
-    figure: Figure, *, columns: int | None = None, order: Sequence[str] = (_FREEZE, _PREDICTION)
-) -> None:
+def legend_above(figure: Figure, *, columns: int | None = None, last: Sequence[str] = ()) -> None:
     """Put one legend of all labeled curves above all panels, where it covers no data.
 
-    columns : entries in a row; None puts all in one.
+    columns : entries in a row; None puts up to five in one.   last : labels that end it.
     """
     entries: dict[str, Any] = {}
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    for label in order:
+    for label in (*last, _FREEZE, _PREDICTION):
         if label in entries:
             entries[label] = entries.pop(label)
-    place: Mapping[str, Any] = {"loc": "outside upper center", "borderaxespad": 0.2}
-    columns = columns or len(entries)
-    _bolder(figure.legend(list(entries.values()), list(entries), ncols=columns, **place))
+    if entries:
+        columns = columns or (len(entries) if len(entries) < 6 else 3)
+        _bolder(
+            figure.legend(
+                list(entries.values()),
+                list(entries),
+                ncols=columns,
+                loc="outside upper center",
+                borderaxespad=0.2,
+            )
+        )
 
 
 def legend_beside(axes: Axes) -> None:
     """Put the legend of one panel to its right, where it covers no data."""
     entries = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    place: Mapping[str, Any] = {"bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
-    _bolder(axes.legend(list(entries.values()), list(entries), loc="upper left", **place))
+    _bolder(
+        axes.legend(
+            list(entries.values()),
+            list(entries),
+            loc="upper left",
+            bbox_to_anchor=(1.01, 1.0),
+            borderaxespad=0.0,
+        )
+    )
 
 
 def _bolder(legend: Legend) -> None:
@@ -300,7 +295,7 @@ def force_unit_of(force: Array) -> ForceUnit:
 
     force : any shape [N]; what is not finite does not count.
     """
-    return _KILONEWTON if np.abs(_finite(force)).max(initial=0.0) >= 1000.0 else _NEWTON
+    return _KILONEWTON if np.abs(force[np.isfinite(force)]).max(initial=0.0) >= 1000.0 else _NEWTON
 
 
 def paper_design(history: History) -> PaperIdentifier:
@@ -315,9 +310,9 @@ def force_range(reference: Array, *others: Array) -> tuple[float, float]:
 
     A law that diverges or a model that is far off leaves the panel instead of flattening the rest.
     """
-    largest = _finite(reference)
-    bound = CHOSEN.style_farthest * float(np.abs(largest).max(initial=0.0)) or np.inf
-    every = np.concatenate([largest, *(_finite(other) for other in others)])
+    known = reference[np.isfinite(reference)]
+    bound = FARTHEST * float(np.abs(known).max(initial=0.0)) or np.inf
+    every = np.concatenate([one.ravel() for one in (reference, *others)])
     every = every[np.abs(every) <= 1e12]
     low = max(float(every.min(initial=0.0)), -bound)
     high = min(float(every.max(initial=0.0)), bound)
@@ -330,8 +325,3 @@ def drawable(curve: Array, limits: tuple[float, float]) -> Array:
     low, high = limits
     reach = 10.0 * (high - low)
     return np.clip(curve, low - reach, high + reach)
-
-
-def _finite(values: Array) -> Array:
-    kept: Array = values[np.isfinite(values)]
-    return kept

@@ -18,20 +18,19 @@ from models.recordings import Recording
 COLUMNS = 1500  # of pixels, more than any panel has
 
 _Samples = NDArray[np.intp]  # indices
-Signal = Callable[[slice | _Samples], NDArray[Any]]  # values (k,) or (k, m) at some samples
 
 
-def shown(t: Array, ends: tuple[float, float], *signals: Signal) -> _Samples:
+def shown(t: Array, ends: tuple[float, float], *signals: Array) -> _Samples:
     """Return which samples within the ends of a time axis are drawn.
 
     t : times of the samples (n,) [s].   ends : first and last time [s].
+    signals : (n,) or (n, m) each.
     """
     first = int(np.searchsorted(t, ends[0], side="left"))
     last = int(np.searchsorted(t, ends[1], side="right"))
     if last - first <= LONG:
         return np.arange(first, last)
-    part = slice(first, last)
-    outermost = _outermost([signal(part) for signal in signals], last - first)
+    outermost = _outermost([signal[first:last] for signal in signals], last - first)
     return np.unique(np.concatenate([[first, last - 1], first + outermost]))
 
 
@@ -76,7 +75,7 @@ def shown_of_run(
     return drawn_times(recording, t), joined
 
 
-def cloud(t: Array, *signals: Signal) -> _Samples:
+def cloud(t: Array, *signals: Array) -> _Samples:
     """Return which samples a cloud of points shows: some at even distances, and the outermost.
 
     t : times of the samples (n,) [s].   signals : across and up.

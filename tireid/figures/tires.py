@@ -16,8 +16,7 @@ from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
 from models.recordings import Recording
 from tireid.figures import style
-from tireid.figures.chosen import CHOSEN
-from tireid.figures.drive import AT_THE_END, ORACLE, tire_look
+from tireid.figures.drive import tire_look
 from tireid.figures.thinned import cloud, shown_of_run
 
 if TYPE_CHECKING:
@@ -50,13 +49,10 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         known, color, label = online.axle_force, style.BLUE, "online"
     against = force if known is None else known
 
-    def slip(at: Any) -> Array:
-        return np.rad2deg(recording.alpha(vehicle.l_f, vehicle.l_r, at))
-
-    heights = [force.__getitem__, against.__getitem__, lambda at: force[at] - against[at]]
-    part = cloud(recording.t, slip, *heights)
+    slip = np.rad2deg(recording.alpha(vehicle.l_f, vehicle.l_r))
+    part = cloud(recording.t, slip, force, against, force - against)
     part = part[recording.v_x[part] >= model.min_speed]
-    alpha, frozen, reference = slip(part), force[part], against[part]
+    alpha, frozen, reference = slip[part], force[part], against[part]
     unit = style.force_unit_of(reference)
     frozen, reference = frozen / unit.newtons, reference / unit.newtons
     limits = style.force_range(reference, frozen)
@@ -65,16 +61,15 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     learnt: Mapping[str, Any] = {**_CLOUD, "color": style.ORANGE, "label": "frozen weights"}
     figure, panels = style.axle_panels([3.2] if known is None else [3.2, 1.3], sharex="col")
     for axle, (axes, lowest) in enumerate(zip(panels[0], panels[-1], strict=True)):
+        x, y, truth = alpha[:, axle], frozen[:, axle], reference[:, axle]
         if known is not None:
             look = {**_CLOUD, "color": color, "label": label, "markersize": 3.0, "alpha": 0.35}
-            axes.plot(alpha[:, axle], style.drawable(reference[:, axle], limits), **look)
-            missed = np.clip(frozen[:, axle] - reference[:, axle], *limits)
+            axes.plot(x, style.drawable(truth, limits), **look)
             lowest.axhline(0.0, color=color, linewidth=0.6)
-            lowest.plot(alpha[:, axle], missed, **learnt)
-        axes.plot(alpha[:, axle], style.drawable(frozen[:, axle], limits), **learnt)
-        low, high = float(alpha[:, axle].min()), float(alpha[:, axle].max())
-        margin = 0.04 * (high - low) or 1.0
-        ends = np.array([low - margin, high + margin])
+            lowest.plot(x, np.clip(y - truth, *limits), **learnt)
+        axes.plot(x, style.drawable(y, limits), **learnt)
+        margin = 0.04 * float(np.ptp(x)) or 1.0
+        ends = np.array([x.min() - margin, x.max() + margin])
         axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **style.LINEAR)
         if model.known_slip is not None:
             _draw_curve(axes, model, axle, ends, unit.newtons)
@@ -85,8 +80,7 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         axes.set(xlim=ends, ylim=limits)
         _label_slip(lowest, axle)
     style.label_forces(panels, unit, residual=known is not None)
-    labels = {label for axes in figure.axes for label in axes.get_legend_handles_labels()[1]}
-    style.legend_above(figure, columns=None if len(labels) < 6 else 3, order=(_UNKNOWN,))
+    style.legend_above(figure, last=(_UNKNOWN,))
     return figure
 
 
@@ -100,12 +94,26 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
     degrees = np.linspace(float(ends[0]), float(ends[1]), 200)
     slip = np.deg2rad(degrees)
     if model.band is not None:  # under the points, which it would make grey
-        edge: Mapping[str, Any] = {"edgecolor": style.BLUE, "linewidth": 0.4, "zorder": 1.5}
         low, high = (force[:, axle] / newtons for force in model.band.at(slip))
-        axes.fill_between(degrees, low, high, facecolor=(style.SKY, 0.6), label=_BAND, **edge)
+        axes.fill_between(
+            degrees,
+            low,
+            high,
+            facecolor=(style.SKY, 0.6),
+            label=_BAND,
+            edgecolor=style.BLUE,
+            linewidth=0.4,
+            zorder=1.5,
+        )
     label = f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}"
-    look: Mapping[str, Any] = {"color": style.BLUE, "linewidth": 1.2, "zorder": 4, "label": label}
-    axes.plot(degrees, model.force(slip)[:, axle] / newtons, **look)
+    axes.plot(
+        degrees,
+        model.force(slip)[:, axle] / newtons,
+        color=style.BLUE,
+        linewidth=1.2,
+        zorder=4,
+        label=label,
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -124,8 +132,9 @@ class TireCurve:
 def axle_slip(drive: "Drive") -> Array:
     """Return the slip angles δ - atan2(v_y ± l r, v_x) in the paper's sign [rad], (n, 2)."""
     car = drive.vehicle
-    motion = {"v_x": drive.v_x, "v_y": drive.v_y, "r": drive.r}
-    return measured_slip(car.l_f, car.l_r, **motion, delta_f=drive.delta)
+    return measured_slip(
+        car.l_f, car.l_r, v_x=drive.v_x, v_y=drive.v_y, r=drive.r, delta_f=drive.delta
+    )
 
 
 _REACH = 1.25  # curves go on this far beyond the slip of the drive
@@ -133,53 +142,28 @@ _REACH = 1.25  # curves go on this far beyond the slip of the drive
 
 @style.styled
 def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
-    """Draw the forces of a drive as a cloud, and the curves that trackers believed.
-
-    Below stands what each curve misses of the true one, where the true one is known.
-    """
+    """Draw the forces of a drive as a cloud, and the curves that trackers believed."""
     unit = style.force_unit_of(drive.axle_force)
     alpha, force = np.rad2deg(axle_slip(drive)), drive.axle_force / unit.newtons
     reach = _REACH * float(np.abs(alpha).max())
-    shown = [np.abs(np.rad2deg(curve.alpha)) <= reach for curve in curves]
-    within = [c.force[part] / unit.newtons for c, part in zip(curves, shown, strict=True)]
-    steep = [f for c, f in zip(curves, within, strict=True) if not c.label.startswith("linear")]
-    low, high = style.force_range(force, *steep)
-    missed = _missed_of_truth(curves, reach, unit.newtons)
+    near = [
+        curve.force[np.abs(np.rad2deg(curve.alpha)) <= reach] / unit.newtons
+        for curve in curves
+        if not curve.label.startswith("linear")
+    ]
+    limits = style.force_range(force, *near)
     cloud = {**_CLOUD, "markersize": 3.0, "alpha": 0.6, "label": "this drive, true forces"}
-    figure, panels = style.axle_panels([3.3, 1.3] if missed else [3.3], sharex="col")
+    figure, panels = style.axle_panels([3.3])
     for axle, axes in enumerate(panels[0]):
         axes.plot(alpha[:, axle], force[:, axle], color=style.SKY, **cloud)
-        for curve, part, values in zip(curves, shown, within, strict=True):
-            drawn = style.drawable(values[:, axle], (low, high))
-            look = {**tire_look(curve.label), "label": curve.label}
-            axes.plot(np.rad2deg(curve.alpha[part]), drawn, **look)
-        axes.set(xlim=(-reach, reach), ylim=(low, high))
-        for label, slip, residual in missed:
-            panels[1, axle].plot(slip, residual[:, axle], **tire_look(label))
-        _label_slip(panels[-1, axle], axle)
-    if missed:
-        near = [one for label, _, one in missed if not label.startswith("linear")]
-        panels[1, 0].set_ylim(style.force_range(np.zeros(1), *near))
-    style.label_forces(panels, unit, residual=bool(missed))
-    style.legend_above(figure, columns=1 + len(curves) if len(curves) < 5 else 3)
+        for curve in curves:
+            drawn = style.drawable(curve.force[:, axle] / unit.newtons, limits)
+            look = tire_look(curve.label)
+            axes.plot(np.rad2deg(curve.alpha), drawn, label=curve.label, **look)
+        axes.set(xlim=(-reach, reach), ylim=limits)
+        _label_slip(axes, axle)
+    style.label_forces(panels, unit, residual=False)
     return figure
-
-
-def _missed_of_truth(
-    curves: Sequence[TireCurve], reach: float, newtons: float
-) -> list[tuple[str, Array, Array]]:
-    """Return by label slip [deg] and what a curve misses of the true one of the same road."""
-    true = {curve.label: curve for curve in curves if curve.label.startswith(ORACLE)}
-    found = []
-    for curve in curves:
-        at_the_end = curve.label.endswith(AT_THE_END) and ORACLE + AT_THE_END in true
-        truth = true.get(ORACLE + AT_THE_END * at_the_end)
-        if truth is None or truth is curve or not np.array_equal(truth.alpha, curve.alpha):
-            continue
-        slip = np.rad2deg(curve.alpha)
-        part = np.abs(slip) <= reach
-        found.append((curve.label, slip[part], (curve.force - truth.force)[part] / newtons))
-    return [one for one in found if not one[0].startswith(ORACLE)]
 
 
 @style.styled
@@ -195,17 +179,17 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     if not tracks:
         raise TypeError(f"{history.method} has no estimates of the axles")
     at, curves = shown_of_run(history, lambda block: [o.values for o in history.tracks_over(block)])
-    figure = style.new_figure(CHOSEN.page, 4.4)
+    figure = style.new_figure(4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
         label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values
         for axle, color in enumerate((style.GREEN, style.PURPLE)):
-            look: Mapping[str, Any] = {"color": color, "label": style.AXLES[axle].lower()}
-            axes.plot(at, values[:, axle], linewidth=1.0, **look)
+            axes.plot(
+                at, values[:, axle], linewidth=1.0, color=color, label=style.AXLES[axle].lower()
+            )
         axes.set(ylabel=label, xlim=(t[0], t[-1]))
         axes.set_ylim(0.0, 1.1 * float(values.max()) or 1.0)
         for freeze in freeze_times:
             style.mark_freeze(axes, freeze, prediction=False)
     style.label_time(panels[-1], t)
-    style.legend_above(figure)
     return figure

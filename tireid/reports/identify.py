@@ -11,7 +11,6 @@ from identifier.doctor import Diagnosis
 from identifier.measured import with_doubt
 from identifier.reproducibility import (
     AxleRmse,
-    Replay,
     beyond_known,
     force_rms,
     freeze_key,
@@ -58,11 +57,7 @@ def write_identify_report(
         lead=[curve_drawing(figures, verdict)],
         warnings=[
             *verdicts.verdict_warnings(verdict),
-            *(
-                one
-                for name, other in asked.items()
-                for one in verdicts.verdict_warnings(other, f"{name}, replayed: ")
-            ),
+            *verdicts.verdicts_warnings(asked, "{}, replayed: "),
             *notes,
         ],
         sections=[
@@ -119,7 +114,11 @@ def identify_headlines(found: Results) -> list[page.Headline]:
     """Return the errors of a frozen model, other drives first, and up to which slip it knows."""
     numbers, runs = [], found.runs
     for kind, some in (("of validation", runs[1:]), ("of identification", runs[:1])):
-        shares = [share for run in some if (share := _share(run, found.replays)) is not None]
+        shares = []
+        for run in some:
+            size, error = force_rms(run), found.replays[run.recording.name].against_truth
+            if size and error and size.both > 0.0:
+                shares.append(error.both / size.both)
         if shares:
             meaning = f"of the rms force: error on drives {kind}, frozen"
             numbers.append(page.Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
@@ -143,14 +142,6 @@ def curve_drawing(figures: Mapping[str, Figure], verdict: Verdict) -> page.Pictu
     refused = "" if verdict.valid else "NOT VALID. "
     caption = f"{refused}Axle force over slip angle: drive, curve and its band."
     return drawing(figures["slip"], caption, READ["slip"])
-
-
-def _share(run: History, replays: Mapping[str, Replay]) -> float | None:
-    """Return the frozen error of both axles over their rms force, None without truth."""
-    size, replay = force_rms(run), replays.get(run.recording.name)
-    if size is None or replay is None or replay.against_truth is None or not size.both > 0.0:
-        return None
-    return replay.against_truth.both / size.both
 
 
 def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
