@@ -242,8 +242,7 @@ class Band(ABC):
 
     def _half(self, slip: Array, v_x: Array, pressed: Array, level: float) -> Array:
         width = self.spread(slip, v_x, pressed).half_width(self.factor(slip, v_x), level)
-        half: Array = width * np.array(self.model.vehicle.axle_loads)
-        return half
+        return width * np.array(self.model.vehicle.axle_loads)
 
     def of_curves(self, recording: Recording, level: float = LEVEL) -> Array:
         """Return half its width at the slip and speed of a drive, (n, 2) [N].
@@ -269,8 +268,7 @@ class Band(ABC):
     def slope_over(self, recording: Recording) -> Array:
         """Return the slope of the curves over the slip of a drive [static loads/rad], (n, 2)."""
         slope = self.model.slope_at(self.model.lagged_slip(recording))
-        pressed: Array = slope * self.model.vehicle.load_ratio(recording.v_x)
-        return pressed
+        return slope * self.model.vehicle.load_ratio(recording.v_x)
 
 
 def of_axle(both: Array, axle: Axle | None) -> Array:
@@ -279,5 +277,4 @@ def of_axle(both: Array, axle: Axle | None) -> Array:
         return both
     if axle not in AXLES:
         raise ValueError(f"axle must be front or rear, it is {axle!r}")
-    one: Array = both[..., AXLES.index(axle)]
-    return one
+    return both[..., AXLES.index(axle)]

@@ -113,8 +113,7 @@ def holds(part: slice, samples: NDArray[np.intp] | None) -> bool:
 
 
 def _last(state: Mapping[str, Array], port: str) -> Array:
-    last: Array = state[port][-1]
-    return last
+    return state[port][-1]
 
 
 class Recalled(OnDemand):

@@ -313,8 +313,7 @@ class TireModel(ABC):
         force = self.curve_expression(alpha, self._curve_speed)
         slope = ca.Function("stiffness", [alpha], [ca.jacobian(force, alpha)])
         both = np.array([1.0, 1.0])  # the axles slip alike
-        stiffness: Array = np.array(slope(np.zeros(2))) @ both
-        return stiffness
+        return np.array(slope(np.zeros(2))) @ both
 
     @property
     def known_slip(self) -> Array | None:

@@ -28,8 +28,7 @@ def _known_slip(model: Any) -> Array:
     grid, driven = np.linspace(0.0, 1.0, 101)[1:], model.reach.slip
     sd, prior = model.band.of_phi(np.outer(grid, driven))
     sure = sd <= LARGEST_SD * np.maximum(prior, 1e-12)
-    known: Array = driven * np.max(grid[:, None] * sure, axis=0)
-    return known
+    return driven * np.max(grid[:, None] * sure, axis=0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,21 +63,18 @@ class FittedBand(Band):
         """Relative standard deviation of the static loads: mass and center of gravity, (2,)."""
         car = self.model.vehicle
         arms = np.array([car.l_r, car.l_f])
-        doubt: Array = np.hypot(CHOSEN.sure_mass, CHOSEN.sure_center * car.wheelbase / arms)
-        return doubt
+        return np.hypot(CHOSEN.sure_mass, CHOSEN.sure_center * car.wheelbase / arms)
 
     @property
     def error_share(self) -> Array:
         """Standard deviation of the model's own error, the part that goes with the force, (2,)."""
         own = CHOSEN.elsewhere * CHOSEN.error_size[1] * self.model.reach.unexplained
-        share: Array = np.hypot(self.load_doubt, own)
-        return share
+        return np.hypot(self.load_doubt, own)
 
     @property
     def error_floor(self) -> Array:
         """The part of it that is there without a force [static loads], (2,)."""
-        floor: Array = CHOSEN.elsewhere * CHOSEN.error_size[0] * self.model.reach.unexplained
-        return floor
+        return CHOSEN.elsewhere * CHOSEN.error_size[0] * self.model.reach.unexplained
 
     def _error_at(self, force: float) -> Array:
         """Return that error over a force [static loads], (2,)."""
@@ -117,8 +113,7 @@ class FittedBand(Band):
 
     def relative_sd(self, alpha: Array) -> Array:
         sd, prior = self.of_phi(np.column_stack([alpha, alpha]))
-        ratio: Array = sd / np.maximum(prior, 1e-12)
-        return ratio
+        return sd / np.maximum(prior, 1e-12)
 
     def calibrated_by(self, calibration: Any, force_missed: Array | None = None) -> Any:
         """Return the model with what it misses of the drives that taught."""

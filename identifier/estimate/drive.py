@@ -142,16 +142,14 @@ def _piece(
 def thinned(signal: Array, every: int) -> Array:
     """Return the means of so many samples each, (n // every,)."""
     m = len(signal) // every * every
-    mean: Array = signal[:m].reshape(-1, every).mean(axis=1)
-    return mean
+    return signal[:m].reshape(-1, every).mean(axis=1)
 
 
 def gradient(signal: Array, dt: float) -> Array:
     """Return d/dt by central differences, (n,).
     signal : (n,).   dt : [s].
     """
-    slope: Array = np.gradient(signal, dt) if signal.size > 1 else np.zeros_like(signal)
-    return slope
+    return np.gradient(signal, dt) if signal.size > 1 else np.zeros_like(signal)
 
 
 def box(signal: Array, count: float) -> Array:
@@ -164,8 +162,7 @@ def box(signal: Array, count: float) -> Array:
     half = width // 2
     padded = np.concatenate([np.full(half + 1, signal[0]), signal, np.full(half, signal[-1])])
     total = np.cumsum(padded - signal[0])
-    mean: Array = (total[width:] - total[:-width]) / width + signal[0]
-    return mean
+    return (total[width:] - total[:-width]) / width + signal[0]
 
 
 def slope_on(
@@ -201,8 +198,7 @@ def _bank(a_y: Array, v_x: Array, v_y: Array, r: Array, on: NDArray[np.bool_], d
     off = 10.0 * CHOSEN.level
     gap = gap - min(max(float(np.median(gap[on])), -off), off)
     share = np.clip((np.abs(gap) / GRAVITY - CHOSEN.level) / CHOSEN.level, 0.0, 1.0)
-    bank: Array = np.where(on, gap * share, 0.0)
-    return bank
+    return np.where(on, gap * share, 0.0)
 
 
 def hardest(recording: Recording, seconds: float) -> slice:

@@ -193,8 +193,7 @@ def _reach_of_states(learnt: Learnt) -> Reach:
 def _lasting(slip: Array, dt: float) -> Array:
     """Return the slip of each axle that is exceeded for `CHOSEN.reached`, (2,)."""
     k = min(max(round(CHOSEN.reached / dt), 1), len(slip))
-    found: Array = np.partition(slip, len(slip) - k, axis=0)[-k]
-    return found
+    return np.partition(slip, len(slip) - k, axis=0)[-k]
 
 
 def _most(signals: Array) -> Array:

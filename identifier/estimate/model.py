@@ -227,15 +227,13 @@ class FittedModel(TireModel):
     def stiffness(self) -> Array:
         """Slope of the force curves at zero, under static loads [N/rad], (2,)."""
         _, slope, _ = self.curve_at(np.zeros((1, 2)))
-        stiffness: Array = slope[0] * self._loads
-        return stiffness
+        return slope[0] * self._loads
 
     @property
     def relaxation_length(self) -> Array:
         """Lag of slip at small slip, under static loads [m], (2,); it goes with the slope."""
         stiff = np.maximum(self.stiffness / self._loads, 0.0)
-        length: Array = self._pair("compliance") * stiff + SHORTEST * self.vehicle.wheelbase
-        return length
+        return self._pair("compliance") * stiff + SHORTEST * self.vehicle.wheelbase
 
     def estimates(self) -> tuple[Estimate, ...]:
         return report.estimates(self)

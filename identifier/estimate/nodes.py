@@ -89,8 +89,7 @@ def _earlier(signal: Array, samples: float) -> Array:
     if samples == 0.0:
         return signal
     at = np.arange(len(signal))
-    moved: Array = np.interp(at + samples, at, signal)
-    return moved
+    return np.interp(at + samples, at, signal)
 
 
 def _piece(
@@ -101,8 +100,7 @@ def _piece(
     slowest = CHOSEN.slow * vehicle.froude_speed
 
     def mean(signal: Array) -> Array:
-        found: Array = signal.reshape(-1, every).mean(axis=1)
-        return found
+        return signal.reshape(-1, every).mean(axis=1)
 
     v_x, r = recording.v_x[some], recording.r[some]
     on, n3 = v_x > slowest, CHOSEN.longitudinal / dt
@@ -139,8 +137,7 @@ def low_passed(signal: Array, hertz: float, dt: float) -> Array:
         return np.array(signal, dtype=np.float64)
     from scipy.signal import butter, filtfilt  # takes long to import
 
-    found: Array = filtfilt(*butter(2, share), signal)
-    return found
+    return filtfilt(*butter(2, share), signal)
 
 
 def _rolled(a: Array, omega: float, dt: float) -> tuple[Array, Array]:

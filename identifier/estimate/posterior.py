@@ -94,5 +94,4 @@ class Reach(NamedTuple):
         """Size of what the drives miss for longer than noise, over the errors that are usual, 2 %
         of the static load and 4 % of the lateral acceleration in g, (2,).
         """
-        found: Array = np.sqrt(np.maximum(self.alike, 0.0) / max(self.pairs, 1e-9))
-        return found
+        return np.sqrt(np.maximum(self.alike, 0.0) / max(self.pairs, 1e-9))

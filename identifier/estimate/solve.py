@@ -98,8 +98,7 @@ class Problem:
     def share_missed(self, p: Array) -> Array:
         """Return the share of the force that the balance misses at each axle, (2,)."""
         e = self.residuals(p).e * self.size[:, None]
-        share: Array = np.sqrt(self.weight @ e**2 / (self.weight @ self.force**2))
-        return share
+        return np.sqrt(self.weight @ e**2 / (self.weight @ self.force**2))
 
     def places(self, k: int) -> NDArray[np.intp]:
         """Return which samples of a drive its residuals are at."""
@@ -112,8 +111,7 @@ class Problem:
             _simulated(one.on(road), p, self._car, motion_scan(), ("missed",), stride)[0][kept]
             for one, stride, kept in zip(self.drives, self._strides, self._kept, strict=True)
         ]
-        found: Array = np.nan_to_num(np.concatenate(e) / self.size[:, None], nan=1e3, posinf=1e3)
-        return found
+        return np.nan_to_num(np.concatenate(e) / self.size[:, None], nan=1e3, posinf=1e3)
 
     def residuals(self, p: Array) -> _Residuals:
         """Return what the balance misses, and its slopes.
