@@ -339,30 +339,27 @@ def fmu_text(specialized: SpecializedStep, version: Version) -> dict[str, str]:
     """Return the text files of an FMU by their path inside it.   version : of FMI, 2 or 3."""
     about = summary(specialized, ingredients(specialized, single=False))
     sources = c_sources(specialized, single=False, about=about)
-    shared = {PurePosixPath(path).name: text for path, text in sources.items()}
-    blank = _text_with(specialized, shared, version, "")
-    content = "\0".join(f"{name}\0{text}" for name, text in sorted(blank.items()))
-    return _text_with(specialized, shared, version, _token(content))
-
-
-def _text_with(
-    specialized: SpecializedStep, shared: Mapping[str, str], version: Version, token: str
-) -> dict[str, str]:
     places = dict.fromkeys((*SHARED, *OF_VERSION[version]), ".")
     text = c_files(FMU, places, {PREFIX: specialized.name})
-    text |= {**shared, TOKEN: token_header(token, version)}
-    sources = sorted(name for name in text if name.endswith(".c"))
-    members = {f"sources/{name}": content for name, content in text.items()}
-    members["modelDescription.xml"] = _description(specialized, version, token, sources)
-    if version == 3:
-        members["sources/buildDescription.xml"] = _build_description(specialized.name, sources)
-    return members
+    text |= {PurePosixPath(path).name: content for path, content in sources.items()}
+    names = sorted(name for name in text if name.endswith(".c"))
+
+    def with_token(token: str) -> dict[str, str]:
+        files = {**text, TOKEN: token_header(token, version)}
+        members = {f"sources/{name}": content for name, content in files.items()}
+        members["modelDescription.xml"] = _description(specialized, version, token, names)
+        if version == 3:
+            built = _build_description(specialized.name, names)
+            members["sources/buildDescription.xml"] = built
+        return members
+
+    return with_token(_token(with_token("")))
 
 
-def _token(content: str) -> str:
+def _token(members: Mapping[str, str]) -> str:
     """Return a GUID made of the content: another model has another."""
-    digest = hashlib.sha256(content.encode("utf-8")).hexdigest()
-    return f"{{{UUID(digest[:32])}}}"
+    content = "\0".join(f"{name}\0{text}" for name, text in sorted(members.items()))
+    return f"{{{UUID(hashlib.sha256(content.encode()).hexdigest()[:32])}}}"
 
 
 def _archive(members: Mapping[str, bytes]) -> bytes:

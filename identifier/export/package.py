@@ -294,10 +294,9 @@ def readme(package: Package, about_figures: str) -> str:
             "output_table": _table(specialized.outputs),
             "carry_table": "".join(carried),
             "modes": _modes(specialized),
-            "implausible_row": _implausible_row(specialized),
             "stale_time": f"{STALE_TIME:g}",
             **_about_signals(specialized),
-            **_about_gaps(specialized),
+            **_about_refused(specialized),
             "libraries": f"{', '.join(called) or 'nothing'} of `<math.h>`, copies of structures",
             "samples": str(CHOSEN.samples),
             "tolerance_double": double,
@@ -348,26 +347,18 @@ def _about_signals(specialized: SpecializedStep) -> dict[str, str]:
     }
 
 
-def _implausible_row(specialized: SpecializedStep) -> str:
-    """Return what is done with a sample that no car can be in, where the method judges that."""
-    if specialized.believed is not None:
-        return (
-            "| 2 `IMPLAUSIBLE` | no car can be there, or get there within a sample | of the last "
-            "plausible sample, zero where that lasts | hold | yes |\n"
-        )
-    if specialized.parts.where_false is not None:
-        return "| 2 `IMPLAUSIBLE` | no car can be there | zero | hold | yes |\n"
-    return ""
-
-
-def _about_gaps(specialized: SpecializedStep) -> dict[str, str]:
+def _about_refused(specialized: SpecializedStep) -> dict[str, str]:
     """Return what becomes of forces while samples are refused, and of the state after it."""
+    row = "| 2 `IMPLAUSIBLE` | no car can be there{} | {} | hold | yes |\n"
     if specialized.believed is not None:
+        lasting = "of the last plausible sample, zero where that lasts"
         return {
-            "refused_forces": "of the last plausible sample, zero where that lasts",
+            "implausible_row": row.format(", or get there within a sample", lasting),
+            "refused_forces": lasting,
             "after_gap": "After a moment the step rests, and restarts with the next good sample.",
         }
     return {
+        "implausible_row": row.format("", "zero") * (specialized.parts.where_false is not None),
         "refused_forces": "as before",
         "after_gap": "With the next good sample observers and filters begin anew, and the "
         "weights stay.",

@@ -28,14 +28,6 @@ _Params = NDArray[np.void]
 MACROS = {"tolerance": "TOLERANCE"}  # members that are other in float
 
 
-def _initializers(params: _Params) -> str:
-    """Return the members of the C structure, one a line with its name."""
-    return "".join(
-        f"    /* {name} */ {MACROS.get(name) or _initializer(params[name])},\n"
-        for name in params.dtype.names or ()
-    )
-
-
 def _plain_params(params: _Params) -> dict[str, Any]:
     """Return the numbers by name, ready for JSON."""
     return {name: params[name].tolist() for name in params.dtype.names or ()}
@@ -196,7 +188,7 @@ def build_mpc_package(
     packaging.check_name(name, "_mpc")
     tracker = Tracker(tire, problem, period=period, delay=delay, caution=caution)
     params: _Params = tracker.params
-    content = _ingredients(tracker, params, name, single=single)
+    content = _ingredients(tracker, name, single=single)
     about = _summary(tracker, content)
     files = c_sources(
         tire.structure, horizon=tracker.problem.horizon, name=name, single=single, about=about
@@ -241,9 +233,8 @@ def _in_words(value: Any) -> str:
     return ", ".join(f"{number:.6g}" for number in values)
 
 
-def _ingredients(tracker: Tracker, params: _Params, name: str, *, single: bool) -> dict[str, Any]:
-    tire, problem = tracker.tire, tracker.problem
-    structure = tire.structure
+def _ingredients(tracker: Tracker, name: str, *, single: bool) -> dict[str, Any]:
+    structure = tracker.tire.structure
     numbers = (
         asdict(structure)
         if is_dataclass(structure) and not isinstance(structure, type)
@@ -252,11 +243,11 @@ def _ingredients(tracker: Tracker, params: _Params, name: str, *, single: bool) 
     return {
         **packaging.content_head(FORMAT, name, single=single),
         "tire": {"kind": type(structure).__name__, **packaging.plain(numbers)},
-        "vehicle": packaging.plain(vehicle_numbers(tire.vehicle)),
-        "problem": packaging.plain(asdict(problem)),
+        "vehicle": packaging.plain(vehicle_numbers(tracker.tire.vehicle)),
+        "problem": packaging.plain(asdict(tracker.problem)),
         "period_s": tracker.period,
         "delay_s": tracker.delay,
-        "params": packaging.plain(_plain_params(params)),
+        "params": packaging.plain(_plain_params(tracker.params)),
         "statuses": {status.name: int(status) for status in Status},
     }
 
@@ -275,6 +266,10 @@ def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str | Wo
 
 
 def _tables(name: str, params: _Params, about: Values) -> str:
+    members = "".join(
+        f"    /* {key} */ {MACROS.get(key) or _initializer(params[key])},\n"
+        for key in params.dtype.names or ()
+    )
     return packaging.header(
         f"{name}_tables.h",
         f"The numbers of the export.\n\n{packaging.generated(about)}",
@@ -284,6 +279,6 @@ def _tables(name: str, params: _Params, about: Values) -> str:
             f"#if {name.upper()}_SINGLE\n"
             f"#define TOLERANCE R({SOLVER_TOLERANCE[True]!r}) /* the least that float comes to */\n"
             f"#else\n#define TOLERANCE R({float(params['tolerance'])!r})\n#endif\n",
-            f"static const {name}_params {name}_exported = {{\n{_initializers(params)}}};\n",
+            f"static const {name}_params {name}_exported = {{\n{members}}};\n",
         ],
     )
