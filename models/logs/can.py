@@ -108,20 +108,7 @@ class _Gathered:
         return _Frames(self._t.finished(), self._data.finished().reshape(-1, self.width))
 
 
-def _in_order(frames: _Frames) -> _Frames:
-    """Return frames in the order of their times: groups of a file follow one another."""
-    if np.all(frames.t[1:] >= frames.t[:-1]):
-        return frames
-    order = np.argsort(frames.t, kind="stable")
-    return _Frames(frames.t[order], frames.data[order])
-
-
-class _Log(NamedTuple):
-    """Frames of a log by bus and identifier; how many others it has, by what they are."""
-
-    format: str
-    frames: dict[_Key, _Frames]
-    others: Counter[str]
+_Log = tuple[dict[_Key, _Frames], Counter[str]]  # and how many others it has, by what they are
 
 
 def _gather(path: Path, kind: str, given: _Dbc) -> _Log:
@@ -151,7 +138,7 @@ def _gather(path: Path, kind: str, given: _Dbc) -> _Log:
     if first > CHOSEN.calendar:
         for key, kept in frames.items():
             frames[key] = kept._replace(t=since(kept.t, first))
-    return _Log(f"CAN {kind}", frames, others)
+    return frames, others
 
 
 def _messages(path: Path, kind: str) -> Iterator[Any]:
@@ -309,7 +296,12 @@ def _of_mdf(path: Path, given: _Dbc) -> _Log:
             for first in range(0, samples, CHOSEN.frames_at_once):
                 count = min(CHOSEN.frames_at_once, samples - first)
                 _add_part(file, names, number, slice(first, first + count), given, found, others)
-    return _Log("CAN MDF4", {key: _in_order(one.finished()) for key, one in found.items()}, others)
+    frames = {key: one.finished() for key, one in found.items()}
+    for key, (t, data) in frames.items():
+        if np.any(t[1:] < t[:-1]):  # groups of a file follow one another
+            order = np.argsort(t, kind="stable")
+            frames[key] = _Frames(t[order], data[order])
+    return frames, others
 
 
 def _add_part(
@@ -393,22 +385,17 @@ class _Group:
         )
 
 
-class _Place(NamedTuple):
-    """Where a channel is: with which others it is sent, and the signal of the DBC.
-    fault: why it cannot be read as the DBC tells it, "" where it can.
-    """
-
-    group: _Group
-    signal: Any
-    fault: str
+# Where a channel is: with which others it is sent, the signal of the DBC, and why it cannot be read
+# as the DBC tells it, "" where it can.
+_Place = tuple[_Group, Any, str]
 
 
 def _samples(asked: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
     groups: dict[_Group, dict[str, Any]] = {}
-    for listed, place in asked:
-        if place.fault:
-            raise RecordingError(place.fault)
-        groups.setdefault(place.group, {})[listed.name] = place.signal
+    for listed, (group, signal, fault) in asked:
+        if fault:
+            raise RecordingError(fault)
+        groups.setdefault(group, {})[listed.name] = signal
     return [
         Samples(group.name, group.t, {name: group.values(one) for name, one in signals.items()})
         for group, signals in groups.items()
@@ -430,20 +417,18 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
             raise RecordingError(
                 f"{path}: is no CAN log: neither ASC, BLF, candump, TRC, a table of frames nor MDF4"
             )
-        log = _gather(path, kind, given)
-        senders = Counter((bus, given.message(one).name) for bus, one in log.frames)
+        gathered, others = _gather(path, kind, given)
+        senders = Counter((bus, given.message(one).name) for bus, one in gathered)
         found = []
-        for (bus, identifier), frames in log.frames.items():
+        for (bus, identifier), frames in gathered.items():
             message = given.message(identifier)
             several = senders[bus, message.name] > 1  # of J1939: which
             group = f"bus {bus}" + f" from {identifier & 0xFF:02X}" * several
             found += [(group, *one) for one in _channels(given, message, frames)]
-    said = tuple(
-        f"{count} {what} frames are not read" for what, count in log.others.items() if count
-    )
+    said = tuple(f"{count} {what} frames are not read" for what, count in others.items() if count)
     return GroupedLog.of(
         path,
-        log.format,
+        f"CAN {kind}",
         "a CAN log",
         "message",
         found,
@@ -474,7 +459,7 @@ def _channels(given: _Dbc, message: Any, frames: _Frames) -> Iterator[tuple[List
                 samples=group.t.size,
                 rate=typical_rate(group.t),
             )
-            yield listed, _Place(group, signal, given.faults.get((message.name, signal.name), ""))
+            yield listed, (group, signal, given.faults.get((message.name, signal.name), ""))
 
 
 def _read_dbc(path: Path) -> _Dbc:

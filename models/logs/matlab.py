@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 from codegen.arrays import Array
 from models.logs import hdf5, mat5, npz
@@ -20,15 +19,6 @@ _REMEDY = (
     "save vectors and their time, for example s = struct('t', x.Time, 'v', x.Data); "
     "save('log.mat', '-struct', 's'); or --rate HZ gives the samples per second"
 )
-
-
-class _Time(NamedTuple):
-    """How a clock is read.
-    per_second: of its unit; rate: typical [Hz].
-    """
-
-    per_second: float
-    rate: float
 
 
 def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
@@ -53,10 +43,16 @@ def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
             *noted("not read", found.unread),
             *noted("there is no vector t or time of the same length for", found.clockless),
         )
-        times = _times(found.signals)
+        per_second, rates = dict[Clock, float](), dict[Clock, float]()
+        for clock in dict.fromkeys(one.clock for one in found.signals):
+            t = times_of(clock)
+            cells = [repr(one) for one in t[:HEAD].tolist()]
+            known = find_clock(["t"], [clock.unit], {0: cells}.__getitem__)
+            per_second[clock] = PER_SECOND[known.unit] if known is not None else 1.0
+            rates[clock] = typical_rate(t / per_second[clock])
     channels = []
     for one in found.signals:
-        struct, rate = one.clock.name.rpartition(".")[0] or "top", times[one.clock].rate
+        struct, rate = one.clock.name.rpartition(".")[0] or "top", rates[one.clock]
         listed = Listed(name=one.name, unit=one.unit, samples=one.samples, rate=rate)
         channels.append((struct, listed, one))
     return GroupedLog.of(
@@ -66,14 +62,19 @@ def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
         "sample",
         channels,
         said,
-        partial(_samples, times),
+        partial(_samples, per_second),
         missing="signal with a time",
         remedy=_REMEDY if said else f"there is no vector of numbers; {_REMEDY}",
     )
 
 
-def _samples(times: Mapping[Clock, _Time], asked: Sequence[tuple[Listed, Signal]]) -> list[Samples]:
-    """Read signals; those of one matrix together, and the matrix is not kept."""
+def _samples(
+    per_second: Mapping[Clock, float], asked: Sequence[tuple[Listed, Signal]]
+) -> list[Samples]:
+    """Read signals; those of one matrix together, and the matrix is not kept.
+
+    Clocks of the calendar keep their seconds since 1970.
+    """
     together: dict[int, list[tuple[Listed, Signal]]] = {}
     for one in asked:
         together.setdefault(id(one[1].leaf), []).append(one)
@@ -84,18 +85,6 @@ def _samples(times: Mapping[Clock, _Time], asked: Sequence[tuple[Listed, Signal]
         for listed, signal in some:
             found.setdefault(signal.clock, {})[listed.name] = line_of(values, signal)
     return [
-        Samples(clock.name, times_of(clock) / times[clock].per_second, values)
+        Samples(clock.name, times_of(clock) / per_second[clock], values)
         for clock, values in found.items()
     ]
-
-
-def _times(signals: Sequence[Signal]) -> dict[Clock, _Time]:
-    """Return how the clocks are read; those of the calendar keep their seconds since 1970."""
-    result: dict[Clock, _Time] = {}
-    for clock in dict.fromkeys(signal.clock for signal in signals):
-        t = times_of(clock)
-        cells = [repr(one) for one in t[:HEAD].tolist()]
-        known = find_clock(["t"], [clock.unit], {0: cells}.__getitem__)
-        per_second = PER_SECOND[known.unit] if known is not None else 1.0
-        result[clock] = _Time(per_second, typical_rate(t / per_second))
-    return result

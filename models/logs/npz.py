@@ -25,15 +25,11 @@ def read_tree(path: Path) -> dict[str, Tree]:
         members = [one for one in file.infolist() if one.filename.endswith(".npy")]
         few(path, len(members), "columns", "arrays")
         for one in members:
-            dense(path, one.file_size, one.compress_size, _shown_name(one))
+            dense(path, one.file_size, one.compress_size, one.filename.removesuffix(".npy"))
         found: dict[str, Tree] = {}
         for one in members:
-            found |= _top(path, one.filename, _shown_name(one))
+            found |= _top(path, one.filename, one.filename.removesuffix(".npy"))
     return found
-
-
-def _shown_name(member: zipfile.ZipInfo) -> str:
-    return member.filename.removesuffix(".npy")
 
 
 def _top(path: Path, member: str, name: str) -> dict[str, Tree]:

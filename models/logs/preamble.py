@@ -421,6 +421,7 @@ def _maker(lines: Sequence[_Line]) -> str:
 
 
 def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
+    """Return the layout of a header alone, or above rows that are several lines each."""
     number, text = next((k, line) for k, line in enumerate(lines, start=1) if line.strip())
     delimiter = max(_DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
     names = cells_of(text, delimiter)

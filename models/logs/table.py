@@ -152,7 +152,7 @@ class Gathered:
         self._seen += rows.size
         if self._seen > self._most:
             few(self._path, self._seen, "samples", "rows")
-        coded = {column: self._coded(column, columns[column], rows) for column in self._codes}
+        coded = {c: self._coded(c, columns[c], rows) for c in self._codes}
         keep: Any = slice(None)
         if self._run is not None:
             column, word = self._run
@@ -379,7 +379,9 @@ class TableLog:
         column = None if clock is None else clock.column
         timed = clock is None or kind_of(clock) is Kind.NUMBER  # asked for as it stands
         kinds |= {k: Kind.NUMBER for k in places if timed or k != column}
-        cells = self.table.cells(kinds, self._one_run(run))
+        one_run(self.path, self.runs(), run)
+        runs = self._run_column
+        cells = self.table.cells(kinds, None if runs is None or run is None else (runs, run))
         label = str(self.path) if run is None else f"{self.path}:{run}"
         found = {one: self._stamps(label, one, cells) for one in dict.fromkeys(clocks.values())}
         self._noted.extend(note for stamps in found.values() for note in stamps.notes)
@@ -406,12 +408,6 @@ class TableLog:
     @cached_property
     def _places(self) -> dict[str, int]:
         return {name: k for k, name in enumerate(self.names)}
-
-    def _one_run(self, run: str | None) -> tuple[int, str] | None:
-        found = one_run(self.path, self.runs(), run)
-        if self._run_column is None or found is None or (run is None and len(self.runs()) == 1):
-            return None
-        return self._run_column, found
 
 
 def kind_of(clock: Clock) -> Kind:

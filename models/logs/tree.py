@@ -81,9 +81,9 @@ class Signal(NamedTuple):
 class _Found(NamedTuple):
     """What a tree holds: signals, names of vectors without clock, names of what is not read."""
 
-    signals: tuple[Signal, ...]
-    clockless: tuple[str, ...]
-    unread: tuple[str, ...]
+    signals: list[Signal]
+    clockless: list[str]
+    unread: list[str]
     said: tuple[str, ...] = ()
 
 
@@ -96,16 +96,16 @@ def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> _Found:
     walk.struct(dict(tree), "", ())
     rate = rate or walk.rate
     if not rate or not walk.clockless:
-        return _Found(tuple(walk.signals), tuple(walk.clockless), tuple(walk.unread))
+        return _Found(walk.signals, list(walk.clockless), walk.unread)
     sizes = Counter(max(leaf.shape) for _, _, leaf, _ in walk.clockless.values())
-    samples = sizes.most_common(1)[0][0]
+    ((samples, _),) = sizes.most_common(1)
     even = Leaf(shape=(samples, 1), load=lambda: (np.arange(samples) / rate).reshape(-1, 1))
     clock = Clock(f"even {rate:g} Hz", even, None, "s")
     rest = _Walk()
     for name, unit, leaf, columns in walk.clockless.values():
         rest.leaf(leaf, name, unit, (clock,), columns)
     said = (f"time is even at {rate:g} Hz of vectors without a time of their own",)
-    return _Found((*walk.signals, *rest.signals), tuple(rest.clockless), tuple(walk.unread), said)
+    return _Found(walk.signals + rest.signals, list(rest.clockless), walk.unread, said)
 
 
 def times_of(clock: Clock) -> Array:

@@ -54,14 +54,9 @@ def _plain(unit: str) -> str:
     for old, new in TABLES["signs"].items():
         text = text.replace(old, new)
     text = _WORD.sub(lambda found: _SPELLED[found[0]], text)
-    text = re.sub(r"(?:[*. ]s|/s)-?([12])(?!\d)|(?<=[a-z])s-([12])$", _per_second, text)
-    return text.replace(" ", "")
-
-
-def _per_second(found: re.Match[str]) -> str:
-    """Return "/s" or "/s2" for what a spelling has as a negative or dotted power."""
-    power = found.group(1) or found.group(2)
-    return "/s2" if power == "2" else "/s"
+    # A negative or dotted power.
+    text = re.sub(r"(?:[*. ]s|/s)-?([12])(?!\d)|(?<=[a-z])s-([12])$", r"/s\1\2", text)
+    return text.replace("/s1", "/s").replace(" ", "")
 
 
 def quantities(unit: str) -> tuple[str, ...]:

@@ -45,7 +45,7 @@ def rolled(
     dt : sample time [s].
     """
     names, most = _sources(speeds, wheels), wheels.acceleration
-    n, v_x = r.size, large((r.size,))
+    v_x = large((r.size,))
     span = max(1, round(CHOSEN.rolled_window / dt))
     driven = DRIVEN[wheels.driven] if wheels.driven else WHEELS
     pushed = {*driven, WHEELS[4]} if driven else set()  # a lone encoder counts with the motor
@@ -54,7 +54,7 @@ def rolled(
     scan, constants = _trust_scan(len(names)), {"rule": rule, "free": np.array(free, dtype=float)}
     gated = held = 0
     trust: Array | None = None
-    for part in blocks(n):
+    for part in blocks(r.size):
         early = slice(max(part.start - span, 0), part.stop)
         motion = r[early], delta_f[early], delta_r[early]
         of_part = {name: one[early] for name, one in speeds.items()}
