@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[1]
 BENCHMARKS = (
-    *("speed", "estimate", "fleet", "bands", "recorded_cars", "without_v_y", "verdicts", "doctor"),
+    *("speed", "estimate", "bands", "recorded_cars", "without_v_y", "verdicts", "doctor"),
     *("sensor_faults", "road_friction", "paper_gains", "export_cost"),
     *("mpc_speed", "mpc_worth", "mpc_friction_drop"),
 )

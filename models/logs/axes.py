@@ -65,14 +65,13 @@ def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list
         if split is None:
             continue
         letter, rest = split
-        stems = {word for word in rest if word != "?"}
-        likely = [one for one in (RATE, ACCELERATION, SPEED) if stems & set(_STEMS[one].split())]
-        if is_given(units[name]):
-            given = quantities(units[name])
-            likely = [one for one in (RATE, ACCELERATION, SPEED) if one in given]
-        if likely:
+        likely = quantities(units[name])
+        if not is_given(units[name]):
+            likely = tuple(one for one, some in _STEMS.items() if set(rest) & set(some.split()))
+        quantity = next((one for one in (RATE, ACCELERATION, SPEED) if one in likely), "")
+        if quantity:
             found.setdefault(rest, {}).setdefault(letter, name)
-            quantity_of[rest] = likely[0]
+            quantity_of[rest] = quantity
     return [
         Triad(names, quantity_of[rest], rest)
         for rest, names in found.items()
@@ -116,10 +115,8 @@ class _Grid:
             return np.full(self.t.size, np.nan)
         steps = np.diff(t) * (values[1:] + values[:-1]) / 2.0
         total = np.concatenate([[0.0], np.cumsum(steps)])
-        ends = (
-            np.clip(self.t + side * CHOSEN.axes_window / 2.0, t[0], t[-1]) for side in (-1.0, 1.0)
-        )
-        low, high = ends
+        half = CHOSEN.axes_window / 2.0
+        low, high = (np.clip(self.t + side, t[0], t[-1]) for side in (-half, half))
         mean = np.interp(high, t, total) - np.interp(low, t, total)
         return np.asarray(mean / np.maximum(high - low, 1e-9))
 
@@ -151,10 +148,8 @@ def along_axes(
     grid = _Grid(seen, [*asked, *named])
     if grid.t.size < 50:
         return _Found(frozenset(), ())
-    misled: set[str] = set()
-    oblique: set[str] = set()
-    axes: list[_Axis] = []
-    across: list[str] = []
+    misled, oblique = set[str](), set[str]()
+    axes, across = list[_Axis](), list[str]()
     v = np.abs(grid[speed]) if speed and speed not in asked else None
     for one in usable:
         if one.quantity == SPEED and (forward := _forward(grid, one, v)):
@@ -171,7 +166,7 @@ def along_axes(
             rates = [other for other in usable if other.quantity == RATE]
             up = _up({letter: float(np.nanmean(grid[name])) for letter, name in one.names.items()})
             own = [other for other in rates if set(other.words) & set(one.words) - {"?"}]
-            gyro = next(iter(own or rates), None)
+            gyro = next(iter(own + rates), None)
             channels = {*one.names.values(), *(gyro.names.values() if gyro else ())}
             if up[0] == "?":
                 oblique |= channels

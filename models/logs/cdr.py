@@ -59,8 +59,7 @@ def fields_of(
     definitions: Definitions, kind: str, prefix: str = "", owners: tuple[tuple[str, str], ...] = ()
 ) -> Iterator[Field]:
     """Yield the numbers of a message, without those in arrays and sequences."""
-    _require_shallow(len(owners))
-    for name, node in _fields(definitions, kind):
+    for name, node in _fields(definitions, kind, len(owners)):
         inner = (*owners, (kind, name))
         number, value = _kind(node), node[1]
         if number == CHOSEN.name:
@@ -68,8 +67,7 @@ def fields_of(
         elif number == CHOSEN.base and value[0] in _NUMBERS:
             yield Field(prefix + name, inner, _NUMBERS[value[0]])
         elif number in (CHOSEN.array, CHOSEN.sequence) and _kind(value[0]) == CHOSEN.name:
-            for _ in fields_of(definitions, value[0][1], "", inner):  # it must be known, too
-                pass
+            list(fields_of(definitions, value[0][1], "", inner))  # it must be known, too
 
 
 def layout_of(definitions: Definitions, kind: str, raw: bytes) -> Layout:
@@ -111,8 +109,7 @@ class _Walk:
 
     def message(self, kind: str, prefix: str | None, depth: int) -> None:
         """Go through a message; numbers of one in an array, whose prefix is None, are not kept."""
-        _require_shallow(depth)
-        for name, node in _fields(self.definitions, kind):
+        for name, node in _fields(self.definitions, kind, depth):
             path = None if prefix is None else prefix + name
             number, value = _kind(node), node[1]
             if number in (CHOSEN.base, CHOSEN.name):
@@ -169,7 +166,9 @@ class _Walk:
         return value
 
 
-def _fields(definitions: Definitions, kind: str) -> list[tuple[str, Any]]:
+def _fields(definitions: Definitions, kind: str, depth: int) -> list[tuple[str, Any]]:
+    if depth > limits().depth:
+        raise CdrError(f"types must lie in one another at most {limits().depth:g} deep")
     if kind not in definitions:
         raise CdrError(f"the type {kind} has no definition")
     return definitions[kind][1]
@@ -177,8 +176,3 @@ def _fields(definitions: Definitions, kind: str) -> list[tuple[str, Any]]:
 
 def _kind(node: Any) -> int:
     return int(getattr(node[0], "value", node[0]))
-
-
-def _require_shallow(depth: int) -> None:
-    if depth > limits().depth:
-        raise CdrError(f"types must lie in one another at most {limits().depth:g} deep")

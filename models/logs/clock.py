@@ -106,10 +106,7 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Seg
     if zero > CHOSEN.calendar:
         times = {id(raw.t): since(raw.t, zero) for raw in raws.values()}
         near = {name: raw._replace(t=times[id(raw.t)]) for name, raw in raws.items()}
-        return [
-            one._replace(t=filled(one.t.size, lambda part, t=one.t: t[part] + zero))
-            for one in on_one_clock(near, dt, longest)
-        ]
+        return [_later(one, zero) for one in on_one_clock(near, dt, longest)]
     base = min(raws.values(), key=lambda raw: abs(np.log(_interval(raw.t) / dt)))
     found = []
     for begin, end in _covered([raw.t for raw in raws.values()], longest):
@@ -122,6 +119,11 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Seg
             grid = own  # its very numbers, where they are the clock
         found.append(Segment(grid, {name: sampled(raw, grid, dt) for name, raw in raws.items()}))
     return found
+
+
+def _later(segment: Segment, zero: float) -> Segment:
+    t = segment.t
+    return segment._replace(t=filled(t.size, lambda part: t[part] + zero))
 
 
 def _interval(t: Array) -> float:

@@ -61,17 +61,14 @@ class _Reader:
 
     def struct(self, members: dict[str, tuple[Any, Tree]]) -> Tree:
         """Return a struct; where all fields are references, it is one of several elements."""
-        lists = [
-            tree
-            for node, tree in members.values()
+        lists = {
+            name: tree
+            for name, (node, tree) in members.items()
             if isinstance(tree, list) and _matlab_class(node) != "cell"
-        ]
-        sizes = {len(tree) for tree in lists}
-        if members and len(lists) == len(members) and len(sizes) == 1:
-            return [
-                {name: tree[k] for name, (_, tree) in members.items() if isinstance(tree, list)}
-                for k in range(sizes.pop())
-            ]
+        }
+        sizes = {len(tree) for tree in lists.values()}
+        if len(lists) == len(members) and len(sizes) == 1:
+            return [{name: tree[k] for name, tree in lists.items()} for k in range(sizes.pop())]
         return {name: tree for name, (_, tree) in members.items()}
 
     def dataset(self, node: Any, kind: str, depth: int) -> Tree:

@@ -420,6 +420,23 @@ def _maker(lines: Sequence[_Line]) -> str:
     return next((maker for words, maker in _MAKERS.items() if words in start), "")
 
 
+def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
+    """Return the layout of a header alone, or above rows that are several lines each."""
+    number, text = next((k, line) for k, line in enumerate(lines, start=1) if line.strip())
+    delimiter = max(_DELIMITERS, key=lambda one: text.count(one) if one != BLANKS else 0)
+    names = cells_of(text, delimiter)
+    few(path, len(names), "columns", "columns")
+    after = cells_of(lines[number], delimiter) if number < len(lines) else ()
+    under = len(after) == len(names) and is_units_row(after)
+    words = (_encoding_word(encoding), f"names in line {number}")
+    units = tuple(unit_in_name(name) for name in names)
+    columns = Columns(names, units, (True,) * len(names), words)
+    first = number + 1 + under
+    return Layout(
+        encoding=encoding, delimiter=delimiter, columns=columns, first=first, again=(text,)
+    )
+
+
 # Racelogic VBOX: [header], [channel units], [column names], [data], each a section.
 
 _OF_THE_BOX = ("sats", "time", "lat", "long", "velocity", "heading", "height")

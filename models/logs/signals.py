@@ -135,8 +135,7 @@ class Signal:
             inside: Array = np.interp(total, hand, road)
             first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
             below, above = np.minimum(total - hand[0], 0.0), np.maximum(total - hand[-1], 0.0)
-            road_wheel: Array = inside + first * below + last * above
-            return road_wheel
+            return np.asarray(inside + first * below + last * above)
         return total if self.ratio == 1.0 else total / self.ratio
 
 

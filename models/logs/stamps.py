@@ -414,8 +414,7 @@ def seconds(
     if fall is not None and clock.unit in ("instant", "hhmmss"):
         steps = np.diff(t)
         days = np.concatenate([[0.0], np.cumsum((steps < -0.9 * _DAY) & (steps > -1.1 * _DAY))])
-        later: Array = np.round(t + _DAY * days, 6)
-        t = later
+        t = np.asarray(np.round(t + _DAY * days, 6))
         fall = _first_step(t, lambda step: step < 0.0)
     repeat = None if fall is not None else _first_step(t, lambda step: step == 0.0)
     even = None if fall is not None else _even_clock(t)
@@ -443,9 +442,7 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
             begins.append(first)
     if len(begins) > 1 and not restarts:
         return None
-    late = 0
-    orders: list[NDArray[np.intp]] = []
-    times: list[Array] = []
+    late, orders, times = 0, list[NDArray[np.intp]](), list[Array]()
     for first, end in pairwise([*begins, t.size]):
         piece = t[first:end]
         late += int(np.count_nonzero(piece < np.maximum.accumulate(piece)))
@@ -507,8 +504,7 @@ def started(clock: Clock, cell: str) -> float:
 def _of_digits(values: Array) -> Array:
     hours, rest = np.divmod(values, 10000.0)
     minutes, whole = np.divmod(rest, 100.0)
-    total: Array = hours * 3600.0 + minutes * 60.0 + whole
-    return total
+    return np.asarray(hours * 3600.0 + minutes * 60.0 + whole)
 
 
 def _first(values: NDArray[Any], wrong: Callable[[NDArray[Any]], NDArray[Any]]) -> int | None:
