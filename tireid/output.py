@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, is_dataclass
+from glob import escape
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -71,7 +72,7 @@ def output_folder(target: Path, *, force: bool) -> Iterator[Path]:
         except ClaimedError as error:
             raise OutputError(error.refusal(f"is writing {target}")) from None
         _require_replaceable(target, final, force)  # as the last one that held the claim left it
-        for left in sorted(final.parent.glob(f"{_literal(prefix)}*.part")):
+        for left in sorted(final.parent.glob(f"{escape(prefix)}*.part")):
             say(f"a run was stopped and left {left}: recover what you need, then delete it")
         scratch = Path(tempfile.mkdtemp(prefix=prefix, suffix=".part", dir=final.parent))
         new = scratch / "new"
@@ -128,11 +129,6 @@ def _home() -> Path | None:
         return Path.home().resolve()
     except RuntimeError:  # this user has none
         return None
-
-
-def _literal(name: str) -> str:
-    """Return a name as a pattern that matches it alone."""
-    return "".join(f"[{one}]" if one in "*?[" else one for one in name)
 
 
 def _write_marker(folder: Path) -> None:

@@ -14,29 +14,16 @@ from tireid.output import text_table
 HEADER = ("property", "value", "limit", "margin", "")
 
 
-def certificate_rows(certificate: Certificate, force_unit: float) -> list[list[str]]:
-    """Return title with unit, value, limit, margin and status of every property.
-
-    force_unit : the unit U of the design [N].
-    """
-    return [
-        [
-            f"{entry.title} [{unit_text(entry.unit, force_unit)}]",
-            number(entry.value),
-            number(entry.limit),
-            number(entry.margin),
-            entry.status if entry.limit is not None else "stated",
-        ]
-        for entry in certificate.properties
-    ]
-
-
 def certificate_text(certificate: Certificate, force_unit: float) -> str:
     """Return the certificate as lines of text, ending with advice and the verdict.
 
     force_unit : the unit U of the design [N].
     """
-    rows = [list(HEADER), *certificate_rows(certificate, force_unit)]
+    rows = [list(HEADER)]
+    for entry in certificate.properties:
+        numbers = map(number, (entry.value, entry.limit, entry.margin))
+        status = entry.status if entry.limit is not None else "stated"
+        rows.append([f"{entry.title} [{unit_text(entry.unit, force_unit)}]", *numbers, status])
     lines = [text_table(rows, "<>>><")]
     lines += [f"{e.status}: {e.title}: {e.advice}" for e in advised(certificate)]
     lines += [f"note: {note}" for note in notes(certificate)]

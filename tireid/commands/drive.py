@@ -115,7 +115,8 @@ def declare(new: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 0 where the first car reached the end of the path, else 1."""
-    labels = labels_of(options.tires)
+    every = (driving.FROZEN, driving.LINEAR, driving.ORACLE, driving.LEARNING)
+    labels = list(dict.fromkeys(every if ALL in options.tires else options.tires))
     conditions = conditions_of(options)
     setup = conditions.setup
     driving.require_compiler()
@@ -206,16 +207,6 @@ def parse_fault(text: str, kind: str = driving.FULL) -> SensorFault:
 
 
 ALL = "all"
-
-
-def labels_of(words: Sequence[str]) -> list[str]:
-    """Return the tires in order, each once; all begins with the frozen ones."""
-    wanted = (
-        [driving.FROZEN, driving.LINEAR, driving.ORACLE, driving.LEARNING]
-        if ALL in words
-        else list(words)
-    )
-    return list(dict.fromkeys(wanted))
 
 
 def conditions_of(options: argparse.Namespace) -> driving.Conditions:

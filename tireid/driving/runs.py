@@ -26,7 +26,6 @@ from mpc.loop.sensing import (
     CarSensors,
     FaultySensors,
     Measured,
-    Measures,
     imu_and_localization,
     inertial_unit,
 )
@@ -151,11 +150,6 @@ class Conditions:
         method, start = InertialIdentifier.beginning_with(learnt, car, dt=period)
         return LateralVelocity(OnlineIdentifier(method, car, period, start))
 
-    @property
-    def driving_sensors(self) -> Measures:
-        """The sensors on the path, new ones for each drive: broken ones remember."""
-        return FaultySensors(self.sensors, self.faults) if self.faults else self.sensors
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class ClosedLoop:
@@ -243,7 +237,7 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         setup.car(),
         tracker,
         speed=setup.profile(),
-        sensors=conditions.driving_sensors,
+        sensors=FaultySensors(conditions.sensors, conditions.faults),
         delay=conditions.delay,
         rng=np.random.default_rng([conditions.seed, 2]),
         learner=_BacksOff(beside) if conditions.caution > 0.0 else beside,

@@ -105,7 +105,7 @@ class Setup:
         """
         if not self.drops:
             return Friction(scale=self.mu)
-        if self._runs_along_x:
+        if not self.path.closed and np.all(np.cos(self.path.psi) > 0.2):  # along X
             changes = [
                 FrictionChange(scale=mu, at_place=float(self.path.pose(s)[0]))
                 for s, mu in self.drops
@@ -124,7 +124,3 @@ class Setup:
         t = np.concatenate([[0.0], np.cumsum(pace)])
         laps, within = divmod(s, self.path.length) if self.path.closed else (0.0, s)
         return float(laps * t[-1] + np.interp(within, self.path.s, t))
-
-    @property
-    def _runs_along_x(self) -> bool:
-        return not self.path.closed and bool(np.all(np.cos(self.path.psi) > 0.2))

@@ -69,7 +69,8 @@ def _draw(
     t = drawn_times(recording, recording.t[part])
 
     def slip(v_y: Array) -> Array:
-        return _degrees(v_y[part], recording.v_x[part])
+        v_x = recording.v_x[part]
+        return np.degrees(np.where(v_x > 0.0, np.arctan2(v_y[part], np.maximum(v_x, 1e-9)), 0.0))
 
     main = slip(first.v_y if truth is None else truth)
     limit = _BEYOND * max(float(np.abs(main).max()), 0.1)
@@ -86,11 +87,6 @@ def _draw(
     if first.rms is not None:
         style.note(axes, f"RMSE {first.rms:.2g} deg")
     style.label_time(axes, recording.t)
-
-
-def _degrees(v_y: Array, v_x: Array) -> Array:
-    """Return side slip [deg], zero at standstill."""
-    return np.degrees(np.where(v_x > 0.0, np.arctan2(v_y, np.maximum(v_x, 1e-9)), 0.0))
 
 
 @style.styled
