@@ -25,6 +25,7 @@ from typing import Any
 
 from benchmarks.fingerprint import fingerprint
 from benchmarks.targets import RESULTS, Table, Values
+from tireid.commands.paper import printed_values, row_labels
 
 ROOT = Path(__file__).resolve().parents[1]
 PLACE = re.compile(r"^<!-- table ([\w/]+) -->\n(.*?)^<!-- end -->$", re.M | re.S)
@@ -142,21 +143,19 @@ TABLES_OF_PAPER = ROOT / "tests" / "tireid" / "expected_tables.json"
 
 
 def paper() -> Table:
-    """Return Tables I and II of `tireid paper`, medians over the seeds."""
+    """Return Tables I and II of `tireid paper`, medians over the seeds, beside the printed ones."""
+    head = ("instantaneous", "(paper)", "integral", "(paper)", "instantaneous at η/λ")
     rows = []
     for maneuver, laws in json.loads(TABLES_OF_PAPER.read_text(encoding="utf-8")).items():
-        for measure in laws["integral"]:
-            what = re.sub(r"^(.*)_(\d+)$", r"frozen at \2 s: \1", measure).replace("_", " ")
-            cells = [f"{laws[law][measure]['median']:.2f}" for law in LAWS]
-            rows.append([f"{maneuver.replace('_', ' ')}, {what}", *cells])
-    return Table(("RMSE [kN]", *LAWS.values()), rows)
-
-
-LAWS = {
-    "instantaneous": "instantaneous",
-    "integral": "integral",
-    "instantaneous_scaled": "instantaneous at η/λ",
-}
+        printed = printed_values(maneuver)
+        for measure, what in row_labels(maneuver).items():
+            cells = []
+            for law in ("instantaneous", "integral"):
+                cells += [laws[law][measure]["median"], printed[law].get(measure)]
+            cells.append(laws["instantaneous_scaled"][measure]["median"])
+            texts = ["" if one is None else f"{one:.2f}" for one in cells]
+            rows.append([f"{maneuver.replace('_', ' ')}, {what}", *texts])
+    return Table(("RMSE [kN]", *head), rows)
 
 
 def documents(root: Path = ROOT) -> list[Path]:

@@ -74,7 +74,7 @@ MEANING = (
 )
 
 
-def _row_labels(maneuver: str) -> dict[str, str]:
+def row_labels(maneuver: str) -> dict[str, str]:
     """Return the label of every row of a table, by its column in the study."""
     labels = {paper_study.ONLINE: "online, against truth"}
     for t in paper_study.FREEZES[maneuver]:
@@ -83,7 +83,7 @@ def _row_labels(maneuver: str) -> dict[str, str]:
     return {name: labels[name] for name in paper_study.columns(maneuver)}
 
 
-def _printed_values(maneuver: str) -> dict[str, dict[str, float]]:
+def printed_values(maneuver: str) -> dict[str, dict[str, float]]:
     """Return what the paper prints by law and column, beside the measure that it defines [kN]."""
     beside = {paper_study.ONLINE: paper_study.ONLINE}
     beside |= {
@@ -102,9 +102,9 @@ def _rows(maneuver: str, study: paper_study.Study) -> list[list[str]]:
     Medians and quartiles are those of the seeds that did not diverge; the last row counts those
     that did.
     """
-    table, paper = study.tables()[maneuver], _printed_values(maneuver)
+    table, paper = study.tables()[maneuver], printed_values(maneuver)
     cells = []
-    for name, label in _row_labels(maneuver).items():
+    for name, label in row_labels(maneuver).items():
         row = [label]
         for law in paper_study.LAWS:
             if table[law]:
@@ -193,7 +193,7 @@ def _draw(study: paper_study.Study, maneuver: str) -> dict[str, Figure]:
     }
     printed = {
         law: {labels[name]: value for name, value in row.items()}
-        for law, row in _printed_values(maneuver).items()
+        for law, row in printed_values(maneuver).items()
     }
     if any(results.values()):
         figures[f"{maneuver}_errors"] = comparison_figure(results, printed)
