@@ -18,6 +18,7 @@ from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, WHEELS, S
 from models.logs.units import SI, is_given
 from models.recordings import LogMap, choice, split_log_argument
 from models.recordings.assembly import wheel_scales, wheel_units
+from models.recordings.choice import column_of
 from models.recordings.map import CUT
 from models.recordings.wheels import scale_text, wheel_factor, with_scales
 from tireid.commands import DONE, FAILS
@@ -73,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
     if aside:
         tell(choice.aside_text(signals, proposal))
     elif not choice.has_v_y(signals) and not missing:
-        tell(f"{choice.column_of('a_y')} is there: without vy, identify estimates it")
+        tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
     said, of_wheels, rolls = _wheels(log, signals, log_map, chosen)
     if rolls or missing:
         tell(_missing_text(options.log, missing, proposal, signals))
@@ -105,7 +106,7 @@ def _wheels(
         return scale_text(scales), replace(log_map, wheels=wheels, signals=scaled), True
     try:
         for name, unit in wheel_units(log.headings(), signals).items():
-            wheel_factor(choice.column_of(name), name, unit, log_map.wheels)
+            wheel_factor(column_of(name), name, unit, log_map.wheels)
     except RecordingError as error:
         return str(error), plain, False
     return "vx is computed from the wheels", plain, True
@@ -167,18 +168,16 @@ def _meaning(
             remark += ", its sign turned" if signal.factor < 0.0 and name not in known else ""
             remark += f", its sign in {visible(signal.sign)}" if signal.sign else ""
             among = f", with {len(signal.channel) - 1} more" if len(signal.channel) > 1 else ""
-            return f"{choice.column_of(name)}: {MEANINGS[name]}{remark}{among}"
+            return f"{column_of(name)}: {MEANINGS[name]}{remark}{among}"
     for name, guess in proposal.guesses.items():
         for one in (guess, *proposal.rivals.get(name, ())):
             if channel in one.channel and INSTEAD.get(name) in signals:
-                return (
-                    f"{choice.column_of(name)}, not read beside {choice.column_of(INSTEAD[name])}"
-                )
+                return f"{column_of(name)}, not read beside {column_of(INSTEAD[name])}"
             if channel in one.channel and name not in signals:
                 unit = f" in {one.unit}" if one.unit and not is_given(listed.unit) else ""
                 hand = ", of the hand wheel: give its ratio" if one.hand else ""
                 doubt = "; another is as likely" if name in proposal.rivals else ""
-                return f"perhaps {choice.column_of(name)}{unit} ({one.confidence:.0%}){hand}{doubt}"
+                return f"perhaps {column_of(name)}{unit} ({one.confidence:.0%}){hand}{doubt}"
     return ""
 
 
@@ -190,7 +189,7 @@ def _holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> s
             if empty.size:
                 first = f"{channel.place} {channel.rows[empty[0]]}"
                 said.append(
-                    f"{choice.column_of(name)} has no value in {empty.size} of "
+                    f"{column_of(name)} has no value in {empty.size} of "
                     f"{channel.values.size} cells of {channel.name!r}, the first in {first}"
                 )
     return "\n".join(said)
@@ -204,7 +203,7 @@ def _missing_text(
         needed = [name for name in NEEDED if name in there]
         if "v_y" not in there:
             needed.append("a_y")
-        return f"all that is needed is there: {', '.join(map(choice.column_of, needed))}"
+        return f"all that is needed is there: {', '.join(map(column_of, needed))}"
     lines = []
     words = []
     for name in missing:
@@ -212,13 +211,13 @@ def _missing_text(
         texts = " or ".join(choice.likely_text(one, proposal) for one in likely)
         instead = ", ay can replace it" if likely == ["a_y"] and name != "a_y" else ""
         lines.append(
-            f"{choice.column_of(name)} ({MEANINGS[name]}) is {'missing' if instead else 'not sure'}"
+            f"{column_of(name)} ({MEANINGS[name]}) is {'missing' if instead else 'not sure'}"
             f"{instead}: {texts}"
             if likely
-            else f"{choice.column_of(name)} ({MEANINGS[name]}) is missing"
+            else f"{column_of(name)} ({MEANINGS[name]}) is missing"
         )
         proposed = [choice.column_word(one, proposal) for one in likely]
-        words += proposed or [f'"{choice.column_of(name)}=CHANNEL"']
+        words += proposed or [f'"{column_of(name)}=CHANNEL"']
     return "\n".join([*lines, f"declare it: tireid channels {log} --columns {' '.join(words)}"])
 
 

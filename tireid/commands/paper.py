@@ -186,7 +186,11 @@ def write_study(folder: Path, study: paper_study.Study) -> dict[str, Figure]:
 def _draw(study: paper_study.Study, maneuver: str) -> dict[str, Figure]:
     """Draw what did not diverge."""
     figures = {}
-    labels = _compared(maneuver)
+    labels = {paper_study.ONLINE: "online,\nto truth"}  # both measures side by side
+    for t in paper_study.FREEZES[maneuver]:
+        frozen = f"frozen at {freeze_key(t)} s,"
+        labels[paper_study.frozen_column(paper_study.PAST_ONLINE, t)] = f"{frozen}\npast to online"
+        labels[paper_study.frozen_column(paper_study.ALL, t)] = f"{frozen}\nall to truth"
     results = {
         law: {labels[n]: (q["median"], q["q25"], q["q75"]) for n, q in row.items() if n in labels}
         for law, row in study.tables()[maneuver].items()
@@ -209,16 +213,6 @@ def _draw(study: paper_study.Study, maneuver: str) -> dict[str, Figure]:
             trial.history, trial.replays, window=window, since=onset
         )
     return figures
-
-
-def _compared(maneuver: str) -> dict[str, str]:
-    """Return the columns of the figure, both measures side by side, with their labels."""
-    labels = {paper_study.ONLINE: "online,\nto truth"}
-    for t in paper_study.FREEZES[maneuver]:
-        frozen = f"frozen at {freeze_key(t)} s,"
-        labels[paper_study.frozen_column(paper_study.PAST_ONLINE, t)] = f"{frozen}\npast to online"
-        labels[paper_study.frozen_column(paper_study.ALL, t)] = f"{frozen}\nall to truth"
-    return labels
 
 
 _STUDY, _DRAWING = "the study", "figures"
