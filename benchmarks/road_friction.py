@@ -26,7 +26,7 @@ import tireid as ti
 from benchmarks.answers import blind
 from benchmarks.random_cars import CLASSES, FIRST_SEED, RandomCar, drawn, random_steering
 from benchmarks.targets import Table, Targets, Values, parse
-from identifier.verdict.chosen import CHOSEN as VERDICT_CHOSEN
+from identifier.verdict.motion import BRISK
 from models.friction import Friction, FrictionChange
 from models.plant import PlantError
 from models.recordings import Recording
@@ -94,7 +94,7 @@ def wrong_at(model: ti.TireModel, drive: Recording, since: float) -> float:
     """
     assert drive.axle_force is not None
     away = np.abs(model.predict(drive) - drive.axle_force) / np.array(model.vehicle.axle_loads)
-    fast = drive.v_x >= VERDICT_CHOSEN.brisk * model.vehicle.froude_speed
+    fast = drive.v_x >= BRISK * model.vehicle.froude_speed
     wrong = (away.max(axis=1) > WRONG) & (drive.t >= since) & fast
     return float(drive.t[np.argmax(wrong)]) if wrong.any() else math.inf
 

@@ -23,11 +23,11 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
-from identifier.estimate.chosen import CHOSEN as ESTIMATE
-from identifier.estimate.drive import Drive
+from identifier.estimate.drive import SLOW, Drive
 from identifier.estimate.model import FittedModel
 from identifier.estimate.posterior import Reach
 from identifier.estimate.priors import SENSORS, Priors
+from identifier.estimate.report import WIDEST
 from identifier.estimate.solve import Problem, around_beliefs, car_numbers, normal
 from identifier.motion.model import curve_function
 from identifier.motion.nodes import GIVEN, node_scan
@@ -115,7 +115,7 @@ def plan(
     require_within(PlanError, 0.2, 0.97, share=share)
     speeds = [k * vehicle.froude_speed for k in SPEEDS] if speeds is None else speeds
     for speed in speeds:
-        require_within(PlanError, ESTIMATE.slow * vehicle.froude_speed, 100.0, speed=speed)
+        require_within(PlanError, SLOW * vehicle.froude_speed, 100.0, speed=speed)
     if start is not None and not isinstance(start, FittedModel):
         raise PlanError(f"a plan goes on from a fit, this model is of kind {start.kind!r}")
     priors = Priors.of(vehicle)
@@ -200,7 +200,7 @@ class _Likely(NamedTuple):
 
     def hardest(self, of: Steering, speed: float) -> Maneuver:
         """Return the hardest maneuver of a kind that keeps the share of the grip."""
-        slips = np.linspace(0.0, ESTIMATE.widest, 601)
+        slips = np.linspace(0.0, WIDEST, 601)
         curves = [curve_function()(self.p[curve_index(axle)], slips[None])[0] for axle in "fr"]
         phi = np.column_stack([np.array(curve).ravel() for curve in curves])
         most = slips[np.argmax(phi >= self.share * phi.max(axis=0), axis=0)]

@@ -21,13 +21,22 @@ from typing import Any, Self
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle.chosen import CHOSEN
 from identifier.axle.learning import Regression
 from identifier.band import LEVEL, TINY, BandSpread
 from models.recordings import Recording
 from models.recordings.samples import white_noise
 from models.schema import Table
 from models.vehicle import Vehicle
+
+_RANGES = (0.01, 0.02, 0.04, 0.08, 0.16)  # rad: ends of the ranges of slip, the last is open
+CENTERS = (0.005, 0.015, 0.03, 0.06, 0.12, 0.24)  # rad: where the factor of a range holds
+SPEEDS = (2.0, 3.0, 4.0)  # sqrt(g L): ends of the ranges of speed, first and last are open
+AT_SPEEDS = (1.5, 2.5, 3.5, 4.5)  # sqrt(g L): where the factor of a range of speed holds
+STRETCH = (0.5, 2.0)  # least and most of s
+LEAST_FACTOR = 0.1  # of the factors of a band, over errors as they are declared [-]
+MOST_FACTOR = 100.0  # of the same factors, and of the noise [-]
+MOST_COLOR = 1000.0  # of the factor for errors that last longer than they are declared to [-]
+UNKNOWN = 0.25  # standard deviation over the prior's, from which on slip is not known
 
 RELATIVE = Regression().relative_error  # of the force
 FLOOR = 0.5 * Regression().error  # static axle loads
@@ -52,10 +61,10 @@ class BandCalibration:
 
     def __post_init__(self) -> None:
         for name, shape, low, high in (
-            ("factors", (2, len(CHOSEN.centers)), CHOSEN.least_factor, CHOSEN.most_factor),
-            ("speeds", (2, len(CHOSEN.at_speeds)), CHOSEN.least_factor, CHOSEN.most_factor),
-            ("color", (2,), 1.0, CHOSEN.most_color),
-            ("noise", (3,), 0.0, CHOSEN.most_factor),
+            ("factors", (2, len(CENTERS)), LEAST_FACTOR, MOST_FACTOR),
+            ("speeds", (2, len(AT_SPEEDS)), LEAST_FACTOR, MOST_FACTOR),
+            ("color", (2,), 1.0, MOST_COLOR),
+            ("noise", (3,), 0.0, MOST_FACTOR),
         ):
             value = getattr(self, name)
             if value.shape != shape:
@@ -73,7 +82,7 @@ class BandCalibration:
         """Return that of a model whose errors are as declared, of a speed.
         speed : [m/s], positive.
         """
-        ones = np.ones((2, len(CHOSEN.centers))), np.ones((2, len(CHOSEN.at_speeds)))
+        ones = np.ones((2, len(CENTERS))), np.ones((2, len(AT_SPEEDS)))
         return cls(
             factors=ones[0], speeds=ones[1], color=np.ones(2), speed=speed, noise=np.zeros(3)
         )
@@ -85,8 +94,7 @@ class BandCalibration:
         of_axles = zip(np.abs(slip).T, self.factors, self.speeds, strict=True)
         return np.column_stack(
             [
-                np.interp(size, CHOSEN.centers, slips)
-                * np.interp(relative_speed, CHOSEN.at_speeds, speeds)
+                np.interp(size, CENTERS, slips) * np.interp(relative_speed, AT_SPEEDS, speeds)
                 for size, slips, speeds in of_axles
             ]
         )
@@ -95,13 +103,13 @@ class BandCalibration:
         """Return s, by which errors of the model are larger at speeds, (k,).
         v_x : speeds [m/s], positive, (k,).
         """
-        return np.asarray(np.clip(self.speed / v_x, *CHOSEN.stretch), dtype=np.float64)
+        return np.asarray(np.clip(self.speed / v_x, *STRETCH), dtype=np.float64)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the calibration as plain numbers, ready for JSON."""
         return {
-            "ranges": list(CHOSEN.ranges),
-            "speed_ranges": list(CHOSEN.speeds),
+            "ranges": list(_RANGES),
+            "speed_ranges": list(SPEEDS),
             "level": LEVEL,
             "factors": self.factors.tolist(),
             "speeds": self.speeds.tolist(),
@@ -115,8 +123,8 @@ class BandCalibration:
         """Return the calibration that `to_dict` describes."""
         table = Table(data, "", ValueError, "band.")
         for name, ours in (
-            ("ranges", list(CHOSEN.ranges)),
-            ("speed_ranges", list(CHOSEN.speeds)),
+            ("ranges", list(_RANGES)),
+            ("speed_ranges", list(SPEEDS)),
             ("level", LEVEL),
         ):
             if table.value(name) != ours:
@@ -129,7 +137,7 @@ def ranges_of(slip: Array) -> Any:
     """Return in which of the six ranges slip angles lie.
     slip : its size [rad].
     """
-    return np.searchsorted(CHOSEN.ranges, slip, side="right")
+    return np.searchsorted(_RANGES, slip, side="right")
 
 
 def colored(P: Array, prior: Array, color: float, factor: float = 1.0) -> Array:
@@ -144,7 +152,7 @@ def colored(P: Array, prior: Array, color: float, factor: float = 1.0) -> Array:
     share = np.maximum(share, 0.0)
     known = np.maximum(1.0 - share, 0.0)
     share = np.where(known > 0.0, share * color / (share * color + known), share)
-    held = np.minimum(share / CHOSEN.unknown**2, 1.0)
+    held = np.minimum(share / UNKNOWN**2, 1.0)
     share = share * (factor**2 * (1.0 - held) + max(factor, 1.0) ** 2 * held)
     half = half @ along * np.sqrt(share)
     wider: Array = half @ half.T
@@ -192,6 +200,6 @@ def declared_spread(
     force : φ of the model [static axle loads].   left, before : v and v₀ [static axle loads²].
     stretch : s, of errors of the model [-], a number or (k, 1).
     """
-    share = np.minimum(left / np.maximum(CHOSEN.unknown**2 * before, TINY), 1.0)
+    share = np.minimum(left / np.maximum(UNKNOWN**2 * before, TINY), 1.0)
     total = ((RELATIVE * force) ** 2 + FLOOR**2) * stretch**2 + left
     return BandSpread((1.0 - share) * total, share * total)

@@ -13,9 +13,16 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle.band import FLOOR, RELATIVE, BandCalibration
+from identifier.axle.band import (
+    AT_SPEEDS,
+    CENTERS,
+    FLOOR,
+    RELATIVE,
+    STRETCH,
+    UNKNOWN,
+    BandCalibration,
+)
 from identifier.axle.car import larger, reciprocal, smaller, within
-from identifier.axle.chosen import CHOSEN
 from identifier.axle.covariance import Factors, excited
 from identifier.band import LEVEL, normal_quantile
 
@@ -100,11 +107,11 @@ def half_band(
     share = smaller(left * per_before, 1)
     colored = before * share * (1 + numbers.color) * reciprocal(1 + share * numbers.color)
     left = larger(colored, left)
-    stretch = within(numbers.speed * at.per_v_x, *CHOSEN.stretch)
+    stretch = within(numbers.speed * at.per_v_x, *STRETCH)
     total = ((RELATIVE * at.force) ** 2 + FLOOR**2) * stretch**2 + left
-    unknown = smaller(left * per_before / CHOSEN.unknown**2, 1)
-    factor = _hinged(slips, CHOSEN.centers, at.slip)
-    factor = factor * _hinged(speeds, CHOSEN.at_speeds, numbers.per_froude * reciprocal(at.per_v_x))
+    unknown = smaller(left * per_before / UNKNOWN**2, 1)
+    factor = _hinged(slips, CENTERS, at.slip)
+    factor = factor * _hinged(speeds, AT_SPEEDS, numbers.per_froude * reciprocal(at.per_v_x))
     narrow, wide = factor**2, larger(factor, 1) ** 2
     slip_noise = numbers.sideways * at.per_v_x**2 + numbers.steering
     passed = at.slope**2 * slip_noise * (1 - at.e) * reciprocal(1 + at.e)

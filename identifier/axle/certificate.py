@@ -18,13 +18,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.axle.chosen import CHOSEN
+from identifier.axle.covariance import LEAST_VARIANCE
 from identifier.axle.curve import unit_slopes
-from identifier.axle.learning import FLOAT, Bounds, Regression, RoadChange
+from identifier.axle.learning import FLOAT, LEAN, Bounds, Regression, RoadChange
 from identifier.axle.prior import Prior
 from identifier.certificate import Property, at_least, at_most, statement
 from identifier.driving import Driving
 from models.vehicle import Vehicle
+
+_LARGEST_SLIP = 1.5  # rad
+_CELLS = 2000  # of slip, each a part wider than the one before
+_SMALLEST_CELL = 1e-5  # rad, from zero slip
+_ON_BOUND = 1e-9  # of a bound, within which a corner lies on it
+_LONGEST = 60.0  # s, beyond which a drop is not followed
+_FORGETS = (0.5, 0.9)  # share of its own information that a sample may forget: good, bad
+SLOW_Q = 4.0  # the slow mean does not follow a change
+MOST_SLOW = 4.0  # squared errors: above twice the declared they are no noise to get used to
 
 
 class Design(Protocol):
@@ -71,7 +80,7 @@ def corners(bounds: Bounds, ladder: tuple[float, ...]) -> Array:
             for free in map(list, combinations(range(n), active)):
                 rest = [j for j in range(n) if j not in free]
                 rows = np.array([row[free] for row, _ in chosen]).reshape(active, active)
-                if active and abs(np.linalg.det(rows)) < CHOSEN.on_bound:
+                if active and abs(np.linalg.det(rows)) < _ON_BOUND:
                     continue
                 for ends in product(*(range_ for _, range_ in chosen)):
                     for at in product((-most, most), repeat=n - active):
@@ -83,12 +92,10 @@ def corners(bounds: Bounds, ladder: tuple[float, ...]) -> Array:
                         w[free] = np.linalg.solve(rows, missing) if active else []
                         found.append(w)
     points = np.array(found)
-    inside = (np.abs(points) <= most * (1.0 + CHOSEN.on_bound)).all(axis=1)
+    inside = (np.abs(points) <= most * (1.0 + _ON_BOUND)).all(axis=1)
     for row, (low, high) in slabs:
         value = points @ row
-        inside &= (value >= low - CHOSEN.on_bound * high) & (
-            value <= high * (1.0 + CHOSEN.on_bound)
-        )
+        inside &= (value >= low - _ON_BOUND * high) & (value <= high * (1.0 + _ON_BOUND))
     return points[inside]
 
 
@@ -105,7 +112,7 @@ class _CurveFacts(NamedTuple):
 
 def _cells(until: float) -> Array:
     """Return the ends of cells of slip from 0 on [rad]."""
-    narrow = np.geomspace(min(CHOSEN.smallest_cell, 0.1 * until), until, CHOSEN.cells)
+    narrow = np.geomspace(min(_SMALLEST_CELL, 0.1 * until), until, _CELLS)
     return np.concatenate([[0.0], narrow])
 
 
@@ -188,8 +195,8 @@ class FrictionDrop:
         wrong = self.left * error
         declared = r.error + r.relative_error * friction + r.noise * self.slope / v_x
         A, b, slow = 0.0, 0.0, self.errors
-        for k in range(1, math.ceil(CHOSEN.longest / dt) + 1):
-            slow = min(slow * (1.0 + (CHOSEN.slow_q - 1.0) * at.slow), CHOSEN.most_slow)
+        for k in range(1, math.ceil(_LONGEST / dt) + 1):
+            slow = min(slow * (1.0 + (SLOW_Q - 1.0) * at.slow), MOST_SLOW)
             weight = 2.0 * at.per_sample / (declared**2 * slow + self.unsure**2)
             e = min(wrong - self.noise, r.clip * declared)
             A, b = at.keep * A + weight * self.seen**2, at.keep * b + weight * self.seen * e
@@ -211,8 +218,8 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
     """
     b, dt = design.bounds, design.dt
     set_ = corners(b, design.ladder)
-    facts = curve_facts(set_, design.ladder, CHOSEN.largest_slip)
-    apart = _widest_range(set_, design.ladder, CHOSEN.largest_slip)
+    facts = curve_facts(set_, design.ladder, _LARGEST_SLIP)
+    apart = _widest_range(set_, design.ladder, _LARGEST_SLIP)
     jump = jump_by_learning(design)
     forgets = -math.expm1(-dt / design.regression.memory)
     lean = _lean_over_rounding(design)
@@ -221,16 +228,16 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
             name="forgets",
             title="information along its regressor that a sample forgets: P stays positive",
             value=forgets,
-            limit=CHOSEN.forgets[0],
-            margin=CHOSEN.forgets[0] / forgets,
-            status=at_most(forgets, good=CHOSEN.forgets[0], bad=CHOSEN.forgets[1]),
+            limit=_FORGETS[0],
+            margin=_FORGETS[0] / forgets,
+            status=at_most(forgets, good=_FORGETS[0], bad=_FORGETS[1]),
             unit="-",
             advice="sample faster, or let the memory be longer",
         ),
         statement(
             "smallest_factor",
             "smallest factor D of the covariance U D U', double and float",
-            CHOSEN.least_variance,
+            LEAST_VARIANCE,
             "units of weights^2",
         ),
         Property(
@@ -293,7 +300,7 @@ def jump_by_learning(design: Design) -> float:
     from there than n times the weight and the grip.
     """
     b, n = design.bounds, len(design.ladder)
-    return design.regression.rate * design.dt + CHOSEN.lean * n * (b.weight + b.most_grip)
+    return design.regression.rate * design.dt + LEAN * n * (b.weight + b.most_grip)
 
 
 def _lean_over_rounding(design: Design) -> float:
@@ -301,4 +308,4 @@ def _lean_over_rounding(design: Design) -> float:
     n, b = len(design.ladder), design.bounds
     inside = b.of_ladder(design.ladder)
     nearest = max(inside.per_grip, inside.per_weight, inside.per_falling, inside.per_rising)
-    return float(CHOSEN.lean / nearest / (8.0 * n * FLOAT * b.weight))
+    return float(LEAN / nearest / (8.0 * n * FLOAT * b.weight))

@@ -13,7 +13,10 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.axle.car import larger, reciprocal
-from identifier.axle.chosen import CHOSEN
+
+LEAST_VARIANCE = 1e-14  # of stored weights: of a parameter given those after it, in its unit
+TINY = 1e-30  # keeps quotients of factors finite where one has vanished
+_ROUNDING = 1e-5  # share of the limit that rounding in float may take in a step
 
 Symmetric = dict[tuple[int, int], Any]
 
@@ -51,7 +54,7 @@ def _factored(P: Array) -> Array:
     """Return U with D on its diagonal (q, q), from the last column to the first."""
     rest, F = P.copy(), np.zeros_like(P)
     for j in reversed(range(len(P))):
-        D = max(float(rest[j, j]), CHOSEN.least_variance)
+        D = max(float(rest[j, j]), LEAST_VARIANCE)
         F[:j, j], F[j, j] = rest[:j, j] / D, D
         rest[:j, :j] -= D * np.outer(F[:j, j], F[:j, j])
     return F
@@ -75,7 +78,7 @@ def per_variance(prior: Array, n: int, widest: float) -> Array:
     """
     variances = np.einsum("aii->ai", prior)
     sizes = np.column_stack([variances[:, :n].sum(axis=1), variances[:, n:]])
-    return np.asarray(1.0 / (widest * (1.0 - CHOSEN.covariance_rounding) * sizes), dtype=np.float64)
+    return np.asarray(1.0 / (widest * (1.0 - _ROUNDING) * sizes), dtype=np.float64)
 
 
 def narrowed(P: Array, limits: Array) -> Array:
@@ -149,7 +152,7 @@ def inflated(factors: Factors, direction: list[Any], amount: Any) -> Factors:
     for j in reversed(range(len(v))):
         old, cv = D[j], c * v[j]
         D[j] = old + cv * v[j]
-        per_D = reciprocal(D[j] + CHOSEN.covariance_tiny)
+        per_D = reciprocal(D[j] + TINY)
         for i in range(j):
             v[i] = v[i] - v[j] * U[i, j]
             U[i, j] = U[i, j] + cv * per_D * v[i]

@@ -10,12 +10,11 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.axle.band import BandCalibration
+from identifier.axle.band import AT_SPEEDS, CENTERS, BandCalibration
 from identifier.axle.band_step import band_numbers, hinges
 from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeState, road_push
 from identifier.axle.car import car_numbers, downforce_numbers, symbols
 from identifier.axle.certificate import certified
-from identifier.axle.chosen import CHOSEN
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
 from identifier.axle.gate import Plausibility
@@ -224,8 +223,8 @@ class AxleIdentifier(Method):
             constants={
                 **setup.constants,
                 "banding": np.column_stack(band_numbers(calibration, vehicle.froude_speed)),
-                "slip_factors": hinges(calibration.factors, CHOSEN.centers),
-                "speed_factors": hinges(calibration.speeds, CHOSEN.at_speeds),
+                "slip_factors": hinges(calibration.factors, CENTERS),
+                "speed_factors": hinges(calibration.speeds, AT_SPEEDS),
                 "prior": packed(self.prior.covariance(vehicle, self.ladder)),
             },
         )

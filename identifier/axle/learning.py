@@ -15,9 +15,20 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.axle.car import larger, reciprocal, smaller, within
-from identifier.axle.chosen import CHOSEN
-from identifier.axle.covariance import Factors, Spread, Symmetric, excited, scaled, updated, width
+from identifier.axle.covariance import (
+    LEAST_VARIANCE,
+    Factors,
+    Spread,
+    Symmetric,
+    excited,
+    scaled,
+    updated,
+    width,
+)
 from models.rules import require_positive_fields
+
+_TINY = 1e-12  # of a size that is divided by
+LEAN = 1e-4  # of a step that is limited: towards the center, by more than rounding can do
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,7 +153,7 @@ def update(
 
     θ⁺ = θ + P h e/(R + a), a = h'Ph;  P⁺ = P - κ P h h'P/((R + a) a), κ = a - R (1 - λ)/λ, which
     keeps P positive definite for every a, also where κ < 0 and P grows: 1/h'P⁻¹h stays positive.
-    No D of its factors falls below `CHOSEN.least_variance`: what would do so is learnt from, but P
+    No D of its factors falls below `LEAST_VARIANCE`: what would do so is learnt from, but P
     stays.
     theta : parameters, q entries.   P : factors of their covariance.   h : regressor, q entries.
     innovation : e = y - h'θ, clipped.   R : its variance.   forgetting : (1 - λ)/λ.
@@ -162,7 +173,7 @@ def update(
     smallest = P.D[0]
     for one in P.D[1:]:
         smallest = smaller(one, smallest)
-    thick = smallest * (R + R * forgetting) >= CHOSEN.least_variance * (R + a)
+    thick = smallest * (R + R * forgetting) >= LEAST_VARIANCE * (R + a)
     moves = ca.logic_and(learns, ca.if_else(kappa >= 0, thick, wide <= 1))
     # β_q = 1 + c a = (R + a)/(R + R (1 - λ)/λ), so that c/β_q = κ/((R + a) a)
     c = ca.if_else(moves, kappa / (a * R * (1 + forgetting)), 0)
@@ -468,7 +479,7 @@ def _times(P: Symmetric, row: list[Any]) -> list[Any]:
 
 def _positive(x: Any) -> Any:
     """Return a size that rounding may have made zero or negative, as a divisor."""
-    return larger(x + CHOSEN.learning_tiny, CHOSEN.learning_tiny)
+    return larger(x + _TINY, _TINY)
 
 
 def _rising(numbers: BoundNumbers, w: list[Any], P: Symmetric, slope: list[Any]) -> list[Any]:
@@ -520,8 +531,8 @@ def limited(numbers: BoundNumbers, per_step: Any, last: list[Any], w: list[Any])
     for move in moves:
         reached = reached + move
         over = larger(ca.fabs(reached) * per_step, over)
-    part, stay = (1 - CHOSEN.lean) * reciprocal(over), over <= 1
+    part, stay = (1 - LEAN) * reciprocal(over), over <= 1
     return [
-        ca.if_else(stay, b, a + part * move + CHOSEN.lean * (numbers.center - a))
+        ca.if_else(stay, b, a + part * move + LEAN * (numbers.center - a))
         for a, b, move in zip(last, w, moves, strict=True)
     ]

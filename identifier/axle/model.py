@@ -20,7 +20,6 @@ from identifier.axle.band import (
     sensor_noise,
 )
 from identifier.axle.car import Car, car_numbers, downforce_numbers
-from identifier.axle.chosen import CHOSEN
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.dynamics import curve_at_speed, lagged_force, series_compliance
 from identifier.axle.gate import GateState, Plausibility
@@ -51,6 +50,13 @@ from models.recordings import Recording
 from models.rules import require_positive
 from models.schema import Table
 from models.vehicle import DOWNFORCE_SPEED, Vehicle
+
+_LARGEST = 1e9  # of the numbers in a file, SI and static axle loads
+_LARGEST_WEIGHT = 100.0  # static axle loads: no unit of a tire carries more
+_ROUNDING = 1e-6  # of correlations, as learning in float leaves them
+_DECIDED = 0.5  # standard deviation over the prior's, up to which a drive decided a number
+_DRAWS = 1000  # of weights, before a possible tire must have been among them
+_BENT = 0.4  # slope over that at zero, below which a curve shows where it saturates
 
 BESIDE = ("compliance", "sway_share", "offset")  # the curve
 ARRAYS = ("W", *BESIDE, "covariance", "prior_covariance", "excitation")
@@ -116,9 +122,9 @@ class AxleModel(TireModel):
             for P in getattr(self, name):
                 if not np.allclose(P, P.T) or not _is_covariance(P):
                     raise ValueError(f"{name} must be symmetric and positive definite")
-        if np.abs(self.W).max() > CHOSEN.largest_weight:
+        if np.abs(self.W).max() > _LARGEST_WEIGHT:
             raise ValueError(
-                f"W must be static axle loads below {CHOSEN.largest_weight:g}, it reaches "
+                f"W must be static axle loads below {_LARGEST_WEIGHT:g}, it reaches "
                 f"{np.abs(self.W).max():g}"
             )
         missed = self.force_missed
@@ -199,7 +205,7 @@ class AxleModel(TireModel):
         steep[:n], level[:n] = 1.0 / scales, 1.0
         lag, zero = np.eye(n + 3)[n], np.eye(n + 3)[n + 2]
         slope = (self.W / scales).sum(axis=1)
-        bends = self.slope_at(self.known_slip[None])[0] < CHOSEN.bent * slope
+        bends = self.slope_at(self.known_slip[None])[0] < _BENT * slope
         given = self.vehicle.bicycle[4:]
         offset = (("zero of the steering", "deg", np.degrees(1.0)), ("bias of v_y", "m/s", 1.0))
         listed = []
@@ -217,7 +223,7 @@ class AxleModel(TireModel):
                     float(np.sqrt(along @ P[i] @ along))
                     for P in (self.covariance, self.prior_covariance)
                 )
-                learnt = bool(seen and now <= CHOSEN.decided * prior)
+                learnt = bool(seen and now <= _DECIDED * prior)
                 listed.append(
                     Estimate(title, axle, float(value), float(per) * now, its_unit, before, learnt)
                 )
@@ -346,10 +352,8 @@ class AxleModel(TireModel):
             table = Table({**three, **table.data}, "", FrozenModelError)
         numbers: dict[str, Any] = {name: table.array(name) for name in ("ladder", "edges", *ARRAYS)}
         for name, values in numbers.items():
-            if (largest := np.abs(values).max(initial=0.0)) > CHOSEN.largest:
-                table.refuse(
-                    name, f"must hold numbers below {CHOSEN.largest:g}, it reaches {largest:g}"
-                )
+            if (largest := np.abs(values).max(initial=0.0)) > _LARGEST:
+                table.refuse(name, f"must hold numbers below {_LARGEST:g}, it reaches {largest:g}")
         ladder, edges = tuple(numbers.pop("ladder").tolist()), numbers.pop("edges").tolist()
         if edges != list(EDGES):
             table.refuse("edges", f"must be {list(EDGES)}, they are {edges}")
@@ -475,7 +479,7 @@ class _AxleBand(Band):
         both = zip(model.covariance, model.prior_covariance, calibration.color, size, strict=True)
         roots = [root(colored(P, prior, float(c), float(f))) for P, prior, c, f in both]
         drawn: list[AxleModel] = []
-        for _ in range(CHOSEN.draws * n):
+        for _ in range(_DRAWS * n):
             if len(drawn) == n:
                 break
             one = self._drawn(roots, 1.0 + RELATIVE * size * rng.standard_normal(2), rng)
@@ -495,10 +499,7 @@ class _AxleBand(Band):
         away = np.array([root @ rng.standard_normal(len(root)) for root in roots])
         W = (model.W + away[:, :n]) * scale[:, None]
         slope = (W / np.array(model.ladder)).sum(axis=1)
-        if (
-            not ((W.sum(axis=1) > 0.0) & (slope > 0.0)).all()
-            or np.abs(W).max() > CHOSEN.largest_weight
-        ):
+        if not ((W.sum(axis=1) > 0.0) & (slope > 0.0)).all() or np.abs(W).max() > _LARGEST_WEIGHT:
             return None
         zeros = np.array([at_most.max_steering, at_most.slow])
         low = np.column_stack([np.zeros((2, 2)), -zeros])
@@ -514,7 +515,7 @@ def _is_covariance(P: Array) -> bool:
     if not (variances > 0.0).all():
         return False
     sd = np.sqrt(variances)
-    return bool(np.linalg.eigvalsh(P / np.outer(sd, sd))[0] > -CHOSEN.model_rounding)
+    return bool(np.linalg.eigvalsh(P / np.outer(sd, sd))[0] > -_ROUNDING)
 
 
 @cache

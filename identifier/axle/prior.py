@@ -11,11 +11,13 @@ from functools import cache
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle.chosen import CHOSEN
 from identifier.axle.curve import unit_matrix
 from identifier.band import SD_FRICTION
 from models.rules import require_positive_fields
 from models.vehicle import Vehicle
+
+_RIDGE = 0.3  # keeps projected weights small where units are alike
+_STEP = 1.2  # ratio over which log-derivatives are taken
 
 SLIPS = np.linspace(0.002, 0.6, 300)  # rad, where a curve and its projection must agree
 
@@ -63,8 +65,8 @@ class Prior:
         for i, c in enumerate(_relative_stiffness(vehicle)):
             d_C, d_mu = (
                 (fiala_weights(c * s, mu * m, ladder) - fiala_weights(c / s, mu / m, ladder))
-                / (2.0 * np.log(CHOSEN.step))
-                for s, m in ((CHOSEN.step, 1.0), (1.0, CHOSEN.step))
+                / (2.0 * np.log(_STEP))
+                for s, m in ((_STEP, 1.0), (1.0, _STEP))
             )
             P[i, :n, :n] = (
                 self.sd_stiffness**2 * np.outer(d_C, d_C)
@@ -102,7 +104,7 @@ def _projected(force: Array, ladder: tuple[float, ...]) -> Array:
 def _projector(ladder: tuple[float, ...]) -> Array:
     """Return the matrix (n, 300) from curves to weights."""
     T = unit_matrix(SLIPS, ladder)
-    squared = T.T @ T + CHOSEN.ridge**2 * np.eye(len(ladder))
+    squared = T.T @ T + _RIDGE**2 * np.eye(len(ladder))
     return np.asarray(np.linalg.solve(squared, T.T), dtype=np.float64)
 
 

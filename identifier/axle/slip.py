@@ -14,11 +14,16 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from identifier.axle.car import Car, within
-from identifier.axle.chosen import CHOSEN
 from identifier.axle.curve import Curve
 from identifier.axle.gate import Gate
 from models.rules import require_within
 from models.vehicle import GRAVITY, Vehicle
+
+_SLOWEST = 0.1  # rad/s, of a body that rolls on springs
+FASTEST = 100.0  # rad/s, of a body that rolls on springs
+# per wheelbase: ∂x/∂s stays below it, also where its recursion does not settle
+_MOST_SENSITIVE = 1e4
+_MOST_SWAY = 10.0  # g: ρ and ρ'/ω stay below it, at any sampling and however speed changes
 
 SHORTEST = 1e-3  # wheelbases: the lag never vanishes
 
@@ -116,7 +121,7 @@ def sensitivity(
     p_s, p_k = lasting.of_compliance, lasting.of_share
     change = alpha - last.alpha
     by_sigma = ((h.e - h.phi) * change - h.z * h.e * (last.alpha - last.x)) * h.per_sigma
-    most = CHOSEN.most_sensitive * (1 / wheelbase)
+    most = _MOST_SENSITIVE * (1 / wheelbase)
     p_s = h.e * p_s + by_sigma * (last.slope + compliance * lasting.bend * p_s)
     p_s = within(p_s, -most, most)
     p_k = h.e * p_k + (1 - h.e) * sway_before + (1 - h.phi) * (sway_now - sway_before)
@@ -153,7 +158,7 @@ class Sway:
     damping: float = 0.3
 
     def __post_init__(self) -> None:
-        require_within(ValueError, CHOSEN.slowest, CHOSEN.fastest, frequency=self.frequency)
+        require_within(ValueError, _SLOWEST, FASTEST, frequency=self.frequency)
         require_within(ValueError, 0.01, 10.0, damping=self.damping)
 
     @classmethod
@@ -161,13 +166,11 @@ class Sway:
         """Return the roll that a car of this size has: 5 sqrt(g/L), 1.5 Hz for a sedan; of a toy
         below 7 cm 10 Hz.
         """
-        return cls(
-            frequency=min(5.0 * math.sqrt(GRAVITY / vehicle.wheelbase), 0.6 * CHOSEN.fastest)
-        )
+        return cls(frequency=min(5.0 * math.sqrt(GRAVITY / vehicle.wheelbase), 0.6 * FASTEST))
 
     def numbers(self) -> "SwayNumbers":
         """Return the numbers of a step."""
-        omega, most = self.frequency, CHOSEN.most_sway * GRAVITY
+        omega, most = self.frequency, _MOST_SWAY * GRAVITY
         return SwayNumbers(
             stiffness=omega**2,
             damping=2.0 * self.damping * omega,

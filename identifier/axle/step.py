@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
+from identifier.axle.band import AT_SPEEDS, CENTERS
 from identifier.axle.band_step import AtSample, BandNumbers, half_band
 from identifier.axle.bank import UNPROVEN, SlopeNumbers, SlopeState, road_push, slope_step
 from identifier.axle.car import (
@@ -26,7 +27,7 @@ from identifier.axle.car import (
     symbols,
     within,
 )
-from identifier.axle.chosen import CHOSEN
+from identifier.axle.certificate import MOST_SLOW, SLOW_Q
 from identifier.axle.covariance import factors_of, inflated, row_of, spread, triangle
 from identifier.axle.curve import EDGES, EXCITATION, Curve, curve, excited
 from identifier.axle.gate import GATE_PORT, Gate, GateState, Plausibility, gate
@@ -60,6 +61,8 @@ from identifier.axle.slip import (
 )
 from identifier.setup import AXLE_FORCE, FACTORS, HALF_BAND, NOT_NEGATIVE, Port
 from models.vehicle import GRAVITY, load_ratio
+
+_LARGEST_Q = 25.0  # of one outlier
 
 # From a sample to the axle forces of given weights: what learning and the frozen model share.
 #
@@ -255,8 +258,8 @@ def _band_ports(n: int) -> dict[str, Any]:
     """Return the ports of the band."""
     return {
         "banding": (2, BandNumbers),
-        "slip_factors": (2, len(CHOSEN.centers)),
-        "speed_factors": (2, len(CHOSEN.at_speeds)),
+        "slip_factors": (2, len(CENTERS)),
+        "speed_factors": (2, len(AT_SPEEDS)),
         "prior": (2, len(triangle(n + 3))),
     }
 
@@ -445,11 +448,11 @@ def _errors(
     numbers, (fast, trend, slow, _) = s.changing, s.errors
     learns, declared = sample.learns, sample.sigma**2
     V = declared * slow + unsure
-    q = smaller(sample.e**2 / V, CHOSEN.largest_q)
-    of_noise = smaller(sample.e**2 / declared, CHOSEN.slow_q * slow)
+    q = smaller(sample.e**2 / V, _LARGEST_Q)
+    of_noise = smaller(sample.e**2 / declared, SLOW_Q * slow)
     means = fast + learns * numbers.fast * (q - fast)
     lasting = trend + learns * numbers.trend * (larger(q, 1) - trend)
-    noise = within(slow + learns * numbers.slow * (of_noise - slow), 1, CHOSEN.most_slow)
+    noise = within(slow + learns * numbers.slow * (of_noise - slow), 1, MOST_SLOW)
     road = evidence(
         numbers,
         s.change,

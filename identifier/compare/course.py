@@ -20,8 +20,14 @@ from identifier.method import CannotFreezeError, Method
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.run import History, identify
 from identifier.tire_model import TireModel
-from identifier.verdict.chosen import CHOSEN as VERDICT_CHOSEN
-from identifier.verdict.motion import brisk_windows, clean_rms, measured_force, noise_variance
+from identifier.verdict.motion import (
+    BRISK,
+    FEWEST,
+    brisk_windows,
+    clean_rms,
+    measured_force,
+    noise_variance,
+)
 from models.recordings import Recording
 from models.recordings.evidence import Windows
 from models.vehicle import Vehicle
@@ -46,9 +52,9 @@ class Course:
         for recording in self.recordings:
             if names.count(recording.name) > 1:
                 raise ValueError(f"{recording.name} is given twice: each needs its own name")
-            if self.by_motion and len(self._windows(recording)) < VERDICT_CHOSEN.fewest:
+            if self.by_motion and len(self._windows(recording)) < FEWEST:
                 raise ValueError(
-                    f"{recording.name}: fewer than {VERDICT_CHOSEN.fewest} windows are driven "
+                    f"{recording.name}: fewer than {FEWEST} windows are driven "
                     "briskly, and there are no true forces Fyf, Fyr to judge by"
                 )
             size = self.size(recording)
@@ -67,9 +73,7 @@ class Course:
         return f"RMSE of the axle force{by}"
 
     def _windows(self, recording: Recording) -> Windows:
-        return brisk_windows(
-            recording, max(self.min_speed, VERDICT_CHOSEN.brisk * self.vehicle.froude_speed)
-        )
+        return brisk_windows(recording, max(self.min_speed, BRISK * self.vehicle.froude_speed))
 
     def size(self, recording: Recording) -> AxleRmse:
         """Return the rms over the samples that count of the forces that methods are judged by."""

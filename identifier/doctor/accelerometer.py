@@ -12,15 +12,20 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.doctor.chosen import CHOSEN
-from identifier.estimate.chosen import CHOSEN as ESTIMATE_CHOSEN
-from identifier.estimate.drive import Drive, box, gradient, thinned
+from identifier.estimate.drive import SMOOTHED, Drive, box, gradient, thinned
 from identifier.estimate.priors import SEDAN
 from identifier.estimate.solve import DELAYS, autocorrelation_time
 from identifier.motion.model import SENSORS, true_signals
 from identifier.motion.parameters import INDEX
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
+
+_FILTERED = 0.25  # [s] of means
+_STRIDE = 0.1  # [s] between means
+_ERROR = 0.02  # of g, an error of the accelerometer
+_RELATIVE = 0.03  # of the acceleration, an error of the accelerometer
+_LEAST_SCALE = 0.3  # of the scale of what is missed
+_LEAST_MEMORY = 0.25  # [s]
 
 OF_A_Y = ("a_y.offset", "a_y.factor", "a_y.delay", "a_y.place", "a_y.lag")
 
@@ -49,7 +54,7 @@ class Accelerometer:
         self.mean = np.array([0.0, 0.97, 0.0, 0.0, 0.0])  # a body rolls by 0 to 6 degrees per g
         self.usual = np.array([0.04, 0.03, roll, 0.012 * L, 1e-6])
         self.memory = 0.0
-        width = float(np.sqrt(L / SEDAN)) * ESTIMATE_CHOSEN.smoothed
+        width = float(np.sqrt(L / SEDAN)) * SMOOTHED
         self.measured = [
             box(thinned(one.needed("a_y"), drive.every), round(width / drive.dt) | 1)
             for one, drive in zip(segments, drives, strict=True)
@@ -73,13 +78,13 @@ class Accelerometer:
         y, X, seconds = [], [], 0.0
         for one, measured in zip(self.drives, self.measured, strict=True):
             v_x, v_y, r = _motion(one, p)
-            count = CHOSEN.filtered / one.dt
+            count = _FILTERED / one.dt
             K = box(gradient(box(v_y, count / 3), one.dt) + v_x * r, count)
             at = np.arange(measured.size)
             felt = box(np.interp(at + late / one.dt, at, measured), count)
             slope = gradient(felt, one.dt)
             turning = gradient(box(r, count), one.dt)
-            every = max(1, round(CHOSEN.stride / one.dt))
+            every = max(1, round(_STRIDE / one.dt))
             kept = np.flatnonzero(one.counts[::every]) * every
             y.append((K - GRAVITY * p[INDEX["bank"]])[kept])
             X.append(np.column_stack([-np.ones(K.size), felt, slope, -turning, slope])[kept])
@@ -88,21 +93,19 @@ class Accelerometer:
         mean = self.mean.copy()
         mean[2] = -late
         S2, w, theta = 1.0, np.ones(moved.size), mean
-        n = seconds / max(self.memory, CHOSEN.stride) / moved.size  # of each residual
+        n = seconds / max(self.memory, _STRIDE) / moved.size  # of each residual
         for _ in range(5):  # to shrink the motion explains nothing: the size of errors shrinks too
-            size = np.hypot(CHOSEN.error * GRAVITY, CHOSEN.relative * rows[:, 1]) * min(
-                theta[1], 1.0
-            )
+            size = np.hypot(_ERROR * GRAVITY, _RELATIVE * rows[:, 1]) * min(theta[1], 1.0)
             of_size = rows / size[:, None]
             H = n / S2 * (of_size.T * w) @ of_size + np.diag(sd**-2.0)
             g = n / S2 * (of_size.T * w) @ (moved / size - of_size @ mean)
             theta = mean + np.linalg.solve(H, g)
             e = moved / size - of_size @ theta
             w = 5.0 / (4.0 + e**2 / S2)  # Student, 4 degrees
-            S2 = max(float(np.mean(w * e**2)), CHOSEN.least_scale**2)
+            S2 = max(float(np.mean(w * e**2)), _LEAST_SCALE**2)
         if not self.memory:
-            found = autocorrelation_time([np.clip(e, -4.0, 4.0)], CHOSEN.stride, e.size)
-            self.memory = max(found, CHOSEN.least_memory)
+            found = autocorrelation_time([np.clip(e, -4.0, 4.0)], _STRIDE, e.size)
+            self.memory = max(found, _LEAST_MEMORY)
             n = seconds / self.memory / moved.size
         away = (theta - mean) / sd
         loss = 2.5 * np.log1p(e**2 / (4.0 * S2)).sum() + 0.5 * moved.size * math.log(S2)

@@ -4,11 +4,11 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
-from identifier.doctor.chosen import CHOSEN
 from identifier.doctor.faults import Examination, examine, prepared
 from identifier.doctor.finding import Finding, first_of_each
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import (
+    NEAR,
     Screened,
     before_sizes,
     clock_findings,
@@ -21,6 +21,11 @@ from models.recordings import Recording, RecordingError
 from models.recordings.checks import physics_contradiction, vehicle_contradiction, world_axes
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle, VehicleError
+
+_ROUNDS = 2  # in which the ratio of a steering wheel is found
+_SETTLED = 0.02  # change of that ratio, in parts, below which it is settled
+_WIDE = 1.0  # of that ratio, by which the screen may be off
+_SURELY = 0.9  # confidence that a law is broken
 
 RATIOS = ("steering_ratio", "factor")  # codes of gross findings whose factor is any number
 ELSEWHERE = ("velocity_sensor_x", "v_y")  # what may be in place of a gross fault
@@ -99,7 +104,7 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     """
     world = world_axes(recording)
     if world is not None:  # nothing that follows would be of this car
-        finding = Finding(code="world_axes", channel="v_y", confidence=CHOSEN.surely, text=world)
+        finding = Finding(code="world_axes", channel="v_y", confidence=_SURELY, text=world)
         return Diagnosis(name=recording.name, findings=(finding,), unobservable=NEVER)
     if recording.logged_v_y is None:
         samples = clock_findings(recording) or sample_findings(recording)
@@ -154,9 +159,7 @@ def _contradictions(recording: Recording, vehicle: Vehicle) -> list[Finding]:
     """
     blind = replace(recording, axle_force=None)
     said = physics_contradiction(blind) or vehicle_contradiction(blind, vehicle)
-    return (
-        [] if said is None else [Finding(code="contradiction", confidence=CHOSEN.surely, text=said)]
-    )
+    return [] if said is None else [Finding(code="contradiction", confidence=_SURELY, text=said)]
 
 
 def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | None:
@@ -166,18 +169,18 @@ def _exact_ratio(coarse: Finding, drive: Recording, car: Vehicle) -> Finding | N
     """
     assert coarse.repair is not None
     factor, deviation = coarse.repair.factor["delta_f"], math.nan
-    for _ in range(CHOSEN.rounds):
+    for _ in range(_ROUNDS):
         search = prepared(drive, car)
         if search is None:
             return coarse
-        search.wide["steering_gain"] = CHOSEN.wide
+        search.wide["steering_gain"] = _WIDE
         post = search.run()  # what distorts the motion distorts the ratio
         gain, deviation = post["steering_gain"], post.sd("steering_gain")
         factor *= 1.0 + gain
-        if abs(gain) < CHOSEN.settled:
+        if abs(gain) < _SETTLED:
             break
         drive, _ = Repair(factor={"delta_f": 1.0 + gain}).apply(drive, car)
-    if abs(math.log(abs(factor))) < CHOSEN.near and factor > 0.0:
+    if abs(math.log(abs(factor))) < NEAR and factor > 0.0:
         return None
     exact = steering_finding(factor, coarse.confidence, deviation=deviation)
     return replace(exact, sure=exact.sure and coarse.sure)

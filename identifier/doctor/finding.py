@@ -5,8 +5,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from identifier.doctor.chosen import CHOSEN
 from models.recordings.repair import Repair
+
+_MOST_CONFIDENCE = 0.99  # confidence that is given
+_MATTERS = 0.5  # confidence that something is wrong, from which it is given as such
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,12 +60,12 @@ class Finding:
     @property
     def matters(self) -> bool:
         """Whether it is more likely than not that something is wrong with the log."""
-        return self.alarm >= CHOSEN.matters and not self.note
+        return self.alarm >= _MATTERS and not self.note
 
     @property
     def percent(self) -> str:
         """The confidence as text; 99 % at most, as a log alone proves nothing."""
-        return f"{100.0 * min(self.confidence, CHOSEN.most_confidence):.0f} %"
+        return f"{100.0 * min(self.confidence, _MOST_CONFIDENCE):.0f} %"
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain numbers and words, ready for JSON; None is what is not known."""

@@ -10,24 +10,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import blocks, large
-from identifier.doctor.chosen import CHOSEN
-from identifier.verdict.chosen import CHOSEN as VERDICT_CHOSEN
+from identifier.verdict.motion import BRISK
 from models.recordings import Recording
 from models.recordings.evidence import Windows
 from models.vehicle import Vehicle
 
+_WINDOW = 0.2  # [s]
+SLOWEST = 0.3  # of the 95th percentile of speed, below which a window does not count
+PIECE = 60.0  # s of a piece that is looked at, of a drive of hours
+PIECES = 10  # of such a drive that are looked at
+_SHORTEST_PIECE = 200  # samples of such a piece
+_SHORTEST_SEGMENT = 2.0  # s, below which a segment between two gaps is not looked at
+
 
 def looked_at(recording: Recording) -> tuple[Recording, ...]:
     """Return the pieces of a drive that the screen looks at: all of a short one, some of a long."""
-    n = max(round(CHOSEN.piece / recording.dt), CHOSEN.shortest_piece)
+    n = max(round(PIECE / recording.dt), _SHORTEST_PIECE)
     places = list(recording.segments)
-    if len(recording) > CHOSEN.pieces * n:
+    if len(recording) > PIECES * n:
         cut = [
             slice(k, min(k + n, one.stop))
             for one in places
             for k in range(one.start, max(one.stop - n, one.start) + 1, n)
         ]
-        some = np.unique(np.linspace(0, len(cut) - 1, CHOSEN.pieces).astype(int))
+        some = np.unique(np.linspace(0, len(cut) - 1, PIECES).astype(int))
         places = [cut[k] for k in some]
     return _taken(recording, places)
 
@@ -35,7 +41,7 @@ def looked_at(recording: Recording) -> tuple[Recording, ...]:
 def driven_pieces(recording: Recording) -> tuple[Recording, ...]:
     """Return the pieces that are looked at in which the car drives, all where it never does."""
     pieces = looked_at(recording)
-    fast = CHOSEN.slowest * usual_speed(pieces)
+    fast = SLOWEST * usual_speed(pieces)
     return tuple(one for one in pieces if len(driven_windows(one, fast))) or pieces
 
 
@@ -46,7 +52,7 @@ def usual_speed(pieces: tuple[Recording, ...]) -> float:
 
 def driven_windows(recording: Recording, fast: float) -> Windows:
     """Return the windows in which a car is never slower than a speed, forward or backward."""
-    return Windows.where(np.abs(recording.v_x) >= fast, recording, CHOSEN.window)
+    return Windows.where(np.abs(recording.v_x) >= fast, recording, _WINDOW)
 
 
 def segments_of(
@@ -59,7 +65,7 @@ def segments_of(
     if recording.duration <= longest:
         return _taken(recording, _unbroken(recording, slice(0, n)))
     length = int(longest / pieces / dt)
-    total, brisk = large((n + 1,)), VERDICT_CHOSEN.brisk * vehicle.froude_speed
+    total, brisk = large((n + 1,)), BRISK * vehicle.froude_speed
     total[0] = 0.0
     for part in blocks(n):
         lively = np.where(recording.v_x[part] > brisk, recording.r[part] ** 2, 0.0)
@@ -78,7 +84,7 @@ def _unbroken(recording: Recording, part: slice) -> list[slice]:
     """Return the segments of a part of a recording that no gap breaks, the longest at least."""
     edges = [part.start, *(k for k in recording.breaks if part.start < k < part.stop), part.stop]
     pieces = sorted((slice(a, b) for a, b in pairwise(edges)), key=lambda one: one.start - one.stop)
-    least = int(CHOSEN.shortest_segment / recording.dt)
+    least = int(_SHORTEST_SEGMENT / recording.dt)
     kept = [one for one in pieces if one.stop - one.start >= least] or pieces[:1]
     return sorted(kept, key=lambda one: one.start)
 

@@ -21,19 +21,48 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.doctor.chosen import CHOSEN
-from identifier.doctor.pieces import driven_windows, looked_at, usual_speed
+from identifier.doctor.pieces import SLOWEST, driven_windows, looked_at, usual_speed
 from models.recordings import Recording
 from models.recordings.samples import white_noise
 from models.vehicle import GRAVITY, Vehicle
 
-STIFFNESS = CHOSEN.fineness ** np.arange(CHOSEN.stiffnesses)  # c [1/rad], 1 to 100
-FRICTION = 0.3 * CHOSEN.fineness ** np.arange(CHOSEN.frictions)[:, None]  # μ [-], 0.3 to 3.3
+# consistency
+_FEWEST_WINDOWS = 20  # windows: fewer say nothing
+_MOST_WINDOWS = 500  # windows: of more that many are taken all over the log
+# Ratio of a curve to the next. Curves that are tried lie on one grid of c and μ, so that many
+# have the same c/μ: to saturate them, which costs most, is done once for each of these.
+_FINENESS = 100.0 ** (1.0 / 27.0)
+_STIFFNESSES = 28  # c of that grid
+_FRICTIONS = 15  # μ of that grid
+# per square of the logarithm of c over the declared one: a stiffness that is twice that costs
+# as much as 14 % of what is left unexplained
+_DISBELIEF = 0.3
+_FAST = 6.0  # sqrt(g L), 30 m/s for a sedan; what is faster costs as much per square of a logarithm
+_EXACT = 0.003  # share of the variance of φ, below which less that is left says nothing more
+_CLEAR = 2.5  # times its noise that a channel must swing for its unit to be identified
+_ROLLING = (0.85, 1.25)  # slope of a_y on dv_y/dt + v_x r, with the roll of the body
+_GAIN = 1.1  # that a change must earn: less than it is left by a third in a sum of logarithms
+_FREEDOM = 0.5  # that a change must earn beside, whose factor is free
+_DEEPER = math.log(0.15)  # left of each equation, above which more changes are tried together
+_KEPT = 8  # readings that are taken further
+_JUDGED = 10  # of the best, by laws that need no vehicle
+_MOST_CHANGES = 4  # changes at once
+_SAME_STEERING = math.log(2.5)  # of ln of a steering factor, within which nothing is gross
+_SAME_SIZE = math.log(2.2)  # of ln of the size of a car, within which nothing is gross
+_SAME_INERTIA = math.log(2.0)  # of ln of its yaw inertia, within which nothing is gross
+_FINER = 5  # golden sections, of an arm
+_FINEST = 12  # golden sections, of a steering angle
+_ALIKE_FACTORS = math.log(1.15)  # factors that say the same
+_AS_GOOD = 0.5  # of cost: by so much a wrong sign may be worse than one with a factor
+_STEEPNESS = 3.0  # of the confidence over what the next best reading leaves more
+_ALONE = 2.8  # price of a v_y in another unit than v_x
+_UNUSUAL = 2.0  # price of a v_y that is an angle in deg
+
+STIFFNESS = _FINENESS ** np.arange(_STIFFNESSES)  # c [1/rad], 1 to 100
+FRICTION = 0.3 * _FINENESS ** np.arange(_FRICTIONS)[:, None]  # μ [-], 0.3 to 3.3
 # c/μ [1/rad], and which of them is that of μ and c.
-RATIOS = CHOSEN.fineness ** np.arange(1 - CHOSEN.frictions, CHOSEN.stiffnesses)[:, None] / 0.3
-_RATIO_OF = (
-    np.arange(CHOSEN.stiffnesses) - np.arange(CHOSEN.frictions)[:, None] + CHOSEN.frictions - 1
-)
+RATIOS = _FINENESS ** np.arange(1 - _FRICTIONS, _STIFFNESSES)[:, None] / 0.3
+_RATIO_OF = np.arange(_STIFFNESSES) - np.arange(_FRICTIONS)[:, None] + _FRICTIONS - 1
 
 
 class Reading(NamedTuple):
@@ -83,17 +112,17 @@ class Motion(NamedTuple):
         speed = usual_speed(pieces)
         if speed == 0.0:
             return None
-        rows = np.concatenate([_rows(one, CHOSEN.slowest * speed) for one in pieces], axis=1)
+        rows = np.concatenate([_rows(one, SLOWEST * speed) for one in pieces], axis=1)
         m = rows.shape[1]
-        if m < CHOSEN.fewest_windows:
+        if m < _FEWEST_WINDOWS:
             return None
         *means, a_y = (
             rows
-            if m <= CHOSEN.most_windows
-            else rows[:, np.linspace(0, m - 1, CHOSEN.most_windows).astype(int)]
+            if m <= _MOST_WINDOWS
+            else rows[:, np.linspace(0, m - 1, _MOST_WINDOWS).astype(int)]
         )
         felt = None if recording.a_y is None else a_y
-        return cls._make((*means, felt, speed, _hidden(pieces, CHOSEN.slowest * speed)))
+        return cls._make((*means, felt, speed, _hidden(pieces, SLOWEST * speed)))
 
 
 def _rows(recording: Recording, fast: float) -> Array:
@@ -115,7 +144,7 @@ def _hidden(pieces: tuple[Recording, ...], fast: float) -> frozenset[str]:
             continue
         means = [driven_windows(one, fast).mean(getattr(one, name)) for one in pieces]
         noise = float(np.median([white_noise(getattr(one, name)) for one in pieces]))
-        if float(np.std(np.concatenate(means))) < CHOSEN.clear * noise:
+        if float(np.std(np.concatenate(means))) < _CLEAR * noise:
             found.add(name)
     return frozenset(found)
 
@@ -146,7 +175,7 @@ def but_front_leaves(one: _AxleMotion, motion: Motion, vehicle: Vehicle, reading
     """Return what is left of all other equations."""
     froude = abs(reading.v_x) * motion.speed / (math.sqrt(reading.size) * vehicle.froude_speed)
     declared = vehicle.cornering_stiffness_rear / vehicle.axle_loads[1]
-    total = max(math.log(froude / CHOSEN.fast), 0.0) ** 2
+    total = max(math.log(froude / _FAST), 0.0) ** 2
     total += _curve_leaves(one.force[1], one.slip[1], declared)
     if motion.a_y is not None:
         total += _accelerometer_leaves(reading.a_y * motion.a_y, one.acceleration)
@@ -173,7 +202,7 @@ def forces_and_slips(motion: Motion, vehicle: Vehicle, reading: Reading) -> _Axl
 
 
 def _curve_leaves(force: Array, slip: Array, declared: float) -> float:
-    disbelief = CHOSEN.disbelief * np.log(STIFFNESS / declared) ** 2
+    disbelief = _DISBELIEF * np.log(STIFFNESS / declared) ** 2
     force = force - force.mean()
     size = float(force @ force) + 1e-12
     bent = RATIOS * slip
@@ -181,15 +210,15 @@ def _curve_leaves(force: Array, slip: Array, declared: float) -> float:
     bent -= bent.mean(axis=1, keepdims=True)
     along, power = bent @ force, np.einsum("ij,ij->i", bent, bent)
     left = size - 2.0 * FRICTION * along[_RATIO_OF] + FRICTION**2 * power[_RATIO_OF]
-    return float(np.min(np.log(np.clip(left / size, 0.0, 1.0) + CHOSEN.exact) + disbelief))
+    return float(np.min(np.log(np.clip(left / size, 0.0, 1.0) + _EXACT) + disbelief))
 
 
 def _accelerometer_leaves(a_y: Array, acceleration: Array) -> float:
     """Return the logarithm of the share of a_y that the motion does not explain."""
     measured, moved = a_y - a_y.mean(), acceleration - acceleration.mean()
-    slope = float(np.clip(measured @ moved / (moved @ moved + 1e-12), *CHOSEN.rolling))
+    slope = float(np.clip(measured @ moved / (moved @ moved + 1e-12), *_ROLLING))
     left = float(np.sum((measured - slope * moved) ** 2)) / (float(measured @ measured) + 1e-12)
-    return math.log(min(left, 1.0) + CHOSEN.exact)
+    return math.log(min(left, 1.0) + _EXACT)
 
 
 # What may be wrong, alone and together.
@@ -264,8 +293,7 @@ class Change:
         what = (self.code, self.channels, self.unit)
         pairs = zip(self.factors, other.factors, strict=False)
         near = all(
-            abs(math.log(abs(a / b))) < CHOSEN.alike_factors and a * b > 0.0
-            for (_, a), (_, b) in pairs
+            abs(math.log(abs(a / b))) < _ALIKE_FACTORS and a * b > 0.0 for (_, a), (_, b) in pairs
         )
         return what == (other.code, other.channels, other.unit) and near
 
@@ -276,7 +304,7 @@ def _changed(code: str, unit: str, factor: float, *channels: str, price: float =
 
 
 def _unit(unit: str, factor: float, *channels: str) -> Change:
-    alone = CHOSEN.alone if channels == ("v_y",) else 0.0
+    alone = _ALONE if channels == ("v_y",) else 0.0
     return _changed("unit", unit, factor, *channels, price=_PRICES.get(unit, 0.0) + alone)
 
 
@@ -296,7 +324,7 @@ CHANGES = (
             code="sideslip", channels=("v_y",), unit=unit, factors=(("v_y", one),), sideslip=True,
             price=price,
         )
-        for unit, one, price in (("rad", 1.0, 0.0), ("deg", DEGREE, CHOSEN.unusual))
+        for unit, one, price in (("rad", 1.0, 0.0), ("deg", DEGREE, _UNUSUAL))
     ),
     _unit("deg", DEGREE, "delta_f"),
     *(_sign(name) for name in ("v_y", "r", "v_x", "delta_f")),
@@ -324,8 +352,8 @@ class _Explanation:
     def cost(self) -> float:
         """What it leaves and what its changes cost; a number that is free costs more."""
         free = sum(change.code in FREE for change in self.changes)
-        prices = sum(CHOSEN.gain + change.price for change in self.changes)
-        return self.left + prices + CHOSEN.freedom * free
+        prices = sum(_GAIN + change.price for change in self.changes)
+        return self.left + prices + _FREEDOM * free
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -342,7 +370,7 @@ class Read:
     @property
     def confidence(self) -> float:
         """From a half, where the next best reading is as good, to 1."""
-        return 1.0 / (1.0 + math.exp(-CHOSEN.steepness * (self.other.cost - self.best.cost)))
+        return 1.0 / (1.0 + math.exp(-_STEEPNESS * (self.other.cost - self.best.cost)))
 
 
 def read(
@@ -360,16 +388,16 @@ def read(
     tried, best = [as_declared], as_declared
     equations = 2 if motion.a_y is None else 3
     beam = [as_declared]
-    for _ in range(CHOSEN.most_changes):
+    for _ in range(_MOST_CHANGES):
         longer = [new for one in beam for new in _longer(one, changes, motion, vehicle)]
         tried += longer
         before, best = best, min(tried, key=lambda one: one.cost)
-        if best is before and (len(beam) > 1 or best.left < equations * CHOSEN.deeper):
+        if best is before and (len(beam) > 1 or best.left < equations * _DEEPER):
             break
-        good = best is not before and best.left < equations * CHOSEN.deeper
-        beam = [best] if good else sorted(longer, key=lambda one: one.cost)[: CHOSEN.kept]
+        good = best is not before and best.left < equations * _DEEPER
+        beam = [best] if good else sorted(longer, key=lambda one: one.cost)[:_KEPT]
     ranked = sorted(tried, key=lambda one: (one.cost, len(one.changes)))
-    lawful = [one for one in ranked[: CHOSEN.judged] if admissible(one.changes)]
+    lawful = [one for one in ranked[:_JUDGED] if admissible(one.changes)]
     ranked = lawful + [one for one in ranked if one not in lawful]
     found = _chosen(ranked)
     in_place = _chosen([one for one in ranked if one.gross == one.changes])
@@ -382,7 +410,7 @@ def _chosen(ranked: list[_Explanation]) -> Read:
     """Return the first of some explanations, and the next that means something else."""
     best, *others = ranked
     turned = tuple(change.turned for change in best.changes)  # which claims less
-    nearly = best.cost + CHOSEN.as_good
+    nearly = best.cost + _AS_GOOD
     best = next((one for one in others if one.changes == turned and one.cost < nearly), best)
     others = [one for one in others if one.cost >= best.cost]
     other = next((one for one in others if _means_else(one, best)), ranked[-1])
@@ -402,11 +430,9 @@ def _longer(
     if "delta ratio" not in taken:
         free += _steerings(one, motion, vehicle)
     if "size size" not in taken and not one.changes:
-        free += _scaled("other_car", "size", SIZES, CHOSEN.same_size, motion, vehicle)
+        free += _scaled("other_car", "size", SIZES, _SAME_SIZE, motion, vehicle)
     if "inertia size" not in taken:
-        free += _scaled(
-            "yaw_inertia", "inertia", _INERTIAS, CHOSEN.same_inertia, motion, vehicle, one
-        )
+        free += _scaled("yaw_inertia", "inertia", _INERTIAS, _SAME_INERTIA, motion, vehicle, one)
     if not any(change.code == ARM for change in one.changes):
         free += _arms(one, motion, vehicle)
     longer = []
@@ -430,9 +456,9 @@ def _steerings(one: _Explanation, motion: Motion, vehicle: Vehicle) -> list[Chan
 
     tried = {float(factor): left(float(factor)) for factor in (*STEERING, *-STEERING)}
     best, step = min(tried, key=lambda one: tried[one]), math.log(STEERING[1] / STEERING[0])
-    finer = _least(lambda by: left(best * math.exp(by)), -step, step, CHOSEN.finest)
+    finer = _least(lambda by: left(best * math.exp(by)), -step, step, _FINEST)
     factor = best * math.exp(finer)
-    if factor > 0.0 and abs(math.log(factor)) < CHOSEN.same_steering:
+    if factor > 0.0 and abs(math.log(factor)) < _SAME_STEERING:
         return []
     return [Change(code="steering", channels=("delta_f",), factors=(("delta", factor),))]
 
@@ -470,7 +496,7 @@ def _arms(one: _Explanation, motion: Motion, vehicle: Vehicle) -> list[Change]:
     if share == 0.0:
         return []
     step = float(_ARMS[1] - _ARMS[0])
-    share = _least(left, share - step, share + step, CHOSEN.finer)
+    share = _least(left, share - step, share + step, _FINER)
     return [Change(code=ARM, channels=("v_y",), arm=share * length)]
 
 

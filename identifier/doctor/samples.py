@@ -12,13 +12,21 @@ from itertools import combinations
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.doctor.chosen import CHOSEN
 from identifier.doctor.finding import Finding, first_of_each
-from identifier.doctor.pieces import driven_pieces, usual_speed
+from identifier.doctor.pieces import SLOWEST, driven_pieces, usual_speed
 from models.recordings import Recording
 from models.recordings import samples as facts
 from models.recordings.record import CHANNELS
 from models.recordings.repair import Repair
+
+_FREEZE = 0.3  # [s] that a noisy channel repeats one number
+_MOVES = 0.15  # of the range of v_x r, by which a car must move meanwhile, in any unit
+_REPEATED = 0.01  # of a noisy channel: share of repeated samples
+_FEW = 5  # of a noisy channel: how often it repeats
+_CAUGHT_UP = 0.025  # of a rounded channel: share of samples after which it catches up
+_ALIKE_DELAYS = math.log(1.6)  # of the times by which samples of two channels are late
+_COARSE = 0.05  # quantum over the rms of a channel
+CERTAIN = 0.99  # confidence in what samples show by themselves
 
 LATERAL = ("v_y", "r", "delta_f", "a_y")
 UNITS = {"v_x": "m/s", "v_y": "m/s", "r": "rad/s", "delta_f": "rad", "delta_r": "rad",
@@ -36,7 +44,7 @@ def sample_findings(recording: Recording) -> list[Finding]:
         for one in first_of_each(listed)
         if (one.code != "jitter" or _is_late(one.channel, late, recording.dt))
         # Where several channels are late, all are torn, at every sample.
-        and not (len(late) > 1 and one.code == "clock" and one.confidence < CHOSEN.certain)
+        and not (len(late) > 1 and one.code == "clock" and one.confidence < CERTAIN)
     ]
 
 
@@ -45,9 +53,7 @@ def _is_late(name: str, late: Mapping[str, float], dt: float) -> bool:
 
     Noise of v_y alone may well grow with the slip, and that of a camera with the speed.
     """
-    alike = [
-        one for one, size in late.items() if abs(math.log(size / late[name])) < CHOSEN.alike_delays
-    ]
+    alike = [one for one, size in late.items() if abs(math.log(size / late[name])) < _ALIKE_DELAYS]
     return "r" in alike and len(alike) > 1 and late[name] > 0.7 * dt
 
 
@@ -88,7 +94,7 @@ def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:
             else _stopped(name, float(there[0].t[0]), there[0].duration)
         )
         length = sum(one.duration for one in there)
-        yield _found("frozen", name, length, CHOSEN.certain, text)
+        yield _found("frozen", name, length, CERTAIN, text)
 
 
 def _still(recording: Recording) -> list[str]:
@@ -113,18 +119,18 @@ def _copies(moving: Mapping[str, Array]) -> Iterator[Finding]:
             continue
         what = "is a copy of" if abs(ratio - 1.0) < facts.COPY else f"is {ratio:.4g} times"
         text = f"{other} {what} {one}, sample by sample: it was computed or mapped, not measured"
-        yield _found("copied", other, ratio, CHOSEN.certain, text)
+        yield _found("copied", other, ratio, CERTAIN, text)
 
 
 def _channel(name: str, recording: Recording, jumps: bool) -> Iterator[Finding]:
     signal, dt = getattr(recording, name), recording.dt
     noise, step, runs = facts.noise(signal), facts.resolution(signal), facts.Runs.of(signal)
-    if step is not None and step > CHOSEN.coarse * float(np.std(signal)):
+    if step is not None and step > _COARSE * float(np.std(signal)):
         text = (
             f"{name} comes in steps of {step:.3g} {UNITS[name]}: a coarse sensor, or too few "
             "digits were written"
         )
-        coarse = _found("quantized", name, step, CHOSEN.certain, text)
+        coarse = _found("quantized", name, step, CERTAIN, text)
         yield replace(coarse, unit=UNITS[name])
     lost = facts.dropouts(signal, noise)
     if lost.size:
@@ -132,7 +138,7 @@ def _channel(name: str, recording: Recording, jumps: bool) -> Iterator[Finding]:
             f"{name} drops to 0 for {lost.size} of {signal.size} samples, first at "
             f"{recording.t[lost[0]]:.4g} s: a lost sensor; leave these samples out of the log"
         )
-        yield _found("dropout", name, float(lost.size), CHOSEN.certain, text)
+        yield _found("dropout", name, float(lost.size), CERTAIN, text)
         return
     stairs = runs.stairs(rounded=step is not None)
     if stairs is not None:
@@ -141,7 +147,7 @@ def _channel(name: str, recording: Recording, jumps: bool) -> Iterator[Finding]:
             f"{name} has a new value every {1e3 * stairs * dt:.3g} ms only and repeats it in "
             f"between: so it is {1e3 * delay:.3g} ms late in the mean"
         )
-        slow = _found("held", name, stairs * dt, CHOSEN.certain, text)
+        slow = _found("held", name, stairs * dt, CERTAIN, text)
         yield replace(slow, repair=Repair(delay={name: delay}), sure=True)
     elif step is None:
         yield from _repeats(name, runs, noise > 0.0, recording)
@@ -172,14 +178,14 @@ def _repeats(name: str, runs: facts.Runs, noisy: bool, recording: Recording) -> 
     step = runs.resolution(signal)
     lost = runs.lost(signal, step)
     ends = lost[longest] or at + length == signal.size
-    frozen = length * dt >= CHOSEN.freeze and ends and (noisy or name in ("v_y", "r", "a_y"))
+    frozen = length * dt >= _FREEZE and ends and (noisy or name in ("v_y", "r", "a_y"))
     frozen = frozen and _runs_on(name, noisy, recording, slice(at, at + length))
     first = float(recording.t[at])
     of_all, again = float(np.sum(runs.length[lost] - 1)), int(np.count_nonzero(lost))
     of_others = of_all - (length - 1) * bool(frozen and lost[longest])
-    enough = CHOSEN.repeated + facts.alike_by_rounding(signal) if step is None else CHOSEN.caught_up
+    enough = _REPEATED + facts.alike_by_rounding(signal) if step is None else _CAUGHT_UP
     known = noisy or step is not None
-    if known and of_others / len(recording) > enough and again >= CHOSEN.few:
+    if known and of_others / len(recording) > enough and again >= _FEW:
         typical = float(np.median(runs.length[lost])) * dt
         most = f", the longest for {length * dt:.3g} s from {first:.4g} s on" if frozen else ""
         text = (
@@ -199,7 +205,7 @@ def _zero(name: str, runs: facts.Runs, recording: Recording) -> Finding | None:
     """
     signal, dt = getattr(recording, name), recording.dt
     usual = facts.swing(_turning(name, recording))
-    long = (runs.length * dt >= CHOSEN.freeze) & (signal[runs.first] == 0.0)
+    long = (runs.length * dt >= _FREEZE) & (signal[runs.first] == 0.0)
     places = [
         slice(first, first + n)
         for first, n in zip(runs.first[long].tolist(), runs.length[long].tolist(), strict=True)
@@ -223,7 +229,7 @@ def _zero(name: str, runs: facts.Runs, recording: Recording) -> Finding | None:
 
 def _runs_on(name: str, noisy: bool, recording: Recording, here: slice) -> bool:
     """Whether the drive goes on while a channel stands still: it moves, or another one does."""
-    if np.mean(np.abs(recording.v_x[here])) < CHOSEN.slowest * usual_speed((recording,)):
+    if np.mean(np.abs(recording.v_x[here])) < SLOWEST * usual_speed((recording,)):
         return False
     others = [getattr(recording, one) for one in ("v_y", "r", "delta_f", "v_x") if one != name]
     alive = sum(bool(np.ptp(one[here]) > 0.0) for one in others if one is not None)
@@ -235,7 +241,7 @@ def _moves(name: str, recording: Recording, here: slice, usual: float) -> bool:
     """Whether the car changes its turn over a segment, by the channels that are not judged."""
     width = max(1, min(round(0.2 / recording.dt), (here.stop - here.start) // 2))
     smooth = np.convolve(_turning(name, recording)[here], np.ones(width) / width, "valid")
-    return bool(np.ptp(smooth) > CHOSEN.moves * usual > 0.0)
+    return bool(np.ptp(smooth) > _MOVES * usual > 0.0)
 
 
 def _turning(name: str, recording: Recording) -> Array:
@@ -248,7 +254,7 @@ def _clock_jump(recording: Recording, moving: Mapping[str, Array]) -> Finding | 
     again, dt = facts.logged_again(moving), recording.dt
     jump = facts.torn(moving, SMOOTH) if again is None else None
     if again is not None:
-        at, size, confidence, deviation = again[0], -again[1] * dt, CHOSEN.certain, 0.0
+        at, size, confidence, deviation = again[0], -again[1] * dt, CERTAIN, 0.0
     elif jump is not None:
         at, size, confidence, deviation = jump[0], jump[1] * dt, 0.95, 0.5 * abs(jump[1]) * dt
     else:

@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identifier.doctor.chosen import CHOSEN
 from identifier.doctor.finding import Finding
-from identifier.doctor.pieces import driven_pieces, driven_windows, looked_at, usual_speed
+from identifier.doctor.pieces import SLOWEST, driven_pieces, driven_windows, looked_at, usual_speed
 from identifier.doctor.readings import ARM, DEGREE, Change, Motion, Read, read
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.suspects import similar_inertia, usual_inertia
@@ -21,6 +20,16 @@ from models.recordings import Recording, RecordingError
 from models.recordings.checks import physics_contradiction
 from models.recordings.repair import Repair
 from models.vehicle import Vehicle
+
+_QUIET = 0.8  # [m/s^2] of v_x r, which a drive must exceed in a share `lively` of its windows
+_LIVELY = 0.005  # share of the windows of a drive, as of `quiet`
+_SURE = 0.95  # confidence above which nothing else is named beside, and what is found is mended
+_SEVERAL = 3  # changes at once, beyond which nothing is sure
+_WHEEL = (5.0, 30.0)  # ratios of a steering wheel to the road wheels
+NEAR = math.log(1.15)  # of a factor to that of a unit
+_PERFECT = 0.999  # of a drive, from which a channel that does not change is no measurement
+_OFTEN = 0.1  # of a drive, from which a channel that reads exactly 0 so long is no measurement
+_SLOW = 1.0  # s between samples, from which a clock is in ms
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +56,7 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
         return Screened(findings=clock, repair=Repair(), blind="the clock is not in s")
     samples, given = sample_findings(recording), _unlike(vehicle)
     driven = sum(one.duration for one in driven_pieces(recording))
-    lasts = {"copied": -math.inf, "frozen": CHOSEN.perfect * driven, "zero": CHOSEN.often * driven}
+    lasts = {"copied": -math.inf, "frozen": _PERFECT * driven, "zero": _OFTEN * driven}
     missing = [one.channel for one in samples if one.size >= lasts.get(one.code, math.inf)]
     blind = f"{' and '.join(missing)} was not measured" if missing else ""
     quiet = None if missing else _quiet_finding(recording)
@@ -142,13 +151,11 @@ def _quiet_finding(recording: Recording) -> Finding | None:
     pieces = looked_at(recording)
     fast, turns = max(usual_speed(pieces), 1e-9), []
     for piece in pieces:
-        windows = driven_windows(piece, CHOSEN.slowest * fast)
+        windows = driven_windows(piece, SLOWEST * fast)
         if len(windows):
             turns.append(np.abs(windows.mean(piece.v_x * piece.r)))
-    peak = (
-        float(np.percentile(np.concatenate(turns), 100.0 * (1.0 - CHOSEN.lively))) if turns else 0.0
-    )
-    if peak >= CHOSEN.quiet:
+    peak = float(np.percentile(np.concatenate(turns), 100.0 * (1.0 - _LIVELY))) if turns else 0.0
+    if peak >= _QUIET:
         return None
     return Finding(
         code="straight",
@@ -156,13 +163,13 @@ def _quiet_finding(recording: Recording) -> Finding | None:
         unit="m/s^2",
         confidence=0.99,
         text=f"the car hardly corners: v_x r reaches {peak:.2g} m/s² of the "
-        f"{CHOSEN.quiet:g} that are needed; drive a lane change or a slalom",
+        f"{_QUIET:g} that are needed; drive a lane change or a slalom",
     )
 
 
 def clock_findings(recording: Recording) -> tuple[Finding, ...]:
     """Return a sampling interval that is that of a clock in ms; nothing else can be asked then."""
-    if recording.dt < CHOSEN.slow:
+    if recording.dt < _SLOW:
         return ()
     return (
         Finding(
@@ -194,11 +201,11 @@ def _unlike(vehicle: Vehicle) -> list[Finding]:
 
 def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
     confidence = found.confidence
-    if len(found.best.gross) > CHOSEN.several:
-        confidence = min(confidence, CHOSEN.sure)  # so much that is wrong may be wrong otherwise
+    if len(found.best.gross) > _SEVERAL:
+        confidence = min(confidence, _SURE)  # so much that is wrong may be wrong otherwise
     factors = dict(change.factors)
     names = " and ".join(change.channels)
-    doubt = "" if confidence > CHOSEN.sure else f"; or {_words(found.other.changes)}"
+    doubt = "" if confidence > _SURE else f"; or {_words(found.other.changes)}"
     if change.code == "other_car":
         size = factors["size"]
         return Finding(
@@ -239,7 +246,7 @@ def _reading_finding(change: Change, found: Read, vehicle: Vehicle) -> Finding:
         confidence=confidence,
         text=text,
         repair=_repair_of((change,)),
-        sure=confidence > CHOSEN.sure,
+        sure=confidence > _SURE,
     )
 
 
@@ -252,20 +259,20 @@ def steering_finding(
     """
     size, turned = 1.0 / abs(factor), ", positive to the right" if factor < 0.0 else ""
     said = with_doubt(size, size * deviation)
-    if abs(math.log(size)) < CHOSEN.near:
+    if abs(math.log(size)) < NEAR:
         code, text, size = "sign", f"delta_f has the wrong sign{doubt}", -1.0
         factor = -1.0
-    elif abs(math.log(size * DEGREE)) < CHOSEN.near:
+    elif abs(math.log(size * DEGREE)) < NEAR:
         code, text = "unit", f"delta_f is in degrees{turned}{doubt}"
         factor = math.copysign(DEGREE, factor)
         size = 1.0 / factor
-    elif CHOSEN.wheel[0] < size < CHOSEN.wheel[1]:
+    elif _WHEEL[0] < size < _WHEEL[1]:
         code = "steering_ratio"
         text = (
             f"delta_f is the angle of the steering wheel in rad, {said} times that of the "
             f"road wheels{turned}{doubt}"
         )
-    elif CHOSEN.wheel[0] < size * DEGREE < CHOSEN.wheel[1]:
+    elif _WHEEL[0] < size * DEGREE < _WHEEL[1]:
         code, size = "steering_ratio", size * DEGREE
         text = (
             "delta_f is the angle of the steering wheel in degrees, "
@@ -282,7 +289,7 @@ def steering_finding(
         confidence=confidence,
         text=text,
         repair=Repair(factor={"delta_f": factor}),
-        sure=confidence > CHOSEN.sure and code != "factor",
+        sure=confidence > _SURE and code != "factor",
     )
 
 

@@ -9,10 +9,17 @@ import math
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from identifier.doctor.chosen import CHOSEN
 from identifier.measured import with_doubt
 from models.recordings import Repair
 from models.vehicle import Vehicle
+
+_SEDAN = 2.7  # m, wheelbase of whose size the numbers are
+_DEGREES = math.degrees(1.0)  # in a rad
+_INERTIA = (0.5, 1.6)  # of I_z/(m l_f l_r); cars on the road have 0.9 to 1.1
+_SMALL = 1.0  # [m] wheelbase, below which a model car may have as little
+_SMALL_INERTIA = 0.3  # of I_z/(m l_f l_r), the least of such a model car
+_OVERHANG = 0.5  # wheelbases that a car, and what is mounted to it, reach beyond its axles
+_CENTER = (0.25, 0.75)  # l_f over the wheelbase: a load that an axle of a car can have
 
 _OPPOSITES = {  # of what a size says, where it is negative
     " late ": " early ",
@@ -28,9 +35,7 @@ NOTES = ("center_of_gravity", "yaw_inertia", "downforce")  # of the car: never a
 
 def usual_inertia(vehicle: Vehicle) -> tuple[float, float]:
     """Return from what to what I_z/(m l_f l_r) of cars of a size goes."""
-    return (
-        CHOSEN.small_inertia if vehicle.wheelbase < CHOSEN.small else CHOSEN.inertia[0]
-    ), CHOSEN.inertia[1]
+    return (_SMALL_INERTIA if vehicle.wheelbase < _SMALL else _INERTIA[0]), _INERTIA[1]
 
 
 def similar_inertia(vehicle: Vehicle) -> float:
@@ -72,7 +77,7 @@ class Suspect(NamedTuple):
         return ("downforce_f", "downforce_r") if pair else (self.parameter,)
 
     def scaled(self, value: float, vehicle: Vehicle) -> float:
-        return float(value * (vehicle.wheelbase / CHOSEN.sedan) ** _POWERS[self.grows])
+        return float(value * (vehicle.wheelbase / _SEDAN) ** _POWERS[self.grows])
 
     def size(self, value: float) -> float:
         match self.code:
@@ -113,11 +118,9 @@ class Suspect(NamedTuple):
             case "lag":
                 return size > 0.0
             case "center_of_gravity":
-                return (
-                    CHOSEN.center[0] < (vehicle.l_f - size) / vehicle.wheelbase < CHOSEN.center[1]
-                )
+                return _CENTER[0] < (vehicle.l_f - size) / vehicle.wheelbase < _CENTER[1]
             case "velocity_sensor_x" | "acceleration_sensor_x":
-                beyond = CHOSEN.overhang * vehicle.wheelbase
+                beyond = _OVERHANG * vehicle.wheelbase
                 return -vehicle.l_r - beyond < size < vehicle.l_f + beyond
             case "yaw_inertia":
                 least, most = usual_inertia(vehicle)
@@ -155,7 +158,7 @@ def _of_channels() -> tuple[Suspect, ...]:
         ("v_y_bias", "v_y", "m/s", 0.4, 0.02, "speed", " m/s", 1.0),
         ("r_bias", "r", "rad/s", 0.03, 0.002, "rate", " rad/s", 1.0),
         ("a_y.offset", "a_y", "m/s^2", 0.7, 0.05, "", " m/s²", 1.0),
-        ("steering_zero", "delta_f", "rad", 0.03, 0.0015, "", "°", CHOSEN.degrees),
+        ("steering_zero", "delta_f", "rad", 0.03, 0.0015, "", "°", _DEGREES),
     )
     found = [
         Suspect(parameter, "offset", name, unit, wide, least, grows,
@@ -185,7 +188,7 @@ def _of_channels() -> tuple[Suspect, ...]:
 SUSPECTS = (
     *_of_channels(),
     Suspect("v_y_angle", "velocity_sensor_angle", "v_y", "rad", 0.03, 0.0012, "",
-            "the velocity sensor is turned by {size} to the left", "°", CHOSEN.degrees),
+            "the velocity sensor is turned by {size} to the left", "°", _DEGREES),
     Suspect("v_y_lever", "velocity_sensor_x", "v_y", "m", 0.8, 0.04, "length",
             "the velocity is measured {size} ahead of the center of gravity", " m"),
     Suspect("a_y.place", "acceleration_sensor_x", "a_y", "m", 0.8, 0.04, "length",
@@ -195,7 +198,7 @@ SUSPECTS = (
     Suspect("ln_inertia", "yaw_inertia", "", "", 0.5, 0.1, "",
             "the {origin} yaw inertia is {size} times the right one"),
     Suspect("bank", "bank", "", "rad", 0.03, 0.003, "",
-            "the road falls by {size} to the left, or there is side wind", "°", CHOSEN.degrees),
+            "the road falls by {size} to the left, or there is side wind", "°", _DEGREES),
     Suspect("downforce_f", "downforce", "", "s^2/m^2", 2e-4, 5e-5, "",
             "forces grow with speed, as by a downforce of {size}",
             " % of the weight at 100 km/h", 100.0 * (100.0 / 3.6) ** 2),

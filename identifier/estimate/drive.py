@@ -11,11 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
 from models.recordings.record import ALL
 from models.vehicle import GRAVITY, Vehicle
+
+FASTEST = 0.01  # [s]: sampled faster, samples are averaged
+SMOOTHED = 0.07  # [s] of a mean, of a sedan
+SLOW = 0.45  # sqrt(g L): below, no tire curve is learnt
+LONGITUDINAL = 0.3  # [s] over which v_x is differentiated
+MOST_A_X = 18.0  # m/s²
+_BANK_MEAN = 1.0  # [s]: roads bank slowly
+_LEVEL = 0.01  # sine, by which an accelerometer may be off level; twice that is a bank in full
+_MOST_ROLL = 0.08  # per g, by which a body rolls outwards
+_LATE = (1, 2, 3)  # columns of v_y, r and δ_f
+_EXPLAINED = 0.15  # of the fast motion that an accelerometer may miss, else it is none of this car
+_ACROSS = (0.8, 1.2)  # slope of an accelerometer's a_y on that motion; a body rolls
+ALONG = (0.8, 1.25)  # slope of its a_x on that motion; a body pitches
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -47,7 +59,7 @@ class Drive:
         part: slice = ALL,
         *,
         replay: bool = False,
-        fastest: float = CHOSEN.fastest,
+        fastest: float = FASTEST,
     ) -> "Drive":
         """Return a recording with a v_y as the estimate reads it.
         replay : whether each sample is asked about, down to the lowest speed; else those that come
@@ -55,7 +67,7 @@ class Drive:
         fastest : sampling interval to which they are averaged [s].
         """
         every = 1 if replay else max(1, round(fastest / recording.dt))
-        slowest = vehicle.lowest_speed if replay else CHOSEN.slow * vehicle.froude_speed
+        slowest = vehicle.lowest_speed if replay else SLOW * vehicle.froude_speed
         dt = recording.dt * every
         begin, end, _ = part.indices(len(recording))
         within = [
@@ -87,7 +99,7 @@ class Drive:
         """
         signals, rates = self.signals.copy(), self.rates.copy()
         edges = (*self.begins, len(signals))
-        for k, (column, delay) in enumerate(zip(CHOSEN.late, delays, strict=True)):
+        for k, (column, delay) in enumerate(zip(_LATE, delays, strict=True)):
             if delay == 0.0:
                 continue
             for begin, end in pairwise(edges):
@@ -112,21 +124,18 @@ def _piece(
     v_y = recording.needed("v_y")
 
     scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
-    count = round(CHOSEN.smoothed * scale / dt) | 1
+    count = round(SMOOTHED * scale / dt) | 1
     raw = (recording.v_x, v_y, recording.r, recording.delta_f, recording.delta_r)
     v_x, v_y, r, delta_f, delta_r = (box(thinned(signal[piece], every), count) for signal in raw)
     on = v_x > slowest
     v_x = np.where(on, v_x, slowest)
-    n3 = CHOSEN.longitudinal / dt
+    n3 = LONGITUDINAL / dt
     a_x = box(gradient(box(v_x, n3 / 2), dt), n3) - box(v_y * r, n3)
     if recording.a_x is not None:
         felt = box(thinned(recording.a_x[piece], every), count)
-        if (
-            slope_on(gradient(box(v_x, n3 / 3), dt) - v_y * r, felt, on, dt, CHOSEN.along)
-            is not None
-        ):
+        if slope_on(gradient(box(v_x, n3 / 3), dt) - v_y * r, felt, on, dt, ALONG) is not None:
             a_x = felt
-    a_x = np.where(on, np.clip(a_x, -CHOSEN.most_a_x, CHOSEN.most_a_x), 0.0)
+    a_x = np.where(on, np.clip(a_x, -MOST_A_X, MOST_A_X), 0.0)
     bank = np.zeros_like(v_x)
     if recording.a_y is not None:
         bank = _bank(thinned(recording.a_y[piece], every), v_x, v_y, r, on, dt)
@@ -172,14 +181,14 @@ def slope_on(
 
     None where it shows no such motion: a slope out of bounds, or too much that it misses.
     """
-    n1, n3 = CHOSEN.bank_mean / dt, CHOSEN.longitudinal / dt
+    n1, n3 = _BANK_MEAN / dt, LONGITUDINAL / dt
     fast, fast_felt = ((box(one, n3) - box(one, n1))[on] for one in (motion, felt))
     power = float(fast @ fast)
     if fast.size < 2.0 / dt or power <= 0.0 or not np.any(fast_felt):
         return None
     slope = float(fast @ fast_felt) / power
     missed = 1.0 - float(np.corrcoef(fast, fast_felt)[0, 1]) ** 2
-    return slope if within[0] < slope < within[1] and missed < CHOSEN.explained else None
+    return slope if within[0] < slope < within[1] and missed < _EXPLAINED else None
 
 
 def _bank(a_y: Array, v_x: Array, v_y: Array, r: Array, on: NDArray[np.bool_], dt: float) -> Array:
@@ -188,16 +197,16 @@ def _bank(a_y: Array, v_x: Array, v_y: Array, r: Array, on: NDArray[np.bool_], d
     What roll and a sensor off level show instead is taken off; a channel that does not show the
     fast motion is left out.
     """
-    n1 = CHOSEN.bank_mean / dt
-    motion = gradient(box(v_y, CHOSEN.longitudinal / dt / 3), dt) + v_x * r
-    gain = slope_on(motion, a_y, on, dt, CHOSEN.across)
+    n1 = _BANK_MEAN / dt
+    motion = gradient(box(v_y, LONGITUDINAL / dt / 3), dt) + v_x * r
+    gain = slope_on(motion, a_y, on, dt, _ACROSS)
     if gain is None:
         return np.zeros_like(v_x)
     slow, felt = box(motion, n1), box(a_y, n1)
-    gap = slow - felt / (1.0 + min(max(gain - 1.0, 0.0), CHOSEN.most_roll))
-    off = 10.0 * CHOSEN.level
+    gap = slow - felt / (1.0 + min(max(gain - 1.0, 0.0), _MOST_ROLL))
+    off = 10.0 * _LEVEL
     gap = gap - min(max(float(np.median(gap[on])), -off), off)
-    share = np.clip((np.abs(gap) / GRAVITY - CHOSEN.level) / CHOSEN.level, 0.0, 1.0)
+    share = np.clip((np.abs(gap) / GRAVITY - _LEVEL) / _LEVEL, 0.0, 1.0)
     return np.where(on, gap * share, 0.0)
 
 

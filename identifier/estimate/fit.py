@@ -11,8 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.estimate.chosen import CHOSEN
-from identifier.estimate.drive import Drive, hardest
+from identifier.estimate.drive import FASTEST, Drive, hardest
 from identifier.estimate.information import Information
 from identifier.estimate.latent import Learnt, lateness, latent_priors, learn_latent
 from identifier.estimate.model import FittedModel
@@ -20,11 +19,19 @@ from identifier.estimate.nodes import Nodes, TooShortError
 from identifier.estimate.posterior import Posterior, Reach, Segment
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
-from identifier.estimate.solve import error_size, estimate, simulate
+from identifier.estimate.solve import ENOUGH, STRIDE, error_size, estimate, simulate
 from identifier.frozen import PROBE
 from identifier.motion.parameters import INDEX, SLIPS
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
+
+_BLOCK = 600.0  # [s] that are estimated at once
+_BLIND = 300.0  # [s] of a log without v_y that teach: those of hardest cornering
+_ENOUGH_MORE = 1.0  # [nats] of improvement by a later block, below which it ends
+_LONG = 3600.0  # [s]: samples of longer logs are averaged
+_COARSE = 2.0  # times the usual interval, to which they are averaged
+_REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
+_LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of its model are not
 
 
 class _Fit(NamedTuple):
@@ -42,7 +49,7 @@ def fit(
     vehicle: Vehicle,
     priors: Priors | None = None,
     *,
-    block: float = CHOSEN.fit_block,
+    block: float = _BLOCK,
     coarse: bool = False,
     progress: Callable[[float], None] | None = None,
 ) -> _Fit:
@@ -66,7 +73,7 @@ def fit(
     reach = Reach()
     known, sd = Information.nothing(), Priors.of(vehicle).sd
     total, done = sum(one.duration for one in recordings), 0.0
-    coarse = coarse or total > CHOSEN.long
+    coarse = coarse or total > _LONG
 
     def went_on(seconds: float) -> None:
         nonlocal done
@@ -80,7 +87,7 @@ def fit(
         if not any(one.counts.any() for one in drives):
             continue
         begin = None if found is None else found.p
-        enough = CHOSEN.enough if begin is None else CHOSEN.enough_more
+        enough = ENOUGH if begin is None else _ENOUGH_MORE
         beliefs = before.after(known) if parts else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         found, roads = with_roads(drives, vehicle, beliefs, found)
@@ -96,7 +103,7 @@ def fit(
     for blind in (one for one in recordings if one.logged_v_y is None):
         try:
             late = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
-            nodes = Nodes.of(blind, vehicle, hardest(blind, CHOSEN.blind), a_y_late=late)
+            nodes = Nodes.of(blind, vehicle, hardest(blind, _BLIND), a_y_late=late)
         except TooShortError:
             if len(recordings) == 1:
                 raise
@@ -155,7 +162,7 @@ def _reach(
 ) -> Reach:
     """Return what drives reached, by the estimate of them."""
     found = Reach(segments=tuple(_segments(drives, roads)))
-    later = CHOSEN.lasts * min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
+    later = _LASTS * min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
     for i, one in enumerate(drives):
         on = one.counts
         if not on.any():
@@ -165,7 +172,7 @@ def _reach(
         driven = simulate(one, posterior.p, vehicle)
         force = np.abs(one.signals[:, 0] * one.signals[:, 2]) / GRAVITY
         e = np.nan_to_num(driven["missed"] / error_size(force)[:, None])
-        n = max(round(max(later, CHOSEN.stride) / one.dt), 1)
+        n = max(round(max(later, STRIDE) / one.dt), 1)
         together = on[n:] & on[:-n]
         slip, (speeds, a_x) = np.abs(driven["slip"][on]), _most(one.signals[on][:, [0, 5]])
         alike = (e[n:] * e[:-n])[together].sum(axis=0)
@@ -191,8 +198,8 @@ def _reach_of_states(learnt: Learnt) -> Reach:
 
 
 def _lasting(slip: Array, dt: float) -> Array:
-    """Return the slip of each axle that is exceeded for `CHOSEN.reached`, (2,)."""
-    k = min(max(round(CHOSEN.reached / dt), 1), len(slip))
+    """Return the slip of each axle that is exceeded for `_REACHED`, (2,)."""
+    k = min(max(round(_REACHED / dt), 1), len(slip))
     return np.partition(slip, len(slip) - k, axis=0)[-k]
 
 
@@ -207,8 +214,8 @@ def _blocks(
     """Yield drives that last no longer together."""
     group: list[Drive] = []
     length = 0.0
-    small = CHOSEN.coarse * float(np.sqrt(vehicle.wheelbase / SEDAN)) < 1.0
-    fastest = CHOSEN.fastest * (CHOSEN.coarse if coarse and not small else 1.0)
+    small = _COARSE * float(np.sqrt(vehicle.wheelbase / SEDAN)) < 1.0
+    fastest = FASTEST * (_COARSE if coarse and not small else 1.0)
     for recording in recordings:
         n = max(round(longest / recording.dt), 1)
         count = -(-len(recording) // n)

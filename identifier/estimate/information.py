@@ -5,7 +5,7 @@ the loss of drives about their optimum p*, without any prior, is written over
 
     u(p) = [φ_f, φ_r, ρ]:  ½ u'Λu - η'u,   Λ = C'HC,   η = Λ u(p*) - C'g
 
-φ the forces of an axle at the slips `CHOSEN.grid` [static loads], ρ the parameters that are none of
+φ the forces of an axle at the slips `GRID` [static loads], ρ the parameters that are none of
 the curve; g and H slope and curvature of the loss over p; C takes forces to the numbers of the
 curve that make them, by least squares over the slips that were driven. Λ and η of drives add up,
 those of the blocks of a long log and those of the logs of a car alike; `Priors.after` takes them
@@ -20,15 +20,19 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.estimate.chosen import CHOSEN
 from identifier.motion.model import curve_function
 from identifier.motion.parameters import INDEX, NAMES, curve_index
+
+GRID = (0.004, 0.008, 0.015, 0.025, 0.04, 0.06, 0.09, 0.13, 0.19, 0.28)  # [rad]
+_LEAST_REACH = 0.01  # [rad], up to which the curve is always asked
+_BEYOND = 0.02  # weight of a slip that no drive reached
+_RIDGE = 1e-6  # of the least squares, in prior variances of the curve's numbers
 
 OF_CURVE = {axle: curve_index(axle)[:-1] for axle in "fr"}  # without the road
 BESIDE = tuple(
     name for k, name in enumerate(NAMES) if k not in (*curve_index("f"), *curve_index("r"))
 )
-FORCES = 2 * len(CHOSEN.grid)
+FORCES = 2 * len(GRID)
 PLACE = {name: FORCES + k for k, name in enumerate(BESIDE)}  # in u
 SIZE = FORCES + len(BESIDE)
 
@@ -41,7 +45,7 @@ def coordinates(p: Array) -> tuple[Array, Array]:
     """
     u, slopes = np.zeros(SIZE), np.zeros((SIZE, len(NAMES)))
     for i, axle in enumerate("fr"):
-        index, rows = curve_index(axle), slice(i * len(CHOSEN.grid), (i + 1) * len(CHOSEN.grid))
+        index, rows = curve_index(axle), slice(i * len(GRID), (i + 1) * len(GRID))
         phi, J = _on_grid()(p[index])
         u[rows], slopes[rows, index] = np.array(phi).ravel(), np.array(J).T
     for name, k in PLACE.items():
@@ -53,8 +57,8 @@ def coordinates(p: Array) -> tuple[Array, Array]:
 def _on_grid() -> ca.Function:
     """Return (numbers (9,)) -> φ (1, k) and ∂φ/∂numbers (9, k) at the slips of the grid."""
     numbers = ca.SX.sym("numbers", 9)
-    many = ca.repmat(numbers, 1, len(CHOSEN.grid))
-    phi, _, J = curve_function().map(len(CHOSEN.grid))(many, ca.DM(CHOSEN.grid).T)
+    many = ca.repmat(numbers, 1, len(GRID))
+    phi, _, J = curve_function().map(len(GRID))(many, ca.DM(GRID).T)
     return ca.Function("on_grid", [numbers], [phi, J])
 
 
@@ -96,11 +100,11 @@ class Information:
         u, slopes = coordinates(p)
         C = np.zeros((len(NAMES), SIZE))
         for i, axle in enumerate("fr"):
-            index, rows = OF_CURVE[axle], slice(i * len(CHOSEN.grid), (i + 1) * len(CHOSEN.grid))
+            index, rows = OF_CURVE[axle], slice(i * len(GRID), (i + 1) * len(GRID))
             T = slopes[rows, index] * sd[index]
-            reached = np.array(CHOSEN.grid) <= max(driven[i], CHOSEN.information_least_reach)
-            weighted = T.T * np.where(reached, 1.0, CHOSEN.information_beyond) ** 2
-            inverse = np.linalg.solve(weighted @ T + CHOSEN.ridge * np.eye(len(index)), weighted)
+            reached = np.array(GRID) <= max(driven[i], _LEAST_REACH)
+            weighted = T.T * np.where(reached, 1.0, _BEYOND) ** 2
+            inverse = np.linalg.solve(weighted @ T + _RIDGE * np.eye(len(index)), weighted)
             C[index, rows] = sd[index][:, None] * inverse
         for name, k in PLACE.items():
             C[INDEX[name], k] = 1.0

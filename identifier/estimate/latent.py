@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.drive import hardest
-from identifier.estimate.nodes import Nodes, low_passed
+from identifier.estimate.nodes import JERKS, Nodes, low_passed
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.solve import around_beliefs, beliefs_cost, bounded_step, car_numbers
@@ -29,6 +28,27 @@ from identifier.motion.nodes import LATENT_NAMES, MEASURED, STATES, node_scan
 from identifier.motion.parameters import INDEX, NAMES
 from models.recordings import Recording
 from models.vehicle import GRAVITY, Vehicle
+
+_ROLL = 0.06  # by which a_y is larger in a car whose body rolls
+_GYRO = 0.002  # sd of the bias of r of a sedan [rad/s]
+_INERTIA = 0.007  # sd of ln I_z
+_BLOCK = 600.0  # [s] that are smoothed at once
+_BESIDE = 5.0  # [s] beside them that are smoothed, too
+_ASKED = 60.0  # [s] that are asked for a late a_y
+_ANY_DELAY = 0.1  # [s] of a sedan, sd of a delay that is looked for
+_MOST_LATE = 0.3  # [s] of a sedan, the largest delay
+_SMALL_DELAY = 0.003  # [s] of a sedan, a delay that does not matter
+_LOOKS = 4  # at a delay
+_LEFT_LATE = 0.01  # [s] of a sedan, sd of what is left of a delay that was taken out
+_GAINED = 8.0  # nats that a delay gains, more where more is left (`Trust.usual`)
+_ALIKE = 1e-4  # probability from which another start's end counts
+_STARTS = (-0.4, 0.4)  # of ln C: soft and stiff
+_FIRM = 50.0  # times that beliefs count at first
+_FEW = 8  # iterations of all descents but the last
+_MOST_SLIP = 0.7  # |v_y/v_x|, at most
+_MOST_LAGGED = 0.8  # lagged slip [rad], at most
+_LOOKED = 0.25  # [s] over which what is left of a sensor is alike
+_SHORTEST = 50  # nodes from which noise is learnt
 
 N, P = len(STATES), len(NAMES)
 OF_V_Y = ("v_y_bias", "v_y_angle", "v_y_lever")
@@ -130,19 +150,19 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Prio
     mean, bias, inertia = beliefs.mean.copy(), INDEX["r_bias"], INDEX["ln_inertia"]
     mean[INDEX["ln_sway"]] = 0.0  # as the sway that the nodes are given
     information[bias], information[:, bias], mean[bias] = 0.0, 0.0, 0.0  # another in each log
-    information[bias, bias], moves[bias] = (CHOSEN.gyro / scale) ** -2, True
+    information[bias, bias], moves[bias] = (_GYRO / scale) ** -2, True
     if not moves[inertia]:
-        information[inertia, inertia], moves[inertia] = CHOSEN.inertia**-2, True
+        information[inertia, inertia], moves[inertia] = _INERTIA**-2, True
     felt = np.array(list(FELT.values())) * [1.0, 1.0, 1.0, vehicle.wheelbase]
     if late:
-        felt[list(FELT).index("a_y_delay")] = CHOSEN.left_late * scale
+        felt[list(FELT).index("a_y_delay")] = _LEFT_LATE * scale
     whole = np.zeros((P + len(felt),) * 2)
     whole[:P, :P] = information
     whole[range(P, len(whole)), range(P, len(whole))] = felt**-2
     far = np.full(len(felt), np.inf)
     return replace(
         beliefs,
-        mean=np.concatenate([mean, [0.0, CHOSEN.latent_roll, 0.0, 0.0]]),
+        mean=np.concatenate([mean, [0.0, _ROLL, 0.0, 0.0]]),
         low=np.concatenate([beliefs.low, -far]),
         high=np.concatenate([beliefs.high, far]),
         information=whole,
@@ -325,8 +345,8 @@ class _Latent:
     def settled(self, stiffer: float = 0.0) -> tuple[Array, Array]:
         """Return states and parameters near an optimum, where parameters do not run away."""
         firm = copy(self)
-        firm.priors = replace(self.priors, information=CHOSEN.firm * self.priors.information)
-        z, p, _ = firm.descend(*self.begin(stiffer), self.R, CHOSEN.few)
+        firm.priors = replace(self.priors, information=_FIRM * self.priors.information)
+        z, p, _ = firm.descend(*self.begin(stiffer), self.R, _FEW)
         return z, p
 
     def descend(self, z: Array, p: Array, R: Array, most: int = 25) -> tuple[Array, Array, float]:
@@ -336,7 +356,7 @@ class _Latent:
         sd = np.diag(self.priors.information)[index] ** -0.5
         low, high = self.priors.low[index], self.priors.high[index]
         most_z = np.full(z.shape, np.inf)
-        most_z[:, 0], most_z[:, 2:4] = CHOSEN.most_slip * v_x, CHOSEN.most_lagged
+        most_z[:, 0], most_z[:, 2:4] = _MOST_SLIP * v_x, _MOST_LAGGED
         for _ in range(most):
             weights = self.weights(z, p, R)
             cost = self.cost(z, p, weights)
@@ -393,8 +413,8 @@ class _Latent:
         missed = self.nodes.measured - self._run(self._plain, z, p, {})["shows"]
         doubt = np.einsum("nij,njk,nik->ni", shows, own, shows)
         found, on = R.copy(), self.nodes.counts
-        lags = max(2, int(CHOSEN.looked * self.scale / self.nodes.dt))
-        if np.count_nonzero(on) < CHOSEN.shortest:
+        lags = max(2, int(_LOOKED * self.scale / self.nodes.dt))
+        if np.count_nonzero(on) < _SHORTEST:
             return found
         for i in range(len(MEASURED)):
             e = missed[on, i]
@@ -418,7 +438,7 @@ class _Latent:
         """
         R = self.R if R is None else R
         for _ in range(rounds):
-            z, p, _ = self.descend(z, p, R, CHOSEN.few)
+            z, p, _ = self.descend(z, p, R, _FEW)
             own, _, _, shows = self.spread(z, p, R)
             R = self.noise(z, p, own, shows, R)
         z, p, cost = self.descend(z, p, R)
@@ -447,15 +467,15 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, late: bool 
     beliefs : of the car, or what other drives of it left.   late : as of `latent_priors`.
     """
     problem = _Latent(nodes, vehicle, latent_priors(vehicle, beliefs, late))
-    first = problem.smoothed(*problem.settled(CHOSEN.starts[0]))
-    z, p, cost = problem.descend(*problem.settled(CHOSEN.starts[1]), first.R)
+    first = problem.smoothed(*problem.settled(_STARTS[0]))
+    z, p, cost = problem.descend(*problem.settled(_STARTS[1]), first.R)
     best, other = first, (z, p, cost)
     if cost < first.cost:
         best, other = problem.smoothed(z, p, first.R, 0), (first.z, first.p, first.cost)
     on, v_x = nodes.counts, nodes.given[:, 0]
     apart = ((best.z - other[0])[:, 0] / v_x)[on]
     share = 1.0 / (1.0 + np.exp(min(other[2] - best.cost, 50.0)))
-    alike = share > CHOSEN.alike and bool(on.any())  # else one of them explains the drive far worse
+    alike = share > _ALIKE and bool(on.any())  # else one of them explains the drive far worse
     parted = float(np.sqrt(np.mean(apart**2))) if alike else 0.0
     index = problem.index[problem.index < P]
     moved = problem.index < P
@@ -491,33 +511,33 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     too little.
     priors : as of `_Latent`.
     """
-    part = hardest(recording, CHOSEN.latent_asked)
+    part = hardest(recording, _ASKED)
     scale, dt = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt
     # Interpolation averages noise: what is smooth is not changed by it.
-    smooth = low_passed(recording.needed("a_y"), CHOSEN.jerks / scale, dt)
+    smooth = low_passed(recording.needed("a_y"), JERKS / scale, dt)
     piece = replace(recording, a_y=smooth)
     delay = LATENT_NAMES.index("a_y_delay")
     information = priors.information.copy()
-    information[delay, delay] = (CHOSEN.any_delay * scale) ** -2
+    information[delay, delay] = (_ANY_DELAY * scale) ** -2
     open_ = replace(priors, information=information)
 
     def problem(late: float, beliefs: Priors) -> _Latent:
         return _Latent(Nodes.of(piece, vehicle, part, a_y_late=late), vehicle, beliefs)
 
     on_time = problem(0.0, priors)
-    z, p, least = on_time.descend(*on_time.settled(), on_time.R, CHOSEN.few)
+    z, p, least = on_time.descend(*on_time.settled(), on_time.R, _FEW)
     late = 0.0
-    for _ in range(CHOSEN.looks):
-        z, p, _ = problem(late, open_).descend(z, p, on_time.R, CHOSEN.few)
+    for _ in range(_LOOKS):
+        z, p, _ = problem(late, open_).descend(z, p, on_time.R, _FEW)
         more, p[delay] = float(p[delay]), 0.0
-        late = min(max(late + more, -CHOSEN.most_late * scale), CHOSEN.most_late * scale)
-        if abs(more) < CHOSEN.small_delay * scale:
+        late = min(max(late + more, -_MOST_LATE * scale), _MOST_LATE * scale)
+        if abs(more) < _SMALL_DELAY * scale:
             break
-    if abs(late) < CHOSEN.small_delay * scale:
+    if abs(late) < _SMALL_DELAY * scale:
         return 0.0
-    found = problem(late, priors).descend(z, p, on_time.R, CHOSEN.few)[2]
+    found = problem(late, priors).descend(z, p, on_time.R, _FEW)[2]
     count = max(on_time.nodes.counts.sum(), 1)
-    enough = CHOSEN.gained * max(1.0, 2.0 * found / count / TRUST.usual)
+    enough = _GAINED * max(1.0, 2.0 * found / count / TRUST.usual)
     return late if least - found > enough else 0.0
 
 
@@ -565,9 +585,9 @@ def estimate_v_y(
 
 
 def _blocks(recording: Recording) -> Iterator[tuple[slice, slice]]:
-    """Yield parts of at most `CHOSEN.latent_block`, with what is beside them, and alone."""
-    n = max(round(CHOSEN.latent_block / recording.dt), 1)
-    beside = round(CHOSEN.beside / recording.dt)
+    """Yield parts of at most `_BLOCK`, with what is beside them, and alone."""
+    n = max(round(_BLOCK / recording.dt), 1)
+    beside = round(_BESIDE / recording.dt)
     for begin in range(0, len(recording), n):
         end = min(begin + n, len(recording))
         yield slice(max(begin - beside, 0), min(end + beside, len(recording))), slice(begin, end)

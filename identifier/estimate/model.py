@@ -17,7 +17,6 @@ from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.slip import SHORTEST, Sway
 from identifier.estimate import report
 from identifier.estimate.band import FittedBand
-from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.drive import Drive
 from identifier.estimate.latent import LateralVelocity, estimate_v_y
 from identifier.estimate.posterior import Reach
@@ -36,6 +35,8 @@ from models.recordings import Recording
 from models.rules import require_positive
 from models.schema import Table
 from models.vehicle import DOWNFORCE_SPEED, Vehicle, load_ratio
+
+_WARM = 300  # samples before a part of a long drive, over which lag and sway settle
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -187,7 +188,7 @@ class FittedModel(TireModel):
         for segment in recording.segments:
             begin, end = segment.start, min(segment.stop, len(recording))
             for part in blocks(end - begin):
-                first = max(part.start - CHOSEN.warm, 0)
+                first = max(part.start - _WARM, 0)
                 some = slice(begin + first, begin + part.stop)
                 drive = Drive.of(recording, self.vehicle, some, replay=True)
                 out = simulate(drive, self.p, self.vehicle)

@@ -12,13 +12,27 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from codegen.errors import TireidError
 from identifier.axle.slip import Sway
-from identifier.estimate.chosen import CHOSEN
-from identifier.estimate.drive import box, gradient, slope_on
+from identifier.estimate.drive import (
+    ALONG,
+    LONGITUDINAL,
+    MOST_A_X,
+    SLOW,
+    SMOOTHED,
+    box,
+    gradient,
+    slope_on,
+)
 from identifier.estimate.priors import SEDAN
-from identifier.motion.chosen import CHOSEN as MOTION_CHOSEN
+from identifier.motion.model import DAMPING
 from models.recordings import Recording
 from models.recordings.record import ALL
 from models.vehicle import Vehicle
+
+_BETWEEN = 0.06  # sqrt(L/g) from a node to the next
+_LEAST_BETWEEN = 0.02  # [s] that it is at least
+_ROLLS = 5.0  # Hz of a sedan, below which a_y rolls the body
+JERKS = 3.0  # Hz of a sedan, below which a_y is differentiated
+_FEWEST_NODES = 3  # nodes of a segment
 
 
 class TooShortError(TireidError, ValueError):
@@ -57,7 +71,7 @@ class Nodes:
         RecordingError
             Where there is no a_y.
         """
-        between = max(CHOSEN.between * vehicle.froude_time, CHOSEN.least_between)
+        between = max(_BETWEEN * vehicle.froude_time, _LEAST_BETWEEN)
         every = max(1, round(between / recording.dt))
         begin, end, _ = part.indices(len(recording))
         a_y = recording.needed("a_y")
@@ -65,7 +79,7 @@ class Nodes:
         for one in recording.segments:
             first, last = max(one.start, begin), min(one.stop, end)
             count = (last - first) // every
-            if count >= CHOSEN.fewest_nodes:
+            if count >= _FEWEST_NODES:
                 some = slice(first, first + count * every)
                 felt = _earlier(a_y[first:last], a_y_late / recording.dt)[: count * every]
                 pieces.append(_piece(recording, some, vehicle, every, felt))
@@ -97,24 +111,24 @@ def _piece(
 ) -> tuple[Array, Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return t, given, measured, counts and goes of a segment."""
     dt, scale = recording.dt, float(np.sqrt(vehicle.wheelbase / SEDAN))
-    slowest = CHOSEN.slow * vehicle.froude_speed
+    slowest = SLOW * vehicle.froude_speed
 
     def mean(signal: Array) -> Array:
         return signal.reshape(-1, every).mean(axis=1)
 
     v_x, r = recording.v_x[some], recording.r[some]
-    on, n3 = v_x > slowest, CHOSEN.longitudinal / dt
+    on, n3 = v_x > slowest, LONGITUDINAL / dt
     a_x = box(gradient(box(np.maximum(v_x, slowest), n3 / 2), dt), n3)
     turning = 1.0  # a_x = v_x' - v_y r
     if recording.a_x is not None:
-        felt = box(recording.a_x[some], round(CHOSEN.smoothed * scale / dt) | 1)
+        felt = box(recording.a_x[some], round(SMOOTHED * scale / dt) | 1)
         motion = gradient(box(v_x, n3 / 3), dt) - vehicle.l_r * r**2
-        if slope_on(motion, felt, on, dt, CHOSEN.along) is not None:
+        if slope_on(motion, felt, on, dt, ALONG) is not None:
             a_x, turning = felt, 0.0
-    a_x = np.where(on, np.clip(a_x, -CHOSEN.most_a_x, CHOSEN.most_a_x), 0.0)
+    a_x = np.where(on, np.clip(a_x, -MOST_A_X, MOST_A_X), 0.0)
     omega = Sway.for_vehicle(vehicle).frequency
-    rho, rate = _rolled(low_passed(a_y, CHOSEN.rolls / scale, dt), omega, dt)
-    jerk = gradient(low_passed(a_y, CHOSEN.jerks / scale, dt), dt)
+    rho, rate = _rolled(low_passed(a_y, _ROLLS / scale, dt), omega, dt)
+    jerk = gradient(low_passed(a_y, JERKS / scale, dt), dt)
     speed = mean(v_x)
     signals = (recording.delta_f[some], recording.delta_r[some], a_x)
     given = np.column_stack(
@@ -145,7 +159,7 @@ def _rolled(a: Array, omega: float, dt: float) -> tuple[Array, Array]:
     from scipy.signal import lfilter, lfiltic  # takes long to import
 
     stiff = dt * omega**2
-    eased = 1.0 + 2.0 * MOTION_CHOSEN.damping * omega * dt + dt * stiff
+    eased = 1.0 + 2.0 * DAMPING * omega * dt + dt * stiff
     b, c = [dt * stiff], [eased, dt * stiff - eased - 1.0, 1.0]
     rho, _ = lfilter(b, c, a, zi=lfiltic(b, c, [a[0], a[0]]))
     return rho, np.diff(rho, prepend=a[0]) / dt

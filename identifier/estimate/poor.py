@@ -14,17 +14,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.estimate.chosen import CHOSEN
-from identifier.estimate.drive import hardest
+from identifier.estimate.drive import SMOOTHED, hardest
 from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
 from models.recordings.samples import white_noise
 from models.vehicle import Vehicle
 
+_RARE = 0.03  # [s] of a sedan between new values, more of which are too few
+_NOISY = 0.015  # [m/s] of a sedan, white noise that is too much in the mean that the estimate takes
+_FEWEST_VALUES = 20  # new values
+_FINE = 0.005  # [s] of a sedan, to which a delay is found
+_SURE = 20.0  # nats that a delay must gain
+_ASKED = 60.0  # [s] of hardest cornering that tell delay and noise
+_MOST = 12000  # samples of hardest cornering that tell them
+_ROLL = 0.05  # ρ, mean of its prior: by which a_y is larger in a car whose body rolls
+_ROLL_SD = 0.04  # of ρ, standard deviation of its prior
+_OFF = 0.15  # [m/s²], b at first
+_WANDERS = 5e-3  # [(m/s²)²/s], variance of b' of a banked road
+_EQUAL = 1e-9  # of the largest change, below which two are one
+_CLIP = 3.0  # deviations from which a sample counts less
+_AGAIN = 3  # times that samples are weighted anew
+_DELAY_HALVINGS = 5  # halvings of the step in which a delay is looked for
+
 DELAYS = np.arange(0.0, 0.41, 0.05)  # [s]
 NOISE = 3e-3 * 10.0 ** np.arange(0.0, 2.1, 0.25)  # [m/s] of a sedan
 PUSHES = 10.0 ** np.arange(-5.0, 0.1, 0.5)  # [(m/s²)² s], variance of w
-BANKS = CHOSEN.wanders * 10.0 ** np.arange(-3.0, 1.1, 1.0)
+BANKS = _WANDERS * 10.0 ** np.arange(-3.0, 1.1, 1.0)
 
 
 class _Sensor(NamedTuple):
@@ -37,7 +52,7 @@ class _Sensor(NamedTuple):
     late: float = 0.0
     noise: float = float(NOISE[0])
     push: float = 0.003
-    wanders: float = CHOSEN.wanders
+    wanders: float = _WANDERS
 
 
 def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
@@ -50,30 +65,27 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
         return recording
     scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
     new = _new_values(v_y)
-    rare = len(new) < len(v_y) and _interval(new) * recording.dt > CHOSEN.rare * scale
+    rare = len(new) < len(v_y) and _interval(new) * recording.dt > _RARE * scale
     new = new if rare else np.arange(len(v_y))
     sensor = _Sensor(_interval(new) * recording.dt, noise=float(NOISE[0]) * scale)
-    if len(new) < CHOSEN.fewest_values or (recording.a_y is None and not rare):
+    if len(new) < _FEWEST_VALUES or (recording.a_y is None and not rare):
         return recording
     if recording.a_y is None:
         sensor = sensor._replace(push=float(PUSHES[-1]))
     else:
-        part = hardest(recording, min(CHOSEN.poor_asked, CHOSEN.most * recording.dt))
+        part = hardest(recording, min(_ASKED, _MOST * recording.dt))
         inside = new[(new >= part.start) & (new < part.stop)] - part.start
         problem = _Kinematics(recording.taken(part), inside)
-        white = white_noise(problem.values) if problem.values.size > CHOSEN.fewest_values else 0.0
-        if (
-            not rare
-            and not white * np.sqrt(sensor.interval / CHOSEN.smoothed) > CHOSEN.noisy * scale
-        ):
+        white = white_noise(problem.values) if problem.values.size > _FEWEST_VALUES else 0.0
+        if not rare and not white * np.sqrt(sensor.interval / SMOOTHED) > _NOISY * scale:
             return recording
         sensor = _likeliest(problem, sensor._replace(noise=max(white, sensor.noise)), scale)
         if not rare and not sensor.push < PUSHES[-1]:
             return recording  # a_y does not show this motion
     weights, whole = np.ones(len(new)), _Kinematics(recording, new)
-    for _ in range(CHOSEN.again):
+    for _ in range(_AGAIN):
         found, missed, _ = whole.solved(sensor, weights)
-        weights = np.minimum(1.0, CHOSEN.clip * sensor.noise / np.maximum(np.abs(missed), 1e-12))
+        weights = np.minimum(1.0, _CLIP * sensor.noise / np.maximum(np.abs(missed), 1e-12))
     found.setflags(write=False)
     by = "straight lines" if recording.a_y is None else "ay, vx and r"
     note = (
@@ -89,7 +101,7 @@ def _new_values(signal: Array) -> NDArray[np.intp]:
     All are new where neither is the rule.
     """
     step = np.diff(signal)
-    most = CHOSEN.equal * max(float(np.abs(step).max(initial=0.0)), 1e-12)
+    most = _EQUAL * max(float(np.abs(step).max(initial=0.0)), 1e-12)
     changes = 1 + np.flatnonzero(np.abs(step) > most)
     if changes.size > 3 and np.median(np.diff(changes)) > 1.0:
         return np.concatenate([[0], changes])
@@ -155,7 +167,7 @@ class _Kinematics:
         band[0, 3::2] += wander
         band[2, 1:-2:2] -= wander
         band[0, 2 * self.first] += 1e-4
-        band[0, 2 * self.first + 1] += CHOSEN.off**-2
+        band[0, 2 * self.first + 1] += _OFF**-2
         at = np.maximum(self.new - s.late / dt, 0.0)
         i = np.minimum(at.astype(np.intp), n - 2)
         share = at - i
@@ -177,20 +189,14 @@ class _Kinematics:
         factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
         x, X = cho_solve_banded((factor, True), g, check_finite=False).T
         # ρ is a border of the matrix: eliminated by Schur's complement.
-        S = np.sum(push * self.felt**2) + CHOSEN.roll_sd**-2 - g[:, 1] @ X
-        roll = (
-            np.sum(push * self.felt * self.moved)
-            + CHOSEN.poor_roll / CHOSEN.roll_sd**2
-            - g[:, 1] @ x
-        ) / S
+        S = np.sum(push * self.felt**2) + _ROLL_SD**-2 - g[:, 1] @ X
+        roll = (np.sum(push * self.felt * self.moved) + _ROLL / _ROLL_SD**2 - g[:, 1] @ x) / S
         x = x - roll * X
         v, b = x[::2], x[1::2]
         missed = (1.0 - share) * v[i] + share * v[i + 1] - self.values
         moves = np.diff(v) + 0.5 * dt * (b[1:] + b[:-1]) - self.moved + roll * self.felt
         squares = w @ missed**2 + push @ moves**2 + wander @ np.diff(b) ** 2
-        squares += ((roll - CHOSEN.poor_roll) / CHOSEN.roll_sd) ** 2 + np.sum(
-            b[self.first] ** 2
-        ) / CHOSEN.off**2
+        squares += ((roll - _ROLL) / _ROLL_SD) ** 2 + np.sum(b[self.first] ** 2) / _OFF**2
         count, steps = np.count_nonzero(there), np.count_nonzero(self.goes)
         logs = 2.0 * np.sum(np.log(factor[0])) + np.log(S) + count * np.log(s.noise**2)
         logs += steps * np.log(s.push * s.wanders)
@@ -218,12 +224,12 @@ def _likeliest(problem: _Kinematics, best: _Sensor, scale: float) -> _Sensor:
     others = {"noise": NOISE * scale, "push": PUSHES, "wanders": BANKS}
     better(late=DELAYS, **others)
     step = float(DELAYS[1])
-    for _ in range(CHOSEN.delay_halvings):
+    for _ in range(_DELAY_HALVINGS):
         step *= 0.5
         near = np.maximum(best.late + step * np.array([-1.0, 1.0]), 0.0)
-        if not better(late=near, **others) and step < CHOSEN.fine * scale:
+        if not better(late=near, **others) and step < _FINE * scale:
             break
-    if best.late and cost(best._replace(late=0.0)) - least < CHOSEN.sure:
+    if best.late and cost(best._replace(late=0.0)) - least < _SURE:
         best = best._replace(late=0.0)
         least = cost(best)
         better(**others)

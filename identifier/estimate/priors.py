@@ -14,10 +14,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.information import Information
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import FULL_SIZE, Vehicle
+
+_LEAST_DOUBT = 1e-6  # of a prior, in variances of the usual one
+_LESS_LOAD = 0.6  # of the geometric load transfer: tires gain less force than load
+_LESS_USE = 0.65  # of the geometric use of the ellipse, measured on cars and the plant
+_SURE_HEIGHT = 0.03  # sd of the load transfer of a car that tells its height
+_SURE_SHARE = 0.5  # sd of the use of the ellipse of a given share, of that use
+_LEAST_USE = 0.1  # least sd of that use
+# At one speed a bias of v_y and a mounting angle are one: each takes half, unless speeds
+# differ.
+_SHARED_ERROR = 0.5
+# sd of ln of a yaw inertia that nobody measured: m l_f l_r is within a tenth of those of cars;
+# chosen on 16 random cars whose inertia was left out
+_LEFT_OUT = 0.1
+_LEFT_OUT_SMALL = 0.3  # the same of a model car
+ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
+_TAILS = 1.0  # degrees of freedom of their priors
 
 SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
 
@@ -107,7 +122,7 @@ class Priors:
     ) -> "Priors":
         """Return the beliefs for a car.
         wide : standard deviations in SI in place of those of the table, by parameter.
-        apart : whether bias and angle of v_y are believed apart, without `CHOSEN.shared_error`.
+        apart : whether bias and angle of v_y are believed apart, without `_SHARED_ERROR`.
         """
         L = vehicle.wheelbase
         unit = {"": 1.0, "L": L, "v": float(np.sqrt(L / SEDAN))}
@@ -123,7 +138,7 @@ class Priors:
             mean[k], sd[k] = min(max(value, low[k]), high[k]), doubt
         if vehicle.inertia_is_estimate:
             small = vehicle.wheelbase < FULL_SIZE
-            sd[INDEX["ln_inertia"]] = CHOSEN.left_out_small if small else CHOSEN.left_out
+            sd[INDEX["ln_inertia"]] = _LEFT_OUT_SMALL if small else _LEFT_OUT
         for name, value in wide.items():
             sd[INDEX[name]] = value
         information = np.zeros((p, p))
@@ -134,7 +149,7 @@ class Priors:
         if not apart and moves[INDEX["v_y_bias"]] and moves[INDEX["v_y_angle"]]:
             b, beta = OF_CAR["v_y_bias"], OF_CAR["v_y_angle"]
             each = {"v_y_bias": 1.0 / (b.sd * unit[b.per]), "v_y_angle": -1.0 / beta.sd}
-            _couple(information, each, CHOSEN.shared_error)
+            _couple(information, each, _SHARED_ERROR)
         typed = tuple(INDEX[name] for name in TYPED if moves[INDEX[name]])
         return cls(mean=mean, low=low, high=high, information=information, moves=moves, typed=typed)
 
@@ -158,7 +173,7 @@ class Priors:
         information = np.zeros((n, n))
         information[: len(self.mean), : len(self.mean)] = self.information
         extra = np.arange(len(self.mean), n)
-        information[extra, extra] = 1.0 / CHOSEN.another_road**2
+        information[extra, extra] = 1.0 / ANOTHER_ROAD**2
         return replace(
             self,
             mean=np.concatenate([self.mean, np.zeros(count)]),
@@ -177,7 +192,7 @@ class Priors:
         cost = 0.5 * float(away @ self.information @ away)
         for k in self.typed:
             z2 = float(self.information[k, k] * away[k] ** 2)
-            cost += 0.5 * ((CHOSEN.tails + 1.0) * math.log1p(z2 / (CHOSEN.tails + 1.0)) - z2)
+            cost += 0.5 * ((_TAILS + 1.0) * math.log1p(z2 / (_TAILS + 1.0)) - z2)
         return cost if self.data is None else cost + self.data.around(p[: len(NAMES)])[0]
 
     def around(self, p: Array) -> tuple[Array, Array]:
@@ -185,7 +200,7 @@ class Priors:
         away, curvature = p - self.mean, self.information.copy()
         for k in self.typed:
             z2 = self.information[k, k] * away[k] ** 2
-            curvature[k, k] *= (CHOSEN.tails + 1.0) / (CHOSEN.tails + 1.0 + z2)
+            curvature[k, k] *= (_TAILS + 1.0) / (_TAILS + 1.0 + z2)
         gradient: Array = curvature @ away
         if self.data is not None:
             n = len(NAMES)  # of other roads no drive before tells
@@ -200,7 +215,7 @@ class Priors:
         """
         where = np.ix_(self.moves, self.moves)
         information = np.zeros_like(self.information)
-        sure = covariance + CHOSEN.least_doubt * np.diag(self.sd**2)
+        sure = covariance + _LEAST_DOUBT * np.diag(self.sd**2)
         information[where] = np.linalg.inv(sure[where])
         return replace(self, mean=p, information=information, typed=())
 
@@ -217,15 +232,15 @@ def _declared(vehicle: Vehicle) -> dict[str, tuple[float, float]]:
     L, grip = vehicle.wheelbase, np.exp(OF_AXLES["ln_grip"].mean)
     declared: dict[str, tuple[float, float]] = {}
     if (height := vehicle.lengthwise("cg_height")) is not None:
-        declared["load_transfer"] = CHOSEN.less_load * height / L, CHOSEN.sure_height
+        declared["load_transfer"] = _LESS_LOAD * height / L, _SURE_HEIGHT
     for name, share in (("driving", "drive_front_share"), ("braking", "brake_front_share")):
         if (front := vehicle.lengthwise(share)) is not None:
             for axle, part, W in (
                 ("f", front, L / vehicle.l_r),
                 ("r", 1.0 - front, L / vehicle.l_f),
             ):
-                use = float(CHOSEN.less_use * part * W / grip)
-                declared[f"{name}_{axle}"] = use, max(CHOSEN.sure_share * use, CHOSEN.least_use)
+                use = float(_LESS_USE * part * W / grip)
+                declared[f"{name}_{axle}"] = use, max(_SURE_SHARE * use, _LEAST_USE)
     return declared
 
 

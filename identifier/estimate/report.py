@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.latent import TRUST
 from identifier.estimate.posterior import Reach, Segment
 from identifier.estimate.priors import Priors
@@ -16,6 +15,13 @@ from identifier.tire_model import AXLES, GRIP, RELAXATION, STIFFNESS, Axle, Esti
 from models.schema import Table
 from models.vehicle import Vehicle
 
+WIDEST = 0.6  # rad, within which the largest force is looked for
+_DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided a number
+_SLOPE_STEP = 1e-4  # rad, over which a slope is taken
+_SURELY = 3.0  # standard deviations of an error of the steering that is noted
+_NOTED_GAIN = 0.08  # least error of the steering that is noted [-]
+_LARGEST = 1e6  # of the numbers in a file
+
 BOUNDED = (("ln_stiffness", "cornering stiffness"), ("ln_grip", "grip"))
 
 
@@ -24,10 +30,10 @@ def estimates(model: Any) -> tuple[Estimate, ...]:
     before = model.band.prior_covariance
     given = model.vehicle.bicycle[4:]
     band, loads, lag = model.band, np.array(model.vehicle.axle_loads), model.relaxation_length
-    stiff = [sd[0] / CHOSEN.slope_step for sd in band.of_phi(np.full((1, 2), CHOSEN.slope_step))]
+    stiff = [sd[0] / _SLOPE_STEP for sd in band.of_phi(np.full((1, 2), _SLOPE_STEP))]
     stiffness = model.stiffness
     C = stiffness / loads
-    slip = np.linspace(0.0, CHOSEN.widest, 201)
+    slip = np.linspace(0.0, WIDEST, 201)
     slip = np.column_stack([slip, slip])
     phi = model.curve_at(slip)[0]
     peak = np.take_along_axis(slip, phi.argmax(axis=0)[None], axis=0)
@@ -44,11 +50,11 @@ def estimates(model: Any) -> tuple[Estimate, ...]:
     rows: list[tuple[str, Axle, float, float, str, float | None, bool]] = []
     for i, axle in enumerate(AXLES):
         now, prior = sd_of(f"compliance_{axle[0]}")
-        known = [sd[0][i] <= CHOSEN.decided * sd[1][i] for sd in (stiff, wide)]
+        known = [sd[0][i] <= _DECIDED * sd[1][i] for sd in (stiff, wide)]
         rows += [
             (STIFFNESS, axle, stiffness[i], sd_C[i] * loads[i], "N/rad", given[i], known[0]),
             (GRIP, axle, top[i], sd_top[i], "static load", None, known[1]),
-            (RELAXATION, axle, lag[i], C[i] * now, "m", None, now <= CHOSEN.decided * prior),
+            (RELAXATION, axle, lag[i], C[i] * now, "m", None, now <= _DECIDED * prior),
         ]
     zeros: tuple[tuple[str, Axle, str, str, float], ...] = (
         ("zero of the steering", "front", "steering_zero", "deg", math.degrees(1.0)),
@@ -56,7 +62,7 @@ def estimates(model: Any) -> tuple[Estimate, ...]:
     )
     for title, axle, name, unit, scale in zeros:
         now, prior = sd_of(name)
-        known_zero, value = now <= CHOSEN.decided * prior, scale * model[name]
+        known_zero, value = now <= _DECIDED * prior, scale * model[name]
         rows.append((title, axle, value, scale * now, unit, 0.0, known_zero))
     return tuple(
         Estimate(title, axle, float(value), float(sd), unit, declared, bool(known))
@@ -78,7 +84,7 @@ def notes(reach: Reach, p: Array, covariance: Array) -> tuple[tuple[str, str], .
     ]
     k = INDEX["steering_gain"]
     gain, sd = float(p[k]), float(np.sqrt(covariance[k, k]))
-    if abs(gain) > max(CHOSEN.surely * sd, CHOSEN.noted_gain):
+    if abs(gain) > max(_SURELY * sd, _NOTED_GAIN):
         listed.append(
             (
                 "steering_gain",
@@ -161,8 +167,8 @@ def read(table: Table) -> dict[str, Any]:
         value = table.array(key)
         if value.shape != shape:
             table.refuse(key, f"must hold {shape} numbers, it has {value.shape}")
-        if np.abs(value).max(initial=0.0) > CHOSEN.largest:
-            table.refuse(key, f"must hold numbers below {CHOSEN.largest:g}")
+        if np.abs(value).max(initial=0.0) > _LARGEST:
+            table.refuse(key, f"must hold numbers below {_LARGEST:g}")
         return value
 
     parted, late = (

@@ -13,12 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import Priors
-from identifier.estimate.solve import Problem, estimate
+from identifier.estimate.solve import NU, Problem, estimate
 from models.vehicle import Vehicle
+
+PRICE = 12.0  # [nats] of a change of friction
+_BIN = 10  # residuals, half a second, on one road
+LEAST_CHANGE = 0.1  # |ln m|, below which segments are one road
+_MOST_SCALE = 1.5  # S [-] of residuals, in search of segments
+_MOST_MEMORY = 4.0  # T [s] of residuals, in search of segments
+_ROUNDS = 2  # of finding segments anew at the better estimate
 
 GRID = np.linspace(-1.35, 0.6, 14)  # ln m: 0.26 to 1.8
 
@@ -41,7 +47,7 @@ def with_roads(
     plain : the estimate without segments.
     """
     best, roads = plain, None
-    for _ in range(CHOSEN.roads_rounds):
+    for _ in range(_ROUNDS):
         labels = _segments(drives, vehicle, priors, best)
         count = 1 + max(int(one.max()) for one in labels)
         if count == 1:
@@ -51,8 +57,8 @@ def with_roads(
         changes = sum(int(np.count_nonzero(np.diff(one))) for one in labels) + len(drives) - 1
         one_road = Problem(drives, vehicle, priors)
         before = one_road.cost(one_road.residuals(plain.p).e, plain.p, found.memory)
-        gained = before - found.cost - CHOSEN.price * max(changes, 1)
-        if gained <= 0.0 or np.abs(ln_m).max() < CHOSEN.least_change:
+        gained = before - found.cost - PRICE * max(changes, 1)
+        if gained <= 0.0 or np.abs(ln_m).max() < LEAST_CHANGE:
             break
         best, roads = found, Roads(labels, ln_m, found.road_sd)
     return best, roads
@@ -68,16 +74,14 @@ def _segments(
     problem = Problem(drives, vehicle, priors)
     weight = problem.weight[:, None]
     # A fit between two roads misses much, for long: that must not hide them.
-    S2, T = np.minimum(at.scale, CHOSEN.most_scale) ** 2, np.minimum(at.memory, CHOSEN.most_memory)
+    S2, T = np.minimum(at.scale, _MOST_SCALE) ** 2, np.minimum(at.memory, _MOST_MEMORY)
     loss = np.empty((len(GRID), len(weight)))
     for k, ln_m in enumerate(GRID):
         e = problem.missed(at.p, float(ln_m))
-        loss[k] = (weight / T * (CHOSEN.nu + 1.0) / 2.0 * np.log1p(e**2 / (CHOSEN.nu * S2))).sum(
-            axis=1
-        )
+        loss[k] = (weight / T * (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))).sum(axis=1)
     count = loss.shape[1]
-    bins = np.arange(0, count, CHOSEN.bin)
-    path = _cheapest(np.add.reduceat(loss, bins, axis=1), CHOSEN.price).repeat(CHOSEN.bin)[:count]
+    bins = np.arange(0, count, _BIN)
+    path = _cheapest(np.add.reduceat(loss, bins, axis=1), PRICE).repeat(_BIN)[:count]
     found, begin = [], 0
     for k, one in enumerate(drives):
         length = problem.lengths[k]
@@ -117,7 +121,7 @@ def _ranked(found: list[NDArray[np.intp]]) -> tuple[NDArray[np.intp], ...]:
     states, counts = np.unique(whole, return_counts=True)
     order: dict[int, int] = {}
     for state in states[np.argsort(-counts)]:
-        alike = [known for known in order if abs(GRID[known] - GRID[state]) < CHOSEN.least_change]
+        alike = [known for known in order if abs(GRID[known] - GRID[state]) < LEAST_CHANGE]
         order[int(state)] = order[alike[0]] if alike else len(set(order.values()))
     table = np.zeros(len(GRID), dtype=np.intp)
     for state, label in order.items():

@@ -17,13 +17,25 @@ from numpy.typing import NDArray
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.slip import Sway
-from identifier.estimate.chosen import CHOSEN
 from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import OF_CAR, SEDAN, Priors
 from identifier.motion.model import CarNumbers, motion_scan
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, Vehicle
+
+STRIDE = 0.05  # [s] between residuals
+ERROR_SIZE = 0.02, 0.04  # b: of a static load, and of the lateral acceleration in g
+NU = 4.0  # degrees of freedom of the loss: a tenth of the residuals may be far off
+_LEAST_SCALE = 0.25  # S: a model is never believed to be better than that
+_SHORTEST_MEMORY = 0.25  # least T [s]
+_LONGEST_MEMORY = 8.0  # largest T [s]
+_LEAST_STIFF = 0.25  # of C: slope at zero
+_STIFF_SD = 0.1  # of C: how firmly that slope is believed
+_ITERATIONS = 25  # of a descent, at most
+ENOUGH = 0.02  # [nats] of improvement, below which it ends
+_SETTLING = 60  # iterations at most where no drive is looked at
+_SETTLED = 1e-4  # [nats] of improvement, below which these end
 
 DELAYS = [INDEX[name] for name in ("v_y_delay", "r_delay", "steering_delay")]
 
@@ -63,7 +75,7 @@ class Problem:
         moved = NAMES[:-1] if every else [NAMES[k] for k in moving]
         self._scan = motion_scan((*moved, "ln_road"))
         self._car = car_numbers(vehicle)
-        self._strides = [max(1, round(CHOSEN.stride / one.dt)) for one in drives]
+        self._strides = [max(1, round(STRIDE / one.dt)) for one in drives]
         self._kept, weights, forces = [], [], []
         for one, stride in zip(drives, self._strides, strict=True):
             kept = np.flatnonzero(one.counts[::stride])
@@ -148,20 +160,20 @@ class Problem:
         e : over b [-], (m, 2).
         """
         step, x = float(self.weight[0]), np.clip(e, -4.0, 4.0)
-        lags = int(CHOSEN.longest_memory / step) + 1
+        lags = int(_LONGEST_MEMORY / step) + 1
         edges = np.cumsum(self.lengths)[:-1]
         found = [autocorrelation_time(np.split(x[:, k], edges), step, lags) for k in range(2)]
-        return np.maximum(found, CHOSEN.shortest_memory)
+        return np.maximum(found, _SHORTEST_MEMORY)
 
     def scale(self, e: Array) -> Array:
         """Return S² of both axles, (2,), by expectation maximization.
         e : over b [-], (m, 2).
         """
-        S2 = np.maximum(np.median(np.abs(e), axis=0) / 0.6745, CHOSEN.least_scale) ** 2
+        S2 = np.maximum(np.median(np.abs(e), axis=0) / 0.6745, _LEAST_SCALE) ** 2
         total = self.weight.sum()
         for _ in range(8):
-            w = (CHOSEN.nu + 1.0) / (CHOSEN.nu + e**2 / S2)
-            S2 = np.maximum(self.weight @ (w * e**2) / total, CHOSEN.least_scale**2)
+            w = (NU + 1.0) / (NU + e**2 / S2)
+            S2 = np.maximum(self.weight @ (w * e**2) / total, _LEAST_SCALE**2)
         return S2
 
     def cost(self, e: Array, p: Array, T: Array) -> float:
@@ -176,13 +188,13 @@ class Problem:
         """Return Σ w/T ρ(e) [nats].
         e : over b [-], (m, 2).   S2 : [-], (2,).   T : [s], (2,).
         """
-        loss = (CHOSEN.nu + 1.0) / 2.0 * np.log1p(e**2 / (CHOSEN.nu * S2))
+        loss = (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))
         return float((self.weight @ loss / T).sum())
 
 
 def error_size(force: Array) -> Array:
     """Return b, what a good model misses of a force, both in static loads."""
-    floor, share = CHOSEN.error_size
+    floor, share = ERROR_SIZE
     return np.hypot(floor, share * force)
 
 
@@ -248,7 +260,7 @@ def estimate(
     begin: Array | None = None,
     *,
     labels: Labels | None = None,
-    enough: float = CHOSEN.enough,
+    enough: float = ENOUGH,
 ) -> Posterior:
     """Return the parameters that explain drives best, and how sure they are.
     vehicle : the car; its stiffnesses are not looked at.
@@ -292,8 +304,8 @@ def descend(
     problem: Problem,
     start: Array,
     memory: Array | None = None,
-    iterations: int = CHOSEN.iterations,
-    enough: float = CHOSEN.enough,
+    iterations: int = _ITERATIONS,
+    enough: float = ENOUGH,
 ) -> Posterior:
     """Return the optimum that is found from a start.
     start : parameters to begin with (p,).
@@ -366,7 +378,7 @@ def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
     """
     index, p = np.flatnonzero(priors.moves), begin.copy()
     where, cost, damping = np.ix_(index, index), beliefs_cost(priors, p), 1e-6
-    for _ in range(CHOSEN.settling):
+    for _ in range(_SETTLING):
         gradient, curvature = around_beliefs(priors, p)
         for trial, tried in _trials(curvature[where], gradient[index], p, priors, damping):
             reached = beliefs_cost(priors, trial)
@@ -376,7 +388,7 @@ def settled(priors: Priors, begin: Array) -> tuple[Array, Array]:
         else:
             break
         gained, cost = cost - reached, reached
-        if gained < CHOSEN.settled:
+        if gained < _SETTLED:
             break
     covariance = np.zeros_like(priors.information)
     covariance[where] = np.linalg.inv(around_beliefs(priors, p)[1][where])
@@ -422,17 +434,17 @@ def _softness(p: Array) -> tuple[Array, Array]:
         q = [INDEX[f"residual{j}_{axle}"] for j in range(len(SLIPS))]
         C = float(np.exp(p[k]))
         added = float(np.sum(p[q] / np.array(SLIPS)))
-        lacks = (CHOSEN.least_stiff - 1.0 - added / C) / CHOSEN.stiff_sd
+        lacks = (_LEAST_STIFF - 1.0 - added / C) / _STIFF_SD
         if lacks > 0.0:
             found[i] = lacks
-            slopes[i, k] = added / C / CHOSEN.stiff_sd
-            slopes[i, q] = -1.0 / (np.array(SLIPS) * C * CHOSEN.stiff_sd)
+            slopes[i, k] = added / C / _STIFF_SD
+            slopes[i, q] = -1.0 / (np.array(SLIPS) * C * _STIFF_SD)
     return found, slopes
 
 
 def normal(problem: Problem, at: _Residuals, S2: Array, T: Array) -> tuple[Array, Array]:
     """Return Gauss-Newton's matrix (n, n) and the gradient of the misfit (n,)."""
-    w = problem.weight[:, None] / T * (CHOSEN.nu + 1.0) / (CHOSEN.nu * S2 + at.e**2)
+    w = problem.weight[:, None] / T * (NU + 1.0) / (NU * S2 + at.e**2)
     J = at.slopes.reshape(-1, at.slopes.shape[2])
     weighted = J * w.reshape(-1, 1)
     return weighted.T @ J, weighted.T @ at.e.ravel()

@@ -20,11 +20,14 @@ from codegen.escape import visible
 from identifier.band import LEVEL, Band, normal_quantile
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import car_numbers
-from identifier.export.chosen import CHOSEN
 from identifier.motion.model import pushed_function
 from identifier.motion.parameters import INDEX
 from identifier.tire_model import AXLES, TireModel, brisk_speed, require_band
 from models.vehicle import GRAVITY, Vehicle
+
+_SPEEDS = 13  # of the table
+_PUSHES = 200  # longitudinal forces of a diagram
+_SLIPS = 200  # of a curve
 
 NUMBERS = ("load_transfer", "braking_f", "braking_r", "driving_f", "driving_r")
 
@@ -53,7 +56,7 @@ def limits(model: TireModel) -> Limits:
     p = mean.copy()
     p[index] = (mean + normal_quantile(LEVEL) * sd)[index]
     top = brisk_speed(car, model.min_speed) if drives.speeds is None else float(drives.speeds[1])
-    v_x = np.linspace(0.0, top, CHOSEN.speeds)
+    v_x = np.linspace(0.0, top, _SPEEDS)
     a_y = (grip * car.load_ratio(v_x)).min(axis=1)
     sides = [
         [_side(car, p, grip, *at, sign) for at in zip(v_x, a_y, strict=True)]
@@ -64,7 +67,7 @@ def limits(model: TireModel) -> Limits:
 
 def _lowest_grip(band: Band, i: int, known: float) -> float:
     """Return the largest force of the lower end of an axle's band, in static loads."""
-    alpha = np.linspace(0.0, known, CHOSEN.slips + 1)[1:]
+    alpha = np.linspace(0.0, known, _SLIPS + 1)[1:]
     half, model = band.half(alpha), band.model
     low = float((model.force(alpha) - half)[:, i].max())
     if known <= 0.0 or low <= 0.0:
@@ -80,7 +83,7 @@ def _side(car: Vehicle, p: Array, grip: Array, v_x: float, a_y: float, sign: flo
     """
     use = p[[INDEX[f"{'driving' if sign > 0.0 else 'braking'}_{axle}"] for axle in "fr"]]
     most = min(a_y, 1.0 / max(float(use.max()), 1e-9))
-    f = np.linspace(0.0, most, CHOSEN.pushes + 1)[1:]
+    f = np.linspace(0.0, most, _PUSHES + 1)[1:]
     a_x = sign * GRAVITY * f - car.drag * v_x**2
     pushed = np.array(pushed_function()(p, car_numbers(car), a_x[None], v_x)).T
     left = (grip * pushed).min(axis=1)

@@ -15,9 +15,8 @@ from codegen.elementary import atan
 from codegen.errors import TireidError
 from codegen.escape import visible
 from codegen.graph import BUILDERS, function_of, graph_of
-from identifier.axle.band import root
+from identifier.axle.band import AT_SPEEDS, CENTERS, root
 from identifier.axle.band_step import AtSample, BandNumbers, band_numbers, half_band, hinges
-from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
 from identifier.axle.covariance import factors_of, packed
 from identifier.axle.model import AxleModel
 from identifier.band import LEVEL, normal_quantile
@@ -195,8 +194,8 @@ def _axle_curve(model: AxleModel, i: int, x: ca.SX, *, with_band: bool) -> list[
     covariances = (model.covariance, model.prior_covariance)
     P, prior = (factors_of(list(packed(one)[i]), q) for one in covariances)
     numbers = band_numbers(calibration, model.vehicle.froude_speed)
-    slips = hinges(calibration.factors, AXLE_CHOSEN.centers)[i]
-    speeds = hinges(calibration.speeds, AXLE_CHOSEN.at_speeds)[i]
+    slips = hinges(calibration.factors, CENTERS)[i]
+    speeds = hinges(calibration.speeds, AT_SPEEDS)[i]
     numbers = BandNumbers(*(column[i] for column in numbers))
     return [force, half_band(at, P, prior, numbers, list(slips), list(speeds))]
 

@@ -20,7 +20,6 @@ from codegen.package import (
 )
 from codegen.template import Values, Words, filled
 from identifier.export.c_source import PREFIX, PROGRAMS, C, c_sources
-from identifier.export.chosen import CHOSEN
 from identifier.export.layout import carried_members, rules
 from identifier.export.specialize import (
     ACCELERATION,
@@ -34,6 +33,12 @@ from identifier.method import Method
 from identifier.refused import NOWHERE, STALE_TIME, stale_samples
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
+
+_SAMPLES = 240  # of the self-test
+_REST = 10  # samples at rest, and some as long in between
+# largest difference of a force that the self-test allows, of the limit of forces
+_TOLERANCE_DOUBLE = 1e-8
+_TOLERANCE_SINGLE = 2e-5  # likewise, in float
 
 # <name>.json: everything that went into a package, what is in it, and their hashes.
 
@@ -143,7 +148,7 @@ class _Vectors(NamedTuple):
     force: Array
 
 
-def synthetic_samples(specialized: SpecializedStep, n: int = CHOSEN.samples) -> Array:
+def synthetic_samples(specialized: SpecializedStep, n: int = _SAMPLES) -> Array:
     """Return a start from rest and turns to both sides, (n, k); arithmetic only, no noise.
 
     Where v_y is given it is measured at the end alone; a_y is that of the motion, with a gap.
@@ -151,8 +156,8 @@ def synthetic_samples(specialized: SpecializedStep, n: int = CHOSEN.samples) -> 
     """
     k = np.arange(n, dtype=np.float64)
     wave, slow = _triangle(k / 60.0), _triangle(k / 97.0 + 0.2)
-    v_x = specialized.min_speed * np.minimum(0.0973 * np.maximum(k - CHOSEN.rest, 0.0), 15.0)
-    v_x = np.where((k >= n // 2) & (k < n // 2 + CHOSEN.rest), 0.5 * specialized.min_speed, v_x)
+    v_x = specialized.min_speed * np.minimum(0.0973 * np.maximum(k - _REST, 0.0), 15.0)
+    v_x = np.where((k >= n // 2) & (k < n // 2 + _REST), 0.5 * specialized.min_speed, v_x)
     v_y = 0.03 * v_x * slow
     r = 0.4 * specialized.min_speed * wave * np.minimum(k / n, 0.5)
     delta_f, delta_r = 0.05 * wave, 0.005 * slow
@@ -273,7 +278,7 @@ def build_package(
 def _tolerances(specialized: SpecializedStep) -> tuple[str, str]:
     """Return the largest difference of a force that the self-test allows [N], double and float."""
     force = specialized.limits.force
-    return f"{CHOSEN.tolerance_double * force:.2g}", f"{CHOSEN.tolerance_single * force:.2g}"
+    return f"{_TOLERANCE_DOUBLE * force:.2g}", f"{_TOLERANCE_SINGLE * force:.2g}"
 
 
 def readme(package: Package, about_figures: str) -> str:
@@ -298,7 +303,7 @@ def readme(package: Package, about_figures: str) -> str:
             **_about_signals(specialized),
             **_about_refused(specialized),
             "libraries": f"{', '.join(called) or 'nothing'} of `<math.h>`, copies of structures",
-            "samples": str(CHOSEN.samples),
+            "samples": str(_SAMPLES),
             "tolerance_double": double,
             "tolerance_single": single,
             "figures": about_figures,

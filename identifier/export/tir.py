@@ -14,8 +14,17 @@ from scipy.optimize import least_squares
 
 from codegen.arrays import Array
 from codegen.escape import visible
-from identifier.export.chosen import CHOSEN
 from identifier.tire_model import AXLES, Axle, TireModel
+
+_WIDEST = 0.6  # rad, slip up to which curves are compared
+_BEYOND = 0.02  # weight of slip past what is known
+_LEAST_REACH = 0.032  # rad, slip that is followed at least
+_REACH = 0.1  # rad, slip that is followed where nothing is said of what is known
+_LOW = (0.0, -4.0, 1.0001, -5.0)  # of ln K, ln μ, C, E, at least
+_HIGH = (6.0, 2.0, 2.4, 0.95)  # of ln K, ln μ, C, E, at most
+_WORST = 5.0  # power of the errors whose squares are summed at last: near to the largest one
+_MOST_MISSED = 0.1  # of the peak: past that a curve is no Magic Formula
+_PROPORTIONAL = 100.0  # PKY2: stiffness goes with load, within 0.1 % up to twice the nominal one
 
 
 class _MagicCurve(NamedTuple):
@@ -32,14 +41,14 @@ class _MagicCurve(NamedTuple):
 
 
 def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -> _MagicCurve:
-    """Return the Magic Formula nearest to an axle's curve, within `CHOSEN.most_missed`."""
+    """Return the Magic Formula nearest to an axle's curve, within `_MOST_MISSED`."""
     i, known = AXLES.index(axle), model.known_slip
-    reach = CHOSEN.reach if known is None else max(CHOSEN.least_reach, float(known[i]))
-    beyond = np.linspace(reach, max(CHOSEN.widest, 1.5 * reach), 60)
+    reach = _REACH if known is None else max(_LEAST_REACH, float(known[i]))
+    beyond = np.linspace(reach, max(_WIDEST, 1.5 * reach), 60)
     side = np.concatenate([np.linspace(0.0, reach, 60)[1:], beyond])
     slip = np.concatenate([side, -side])
     inside = np.abs(slip) <= reach
-    weight, load = np.where(inside, 1.0, CHOSEN.beyond), model.vehicle.axle_loads[i]
+    weight, load = np.where(inside, 1.0, _BEYOND), model.vehicle.axle_loads[i]
     phi = model.force(slip)[:, i] / load
     peak = float(np.abs(phi[inside]).max())
 
@@ -51,12 +60,12 @@ def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -
     stiff, most = math.log(max(phi[0] / slip[0], 1.1)), math.log(max(float(phi.max()), 0.05))
     squares = [_solved(errors, (stiff, most, 1.35, E)) for E in (0.0, -1.5)]
     best = min(squares, key=lambda z: float(np.sum(errors(z) ** 2)))
-    z = _solved(errors, best, CHOSEN.worst, max(float(np.abs(errors(best)).max()), 1e-9))
+    z = _solved(errors, best, _WORST, max(float(np.abs(errors(best)).max()), 1e-9))
     missed = float(np.abs(errors(z))[inside].max())
-    if not missed <= CHOSEN.most_missed:
+    if not missed <= _MOST_MISSED:
         raise ValueError(
             f"the curve of the {axle} axle is no Magic Formula: the nearest one is off by "
-            f"{100.0 * missed:.2g} % of its peak ({100.0 * CHOSEN.most_missed:g} % are allowed)"
+            f"{100.0 * missed:.2g} % of its peak ({100.0 * _MOST_MISSED:g} % are allowed)"
         )
     moved = [formula(slip, z + h) - formula(slip, z - h) for h in 1e-5 * np.eye(4)]
     step = np.linalg.pinv(weight[:, None] * np.column_stack(moved) / 2e-5, rcond=1e-6) * weight
@@ -75,13 +84,9 @@ def formula(slip: Array, z: Array) -> Array:
 
 
 def _solved(errors: Callable[..., Array], begin: Sequence[float] | Array, *of: float) -> Array:
-    inside = np.clip(begin, np.array(CHOSEN.tir_low) + 1e-6, np.array(CHOSEN.tir_high) - 1e-6)
+    inside = np.clip(begin, np.array(_LOW) + 1e-6, np.array(_HIGH) - 1e-6)
     scale = (0.1, 0.1, 0.1, 0.5)
-    return np.array(
-        least_squares(
-            errors, inside, bounds=(CHOSEN.tir_low, CHOSEN.tir_high), x_scale=scale, args=of
-        ).x
-    )
+    return np.array(least_squares(errors, inside, bounds=(_LOW, _HIGH), x_scale=scale, args=of).x)
 
 
 def tire_properties(model: TireModel, axle: Axle) -> str:
@@ -92,7 +97,7 @@ def tire_properties(model: TireModel, axle: Axle) -> str:
     """
     found, i = magic_curve(model, axle), AXLES.index(axle)
     K, mu, C, E = (float(one) for one in found.numbers)
-    load, u = 0.5 * model.vehicle.axle_loads[i], 1.0 / CHOSEN.proportional
+    load, u = 0.5 * model.vehicle.axle_loads[i], 1.0 / _PROPORTIONAL
     slips = found.reach * np.array([0.25, 0.5, 0.75, 1.0])
     force, band = model.force(slips), "the model cannot tell how sure it is"
     if model.band is not None:
@@ -141,5 +146,5 @@ PCY1 = {C:.10g}
 PDY1 = {mu:.10g}
 PEY1 = {E:.10g}
 PKY1 = {-K * (1.0 + u**2) / (2.0 * u):.10g}
-PKY2 = {CHOSEN.proportional:.10g}
+PKY2 = {_PROPORTIONAL:.10g}
 """

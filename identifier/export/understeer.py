@@ -11,9 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.export.chosen import CHOSEN
 from identifier.tire_model import TireModel, brisk_speed, require_band
 from models.vehicle import GRAVITY
+
+_STEP = 1.0  # m/s², of the lateral acceleration
+_SPEEDS = 3  # at which gradients are given
+_DRAWN = 100  # models
+_LOWER_SHARE = 0.16  # share of the models that lie below the lower end, a deviation off
+_UPPER_SHARE = 0.84  # share of them that lie below the upper end, a deviation off
 
 SLIPS = np.linspace(0.0, 0.6, 301)  # rad
 
@@ -45,22 +50,20 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
     Its standard deviation is half of what lies between the 16 % and 84 % points of models drawn
     from what the drives left open. A model that cannot tell how sure it is is refused.
     """
-    drawn = require_band(model).samples(CHOSEN.drawn, rng)
+    drawn = require_band(model).samples(_DRAWN, rng)
     known, speeds, car = model.known_slip, model.drives.speeds, model.vehicle
     if known is None or not known.min() > 0.0:
         raise ValueError("the force of an axle is not known at any slip: drive harder")
     slow, fast = (brisk_speed(car, model.min_speed),) * 2 if speeds is None else speeds
-    v_x = np.unique(np.linspace(slow, fast, CHOSEN.understeer_speeds))
+    v_x = np.unique(np.linspace(slow, fast, _SPEEDS))
     force = model.force(SLIPS)
     reached = np.array([np.interp(known[i], SLIPS, force[:, i]) for i in range(2)])
     most = reached * car.load_ratio(v_x) / np.array(car.axle_loads) * GRAVITY  # (n, 2)
-    a_y = np.arange(0.0, most.min(axis=1).max(), CHOSEN.step)
+    a_y = np.arange(0.0, most.min(axis=1).max(), _STEP)
     found = _gradients(model, force, v_x, a_y)
     spread = np.array([_gradients(one, one.force(SLIPS), v_x, a_y) for one in drawn])
     with np.errstate(invalid="ignore"):  # beyond what half of them can reach
-        low, high = np.quantile(
-            spread, (CHOSEN.lower_share, CHOSEN.upper_share), axis=0, method="nearest"
-        )
+        low, high = np.quantile(spread, (_LOWER_SHARE, _UPPER_SHARE), axis=0, method="nearest")
         sd = 0.5 * (high - low)
     past = (a_y > most.min(axis=1)[:, None]) | ~np.isfinite(found) | ~np.isfinite(sd)
     return Understeer(v_x, a_y, np.where(past, np.nan, found), np.where(past, np.nan, sd))

@@ -11,7 +11,6 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from identifier.axle.car import car_numbers, downforce_numbers
-from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
 from identifier.axle.covariance import packed, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.design import AxleIdentifier, curve_boxes, curve_tracks, resumed_units
@@ -19,11 +18,10 @@ from identifier.axle.gate import Plausibility
 from identifier.axle.learning import Bounds, inward, rising_shares
 from identifier.axle.model import EXACT, AxleModel, begun
 from identifier.axle.prior import Prior
-from identifier.axle.slip import Sensors, Sway
+from identifier.axle.slip import FASTEST, Sensors, Sway
 from identifier.estimate.model import FittedModel
 from identifier.inertial.beliefs import Beliefs, Body, Trust
-from identifier.inertial.chosen import CHOSEN
-from identifier.inertial.motion import SENSORS, Along, Laws, Learnt
+from identifier.inertial.motion import MOVING, SENSORS, Along, Laws, Learnt
 from identifier.inertial.step import (
     CARRY,
     OVER,
@@ -41,6 +39,9 @@ from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
 from models.rules import require_positive, require_within
 from models.vehicle import GRAVITY, Vehicle
+
+_LEAST_SHARE = 1e-6  # of the sway, which a prior has to have
+_REACH = 0.3  # rad, up to which directions of curves are those of a tire
 
 MOST = {"bias": 0.1, "roll": 0.3, "gyro": 0.1}  # others are in `Bounds`
 
@@ -123,7 +124,7 @@ class InertialIdentifier(Method):
         """
         usual, tires = cls.for_vehicle(vehicle, dt=dt), begun(model)
         assert isinstance(tires, AxleModel)
-        share = max(float(tires.sway_share.mean()), CHOSEN.least_share)
+        share = max(float(tires.sway_share.mean()), _LEAST_SHARE)
         return replace(
             usual,
             held=True,
@@ -254,7 +255,7 @@ class InertialIdentifier(Method):
 
     def _sway(self, vehicle: Vehicle) -> Sway:
         """Return the roll of a body of this size."""
-        omega = min(self.roll_frequency / vehicle.froude_time, 0.6 * AXLE_CHOSEN.fastest)
+        omega = min(self.roll_frequency / vehicle.froude_time, 0.6 * FASTEST)
         return Sway(frequency=omega, damping=self.roll_damping)
 
     def _limits(self) -> LearntLimits:
@@ -273,7 +274,7 @@ class InertialIdentifier(Method):
         A curve φ(x) of another stiffness and the same grip changes by x dφ/dx, one of another grip
         and the same stiffness by φ - x dφ/dx, as near as units come to it.
         """
-        slip = np.linspace(0.0, CHOSEN.reach, 121)[1:]
+        slip = np.linspace(0.0, _REACH, 121)[1:]
         T = unit_matrix(slip, self.ladder)
         stiffer = slip[:, None] * ((1.0 - T * T) / np.array(self.ladder)) @ W.T
         n = len(self.ladder)
@@ -285,9 +286,7 @@ class InertialIdentifier(Method):
     def _into(self, curves: Array, compliance: Array) -> Array:
         """Return what steps of what is learnt move of each axle's numbers, (2, n + 3, k)."""
         n = len(self.ladder)
-        moved = self._learnt.into(n, ca.DM(curves), ca.DM(compliance))[
-            CHOSEN.moving :, CHOSEN.moving :
-        ]
+        moved = self._learnt.into(n, ca.DM(curves), ca.DM(compliance))[MOVING:, MOVING:]
         *weights, own, sensors = np.split(np.array(ca.evalf(moved)), [n, 2 * n, 2 * n + 2])
         steering, nothing = sensors[SENSORS.index("steering")], np.zeros(sensors.shape[1])
         front = np.vstack([weights[0], own[0], nothing, steering])

@@ -12,8 +12,7 @@ from typing import Any
 import casadi as ca
 
 from identifier.axle.car import larger
-from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
-from identifier.axle.covariance import Factors, excited, updated
+from identifier.axle.covariance import TINY, Factors, excited, updated
 
 CONDITIONS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_AND, ca.OP_OR, ca.OP_NOT)
 
@@ -68,7 +67,7 @@ def propagated(factors: Factors, F: Any, Q: list[Any]) -> Factors:
     for j in reversed(range(m)):
         weighted = [a * d for a, d in zip(rows[j], weights, strict=True)]
         diagonal[j] = sum(a * b for a, b in zip(rows[j], weighted, strict=True))
-        per = 1 / (diagonal[j] + AXLE_CHOSEN.covariance_tiny)
+        per = 1 / (diagonal[j] + TINY)
         for i in range(j):
             after[i, j] = per * sum(a * b for a, b in zip(rows[i], weighted, strict=True))
             rows[i] = [a - after[i, j] * b for a, b in zip(rows[i], rows[j], strict=True)]

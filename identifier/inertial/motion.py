@@ -26,9 +26,11 @@ import casadi as ca
 from identifier.axle.car import Car
 from identifier.axle.curve import Curve, hidden_units, of_units
 from identifier.axle.slip import SHORTEST
-from identifier.inertial.chosen import CHOSEN
-from identifier.motion.chosen import CHOSEN as MOTION_CHOSEN
+from identifier.motion.model import LEAST_GRIP
 from models.vehicle import GRAVITY, LIGHTEST
+
+MOVING = 7  # entries of z before those that are learnt
+_FIRST_COS = 24  # of the series of cos δ, 2e-5 off at 0.5 rad
 
 SENSORS = ("bias", "roll", "steering", "gyro")  # the last of these
 
@@ -51,7 +53,7 @@ class _Unknowns(NamedTuple):
 
 def _size(n: int) -> int:
     """Return how many entries z has for n units."""
-    return CHOSEN.moving + 2 * n + 2 + len(SENSORS)
+    return MOVING + 2 * n + 2 + len(SENSORS)
 
 
 class Learnt(NamedTuple):
@@ -77,17 +79,17 @@ class Learnt(NamedTuple):
             of the first, then of the second.
         compliance : of both axles that one of its factor adds, (2,).
         """
-        E = ca.SX(_size(n), CHOSEN.moving + len(self.names))
-        E[: CHOSEN.moving, : CHOSEN.moving] = ca.SX.eye(CHOSEN.moving)
-        rest = CHOSEN.moving + 2 * n
-        for column, name in enumerate(self.names, start=CHOSEN.moving):
+        E = ca.SX(_size(n), MOVING + len(self.names))
+        E[:MOVING, :MOVING] = ca.SX.eye(MOVING)
+        rest = MOVING + 2 * n
+        for column, name in enumerate(self.names, start=MOVING):
             if name == "grip":
                 for axle in range(2):
-                    first = CHOSEN.moving + axle * n
+                    first = MOVING + axle * n
                     E[first : first + n, column] = curves[axle, :].T
             elif name in CURVES:
                 axle = CURVES.index(name) % 2
-                first = CHOSEN.moving + axle * n
+                first = MOVING + axle * n
                 E[first : first + n, column] = curves[CURVES.index(name), :].T
             elif name == "compliance":
                 E[rest : rest + 2, column] = compliance
@@ -103,7 +105,7 @@ def unknowns(z: Any, n: int) -> _Unknowns:
     """Return z by name.
     z : as above.   n : number of units.
     """
-    m, k = CHOSEN.moving, CHOSEN.moving + 2 * n
+    m, k = MOVING, MOVING + 2 * n
     return _Unknowns(
         v_y=z[0],
         r=z[1],
@@ -151,7 +153,7 @@ class Along(NamedTuple):
         drives = f > 0
         pairs = ((self.brake_f, self.drive_f), (self.brake_r, self.drive_r))
         use = ca.vertcat(*(f * ca.if_else(drives, drive, brake) for brake, drive in pairs))
-        left = ca.sqrt(ca.fmax(1 - use * use, MOTION_CHOSEN.least_grip))
+        left = ca.sqrt(ca.fmax(1 - use * use, LEAST_GRIP))
         return ca.fmax(load(v_x) + f * ca.vertcat(self.load_f, self.load_r), LIGHTEST) * left
 
 
@@ -251,7 +253,7 @@ def cosine(delta: Any) -> Any:
     """Return cos δ, without a call.
     delta : steering [rad].
     """
-    return 1 - delta**2 / 2 + delta**4 / CHOSEN.first_cos
+    return 1 - delta**2 / 2 + delta**4 / _FIRST_COS
 
 
 def slip_angle(at: Sample, sideways: Any, steering: Any) -> Any:

@@ -21,10 +21,10 @@ from identifier.axle.curve import EDGES, EXCITATION, curve, excited
 from identifier.axle.gate import GATE_PORT, Gate, GateState, Plausibility, gate
 from identifier.axle.learning import BoundNumbers, towards_center
 from identifier.inertial.beliefs import TrustNumbers
-from identifier.inertial.chosen import CHOSEN
 from identifier.inertial.gaussian import as_factor, measured, propagated
 from identifier.inertial.motion import (
     CURVES,
+    MOVING,
     SENSORS,
     Along,
     Laws,
@@ -44,6 +44,16 @@ from identifier.inertial.motion import (
 )
 from identifier.setup import AXLE_FORCE, FACTORS, Port
 from models.vehicle import GRAVITY, load_ratio
+
+_SAME = 0.01  # of the square of a change, up to which the next one is none: a number that settles
+_MOST_WAITING = 4  # numbers of a channel that wait for its turn
+_MOST_SLIDING = 0.7  # |v_y|/v_x from which the filter begins anew
+_MOST_NOISE = 9.0  # of the noise that is held for true, what one sample may show
+_MOST_MISSED = 25.0  # one outlier alone is no alarm
+_STIFFNESS = 2.0  # static loads/rad, the least that a corner is begun with
+_DOUBTED = 0.7  # of the slip that a corner is begun with
+_LAG_OF_A_X = 0.2  # s, of the washout that shows a_x
+_LEAST = 1e-12  # variance that is divided by
 
 OVER = ("x", "u", "v_x", "a_y")
 LOAD = "static axle loads"
@@ -159,9 +169,9 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     """
     n = len(steps) + 1
     learnt = Learnt(tires)
-    q, k = CHOSEN.moving + len(learnt.names), len(learnt.names)
+    q, k = MOVING + len(learnt.names), len(learnt.names)
     ports, s = symbols(
-        motion=CHOSEN.moving,
+        motion=MOVING,
         W=(2, n),
         own=2,
         sensors=len(SENSORS),
@@ -200,7 +210,7 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     runs = ca.logic_and(gated.on, gated.v_x >= slowest)
     goes_on = ca.logic_and(runs, s.running.on > 0.5)
     slow = ca.if_else(gated.first, gated.v_x, s.running.v_x)
-    a_x = (gated.v_x - slow) * (1 / CHOSEN.lag_of_a_x) - s.motion[0] * gated.r
+    a_x = (gated.v_x - slow) * (1 / _LAG_OF_A_X) - s.motion[0] * gated.r
     if not tires:
         load = partial(s.along.moved, load, a_x)
     z = ca.vertcat(s.motion, s.W[0, :].T, s.W[1, :].T, s.own, s.sensors)
@@ -216,14 +226,14 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     by_z = way.gradient(z, moving)
     F = ca.horzcat(by_z[:, : z.numel()] @ into, by_z[:, z.numel() :])
     # v_y and r on the way, the others
-    for i in (-CHOSEN.moving - 4, -CHOSEN.moving - 3, *range(2 - CHOSEN.moving, 0)):
+    for i in (-MOVING - 4, -MOVING - 3, *range(2 - MOVING, 0)):
         F[i, :] *= goes_on  # a filter that begins anew knows of no dependence
     factors = propagated(factors, F, _process_noise(trust, ahead))
-    ahead_z = ca.vertcat(ahead.moving, z[CHOSEN.moving :])
+    ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
     noise = _noise(s, gated, goes_on)
     step, factors, left = _corrected(s, ahead, ahead_z, into, factors, noise, now, steps, load)
     corrected = ca.vertsplit(ahead_z + into @ step)
-    missed = smaller((ca.vertcat(*corrected[4:6]) / _missed(trust, ahead)) ** 2, CHOSEN.most_missed)
+    missed = smaller((ca.vertcat(*corrected[4:6]) / _missed(trust, ahead)) ** 2, _MOST_MISSED)
     fast = s.running.missed
     fast = fast + trust.alarm_gain * ((missed[0] + missed[1]) / 2 - fast)
     alarm = goes_on * gated.learns * within(fast * trust.per_alarm - 1, 0, 1)
@@ -231,18 +241,15 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     corrected = _bounded(s, corrected, learnt)
 
     # Else it begins anew, a sample later.
-    sane = ca.fabs(corrected[0]) < CHOSEN.most_sliding * now.v_x
+    sane = ca.fabs(corrected[0]) < _MOST_SLIDING * now.v_x
     begun, unsure = _afresh(s, gated, now, load)
-    a_kept = smaller(dt * (1 / CHOSEN.lag_of_a_x), 1)
+    a_kept = smaller(dt * (1 / _LAG_OF_A_X), 1)
     kept = [
-        *(
-            ca.if_else(goes_on, a, b)
-            for a, b in zip(corrected[: CHOSEN.moving], begun, strict=True)
-        ),
-        *corrected[CHOSEN.moving :],  # which are not moved unless the filter goes on
+        *(ca.if_else(goes_on, a, b) for a, b in zip(corrected[:MOVING], begun, strict=True)),
+        *corrected[MOVING:],  # which are not moved unless the filter goes on
     ]
     variances = (ca.if_else(goes_on, a, b) for a, b in zip(factors.D, unsure, strict=False))
-    factors = Factors(factors.U, [*variances, *factors.D[CHOSEN.moving :]])
+    factors = Factors(factors.U, [*variances, *factors.D[MOVING:]])
     after = row_of(factors)
     moving = s.motion_UD.numel()
     given = unknowns(ca.vertcat(*kept), n)
@@ -256,7 +263,7 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     variance = variance + (now.v_x * doubt / curves.carcass_slope[1]) ** 2
     size_of_slip = larger(ca.fabs(given.slip), ca.fabs(ahead.alpha))
     next_state = {
-        "motion": ca.vertcat(*kept[: CHOSEN.moving]),
+        "motion": ca.vertcat(*kept[:MOVING]),
         "W": given.W,
         "own": given.compliance,
         "sensors": ca.vertcat(*kept[-len(SENSORS) :]),
@@ -307,13 +314,13 @@ def _noise(s: SimpleNamespace, gated: Gate, goes_on: Any) -> _Noise:
     readings = [gated.r, ca.if_else(there, a_y, last.newest[1])]
     fresh, waiting, variance, state = [], [], [], []
     for y, newest, old, noise, waits, _ in zip(readings, *map(ca.vertsplit, last), strict=True):
-        differs = (y - newest) ** 2 > CHOSEN.same * (newest - old) ** 2
+        differs = (y - newest) ** 2 > _SAME * (newest - old) ** 2
         news = ca.logic_and(ca.logic_and(differs, goes_on), _is_good(gated))
         second = y - 2 * newest + old
-        shows = smaller(second**2 / 6, CHOSEN.most_noise * noise + CHOSEN.least)
+        shows = smaller(second**2 / 6, _MOST_NOISE * noise + _LEAST)
         variance.append(ca.if_else(news, noise + trust.noise_gain * (shows - noise), noise))
         fresh.append(news)
-        waiting.append(goes_on * smaller(waits + news, CHOSEN.most_waiting))
+        waiting.append(goes_on * smaller(waits + news, _MOST_WAITING))
         before = ca.if_else(news, newest, old)
         holds = ca.logic_and(goes_on, ca.logic_not(news))
         state.append((ca.if_else(holds, newest, y), ca.if_else(goes_on, before, y)))
@@ -398,20 +405,18 @@ def _is_good(gated: Gate) -> Any:
 def _loosened(factors: Factors, learnt: Learnt, amount: Any) -> Factors:
     """Return the factors where the road may be another one: the grip of both curves may change."""
     U, D = factors
-    grip = [
-        i for i, name in enumerate(learnt.names, start=CHOSEN.moving) if name.startswith("grip")
-    ]
+    grip = [i for i, name in enumerate(learnt.names, start=MOVING) if name.startswith("grip")]
     return Factors(U, [d + amount if i in grip else d for i, d in enumerate(D)])
 
 
 def _bounded(s: SimpleNamespace, z: list[Any], learnt: Learnt) -> list[Any]:
     """Return z with what is learnt within its bounds."""
     kept, n, limits = list(z), s.W.shape[1], s.limits
-    for first in (CHOSEN.moving, CHOSEN.moving + n):
+    for first in (MOVING, MOVING + n):
         kept[first : first + n] = towards_center(
             s.bounds, z[first : first + n], ca.vertsplit(s.rising)
         )
-    at = CHOSEN.moving + 2 * n
+    at = MOVING + 2 * n
     if learnt.tires:
         for i in (at, at + 1):
             kept[i] = within(z[i], 0, limits.compliance)
@@ -429,11 +434,11 @@ def _afresh(
     zero, bias = (s.sensors[SENSORS.index(name)] for name in ("steering", "gyro"))
     r = gated.r - bias
     stiffness = ca.dot(s.W[1, :], s.scales) * load(now.v_x)[1]
-    stiffness = larger(stiffness, CHOSEN.stiffness)
+    stiffness = larger(stiffness, _STIFFNESS)
     lean = smaller(ca.fabs(gated.v_x * r) / GRAVITY, 1) / stiffness * ca.sign(r)
     v_y = gated.v_x * (gated.delta[1] - lean) - car.arm[1] * r
     alpha = slip_angle(now, v_y + car.arm * r, zero)
-    unsure = trust.v_y + (CHOSEN.doubted * gated.v_x * lean) ** 2
+    unsure = trust.v_y + (_DOUBTED * gated.v_x * lean) ** 2
     slip = unsure / now.v_x**2
     missed = trust.error**2
     D = [unsure, trust.r, slip, slip, missed, missed, trust.bank]

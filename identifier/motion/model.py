@@ -31,9 +31,14 @@ from codegen.compiler import FLAGS
 from identifier.axle.car import step_function, symbols
 from identifier.axle.gate import GateState, Plausibility, gate
 from identifier.axle.slip import SHORTEST
-from identifier.motion.chosen import CHOSEN
 from identifier.motion.parameters import NAMES, SLIPS, curve_names
 from models.vehicle import GRAVITY, LIGHTEST
+
+LEAST_GRIP = 0.05  # of G²: what an axle that uses all of its grip lengthwise keeps sideways
+_LEAST_SLOPE = 0.02  # of C: the carcass does not stretch further
+DAMPING = 0.3  # ζ of the sway
+RATE = 4.0  # κ [1/s]: what is missed is a mean over a quarter of a second
+_LAG_OF_A_X = 0.2  # [s] of the washout that tells a_x
 
 # Slopes over all parameters are thousands of lines: to optimize them further takes the compiler
 # longer than they run.
@@ -236,9 +241,7 @@ def _sway(at: _At, v_x: _Dual, r: _Dual) -> tuple[dict[str, _Dual], _Dual]:
         omega = car.omega * ca.exp(ln_sway)
         a = GRAVITY * (front * f_f + rear * f_r)
         eased = 1 + dt * GRAVITY * (front * C_f * k_f + rear * C_r * k_r) / speed
-        moved = (rate * eased + dt * omega**2 * (a - rho)) / (
-            eased + dt * 2 * CHOSEN.damping * omega
-        )
+        moved = (rate * eased + dt * omega**2 * (a - rho)) / (eased + dt * 2 * DAMPING * omega)
         moved = ca.if_else(first > 0, 0, moved)
         place = ca.if_else(first > 0, speed * yaw, rho + dt * moved)
         return [moved, place, -moved / (omega**2 * speed)]
@@ -271,7 +274,7 @@ def _curve(ln_C: Any, ln_mu: Any, c: Any, E: Any, *others: Any) -> tuple[Any, An
 def carcass_curve(*numbers: Any) -> tuple[Any, Any]:
     """Return φ and its slope as far as the carcass stretches.   numbers : as of `_curve`."""
     phi, slope = _curve(*numbers)
-    return phi, ca.fmax(slope, CHOSEN.least_slope * ca.exp(numbers[0]))
+    return phi, ca.fmax(slope, _LEAST_SLOPE * ca.exp(numbers[0]))
 
 
 def pushed_names(axle: str) -> list[str]:
@@ -294,7 +297,7 @@ def load_and_ellipse(
     load = 1 + shifted + (press + down) * v_x**2
     use = ca.if_else(f > 0, drive, brake) * f
     least = ca.if_else(load > LIGHTEST, load, LIGHTEST)
-    return least, ca.sqrt(ca.fmax(1 - use**2, CHOSEN.least_grip))
+    return least, ca.sqrt(ca.fmax(1 - use**2, LEAST_GRIP))
 
 
 @cache
@@ -374,11 +377,11 @@ def _missed(
         across = F0 * ca.cos(angle)
         xi = vy / GRAVITY + J * yaw
         u = across - vx * yaw / GRAVITY + push
-        fall = ca.exp(-CHOSEN.rate * dt)
-        mean = (1 - fall) / (CHOSEN.rate * dt)
+        fall = ca.exp(-RATE * dt)
+        mean = (1 - fall) / (RATE * dt)
         z = fall * z0 + mean * (xi - xi0) - (u + u0) / 2 * dt * mean
         z = ca.if_else(at.first > 0, 0, z)
-        return [z, xi, u, across, CHOSEN.rate * z]
+        return [z, xi, u, across, RATE * z]
 
     bank = _Dual(at.signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
     names = [f"{name}_{axle}" for name in ("z", "xi", "u")]
@@ -412,8 +415,8 @@ def _replay_step() -> ca.Function:
     old = _by_name(REPLAYED, s.motion)
     g = gate(s.plausibility, s.dt, s.gate, s.x, s.u, s.v_x)
     slow = ca.if_else(g.first > 0, g.v_x, old["v_x_slow"])
-    a_x = (g.v_x - slow) / CHOSEN.lag_of_a_x - g.v_y * g.r
-    following = g.v_x + (slow - g.v_x) * ca.exp(-s.dt / CHOSEN.lag_of_a_x)
+    a_x = (g.v_x - slow) / _LAG_OF_A_X - g.v_y * g.r
+    following = g.v_x + (slow - g.v_x) * ca.exp(-s.dt / _LAG_OF_A_X)
     values = [g.v_x, g.v_y, g.r, g.delta[0], g.delta[1], a_x, 0, 0, g.on]
     fixed = _constant((*SIGNALS, *RATES), [*values, 0, 0, 0], 0)
     duals = _constant(NAMES, ca.vertsplit(s.parameters), 0)

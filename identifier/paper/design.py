@@ -21,7 +21,6 @@ from codegen.errors import TireidError
 from identifier.certificate import Certificate
 from identifier.driving import SPEED_SPREAD, Driving, natural_driving
 from identifier.method import Method
-from identifier.paper.chosen import CHOSEN
 from identifier.paper.gains import gains_for
 from identifier.paper.laws import INPUT_SOURCES, LAWS, Gains, diagonal
 from identifier.paper.network import (
@@ -47,6 +46,9 @@ from models.bicycle import BicycleParameters, bicycle
 from models.rules import require_within
 from models.schema import Table, read_toml
 from models.vehicle import GRAVITY, Vehicle
+
+_SHORTEST_STEP = 1e-4  # [s]: finer is only work
+_LONGEST_STEP = 0.1  # [s]: coarser is blind
 
 
 class _Variant(NamedTuple):
@@ -112,7 +114,7 @@ class PaperIdentifier(Method):
                 raise ValueError(
                     f"{name} must be one of {list(known)}, not {getattr(self, name)!r}"
                 )
-        require_within(ValueError, CHOSEN.shortest_step, CHOSEN.longest_step, dt=self.dt)
+        require_within(ValueError, _SHORTEST_STEP, _LONGEST_STEP, dt=self.dt)
         require_within(ValueError, 1e-6, 1e9, force_unit=self.force_unit)
         require_within(ValueError, 1e-6, 200.0, min_speed=self.min_speed)
         require_within(ValueError, 0, 2**63 - 1, seed=self.seed)

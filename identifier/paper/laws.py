@@ -20,8 +20,10 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
-from identifier.paper.chosen import CHOSEN
 from models.rules import require_within
+
+_LEAST = 1e-15  # of a gain that is not 0, in its unit, whatever U is
+_LARGEST = 1e12  # of a gain, in its unit, whatever U is
 
 _Direction = Callable[[Any, Any], Any]
 
@@ -183,7 +185,7 @@ class Gains:
         A_d = np.array(self.A_d, dtype=np.float64)
         if A_d.shape != (2, 2) or not np.isfinite(A_d).all():
             raise ValueError(f"A_d must be a 2x2 matrix of finite numbers, it is {self.A_d}")
-        require_within(ValueError, 0.0, CHOSEN.largest, **{"|A_d|": np.abs(A_d).max()})
+        require_within(ValueError, 0.0, _LARGEST, **{"|A_d|": np.abs(A_d).max()})
         poles = np.linalg.eigvals(A_d)
         if not poles.real.max() < 0.0:
             raise NotHurwitzError(f"A_d must be Hurwitz, its eigenvalues are {poles}")
@@ -194,7 +196,7 @@ class Gains:
             if not 0.0 <= value < np.inf:
                 raise ValueError(f"{name} must not be negative, it is {value}")
             if value != 0.0:
-                require_within(ValueError, CHOSEN.least, CHOSEN.largest, **{name: value})
+                require_within(ValueError, _LEAST, _LARGEST, **{name: value})
 
     @property
     def matrix(self) -> Array:

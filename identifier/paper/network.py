@@ -23,13 +23,15 @@ from identifier.frozen import (
     vehicle_numbers,
 )
 from identifier.method import OTHER_STRUCTURE, resumed
-from identifier.paper.chosen import CHOSEN
 from identifier.setup import Setup
 from identifier.tire_model import StaticModel, TireModel
 from models.bicycle import BicycleParameters, linear_axle_force, slip_angles
 from models.rules import require_positive, require_within
 from models.schema import Table, require_few
 from models.vehicle import Vehicle
+
+_LARGEST_SUM = 1e9  # of the units of an axle together [N]: what cancels may be large
+_LARGEST_V = 1e9  # [-], beyond which tanh is a sign at the slip of a resting car
 
 # Signals that may enter the network, each with the value that counts as large for a passenger car.
 SIGNALS: Mapping[str, float] = {
@@ -207,8 +209,8 @@ class NetworkModel(StaticModel):
                 raise ValueError(f"{name} holds a number that is not finite: the law has diverged")
         with np.errstate(over="ignore"):  # beyond the limit, too
             largest = self.force_unit * np.abs(self.weights.W).sum(axis=1).max()
-        require_within(ValueError, 0.0, CHOSEN.largest_sum, **{"force_unit times |W|": largest})
-        require_within(ValueError, 0.0, CHOSEN.largest_v, **{"|V|": np.abs(self.weights.V).max()})
+        require_within(ValueError, 0.0, _LARGEST_SUM, **{"force_unit times |W|": largest})
+        require_within(ValueError, 0.0, _LARGEST_V, **{"|V|": np.abs(self.weights.V).max()})
 
     def setup(self, dt: float) -> Setup:
         del dt

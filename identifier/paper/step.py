@@ -13,7 +13,6 @@ from typing import Any
 
 import casadi as ca
 
-from identifier.paper.chosen import CHOSEN
 from identifier.paper.laws import (
     INPUT_SOURCES,
     LAWS,
@@ -24,6 +23,9 @@ from identifier.paper.laws import (
 from identifier.paper.network import Network, hidden_layer, network_signals
 from identifier.setup import AXLE_FORCE, Port
 from models.bicycle import BicycleParameters, bicycle, linear_axle_force
+
+_LARGEST_SPEED = 300.0  # m/s: no car is faster
+_LARGEST_ANGLE = 1.5  # rad: no wheel turns more
 
 CARRY = ("xi_hat", "z", "W", "V")
 _NETWORK_PORTS = (
@@ -64,9 +66,7 @@ def _plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
     most = 2 * v_x  # tan 63°
     front, rear = x[0] + parameters.l_f * x[1], x[0] - parameters.l_r * x[1]
     inside = ca.logic_and(ca.fabs(front) <= most, ca.fabs(rear) <= most)
-    steering = ca.logic_and(
-        ca.fabs(u[0]) <= CHOSEN.largest_angle, ca.fabs(u[1]) <= CHOSEN.largest_angle
-    )
+    steering = ca.logic_and(ca.fabs(u[0]) <= _LARGEST_ANGLE, ca.fabs(u[1]) <= _LARGEST_ANGLE)
     return ca.logic_and(inside, steering)
 
 
@@ -110,9 +110,7 @@ def build_step(structure: Structure) -> ca.Function:
     xi_hat_dot = observer_rate(A_d, model.A_xi, model.B_xi / unit, xi, xi_hat, u, W @ sigma)
 
     moving = v_x >= min_speed
-    plausible_sample = ca.logic_and(
-        _plausible(parameters, speed, x, u), v_x <= CHOSEN.largest_speed
-    )
+    plausible_sample = ca.logic_and(_plausible(parameters, speed, x, u), v_x <= _LARGEST_SPEED)
     used = ca.logic_and(moving, plausible_sample)
     f_hat = ca.if_else(used, W @ sigma, 0)
     linear = ca.if_else(used, linear_axle_force(parameters, speed, x, u), 0)

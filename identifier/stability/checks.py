@@ -9,12 +9,16 @@ from codegen.arrays import Array
 from identifier.certificate import Property, Status, at_least, statement
 from identifier.paper.laws import DrivingError, Gains
 from identifier.stability.bounds import small_gain, steady_capacity
-from identifier.stability.chosen import CHOSEN
 from identifier.stability.loop import Loop, eigenvalues
 from identifier.stability.lyapunov import lyapunov
 from identifier.stability.margins import drift_frequency, gain_margin, phase_margin
 from identifier.stability.operation import Operation, Proven
 from identifier.stability.printed import printed_bounds, trivial_bound
+
+_ENOUGH_GAIN = 2.0  # times the gains of learning that the loop bears
+_ENOUGH_PHASE = 30.0  # deg, of the phase margin
+_ENOUGH_DAMPING = 0.2  # [-], of the poles
+_LARGEST_STEP = 0.2  # fastest pole times dt that Euler resolves well
 
 
 def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
@@ -30,11 +34,9 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     sampled = np.abs(1.0 + poles * dt)
     slowest = -math.log(float(sampled.max())) / dt
     lyapunov(A_d, eye)  # raises where P does not solve its equation
-    finer = f"slow A_d down or sample every {1e3 * dt * CHOSEN.largest_step / step:.3g} ms"
+    finer = f"slow A_d down or sample every {1e3 * dt * _LARGEST_STEP / step:.3g} ms"
     title = "fastest pole of A_d times the sampling interval"
-    sampling = Property.judged(
-        "sampling", title, step, "-", limit=CHOSEN.largest_step, advice=finer
-    )
+    sampling = Property.judged("sampling", title, step, "-", limit=_LARGEST_STEP, advice=finer)
     if not operation.resolves(A_d):
         sampling = replace(sampling, status="fail", advice=finer)
     entries = [
@@ -78,7 +80,7 @@ def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
             "phase margin of the sampled loop",
             phase_margin(loop, operation.dt),
             "deg",
-            limit=CHOSEN.enough_phase,
+            limit=_ENOUGH_PHASE,
             bad=1e-9,
             least=True,
             advice="lower eta_W",
@@ -88,7 +90,7 @@ def margin_checks(loop: Loop, operation: Operation) -> list[Property]:
             "damping ratio of the learning loop",
             _worst_damping(loop),
             "-",
-            limit=CHOSEN.enough_damping,
+            limit=_ENOUGH_DAMPING,
             bad=1e-9,
             least=True,
             advice="raise A_d and forgetting, or lower eta_W",
@@ -153,10 +155,10 @@ def _worst_damping(loop: Loop) -> float:
 def _gain_check(name: str, how: str, loop: Loop, dt: float | None) -> Property:
     found = gain_margin(loop, dt)
     value = float(np.linalg.eigvalsh(loop.G)[-1])
-    status: Status = at_least(found.factor, good=CHOSEN.enough_gain, bad=1.0)
+    status: Status = at_least(found.factor, good=_ENOUGH_GAIN, bad=1.0)
     advice = ""
     if status != "pass":
-        factor = found.factor / CHOSEN.enough_gain
+        factor = found.factor / _ENOUGH_GAIN
         advice = f"multiply eta_W and eta_V by {factor:.2g}" if factor > 0.0 else "change A_d"
         if math.isfinite(found.frequency):
             advice += f"; at the limit it oscillates at {found.frequency / (2 * math.pi):.2g} Hz"

@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
-from identifier.stability.chosen import CHOSEN
 from identifier.stability.loop import (
     Loop,
     eigenvalues,
@@ -26,6 +25,9 @@ from identifier.stability.loop import (
     root,
     scaled_matrices,
 )
+
+_LARGEST_FACTOR = 1e6  # of gains at which a margin is looked for, either way
+_AT_ONCE = 150  # points of a grid whose eigenvalues are found together
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,7 +51,7 @@ def gain_margin(loop: Loop, dt: float | None = None) -> _GainMargin:
     def growth_at(log_factors: Array) -> Array:
         return growth_rate(scaled_matrices(loop, np.exp(log_factors)), dt)
 
-    span = np.log(CHOSEN.largest_factor)
+    span = np.log(_LARGEST_FACTOR)
     crossing = _first_crossing(growth_at, np.linspace(-span, span, 1801), 1e-11 * _rate(loop))
     if crossing is None:
         return _GainMargin(factor=np.inf, frequency=np.nan)
@@ -90,7 +92,7 @@ def _first_crossing(
     """
     growth = np.empty(0)
     while growth.size < grid.size and not np.any(growth > threshold):
-        growth = np.append(growth, growth_at(grid[growth.size : growth.size + CHOSEN.at_once]))
+        growth = np.append(growth, growth_at(grid[growth.size : growth.size + _AT_ONCE]))
     unstable = np.flatnonzero(growth > threshold)
     if unstable.size == 0:
         return None

@@ -15,13 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.axle.band import BandCalibration, ranges_of, sensor_noise
-from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
+from identifier.axle.band import (
+    AT_SPEEDS,
+    CENTERS,
+    LEAST_FACTOR,
+    MOST_COLOR,
+    MOST_FACTOR,
+    SPEEDS,
+    BandCalibration,
+    ranges_of,
+    sensor_noise,
+)
 from identifier.axle.learning import Regression
 from identifier.band import LEVEL, Band, BandSpread, normal_quantile
 from identifier.run import History, learn, state_index
 from identifier.tire_model import TireModel
-from identifier.verdict.chosen import CHOSEN
 from identifier.verdict.judging import judge
 from identifier.verdict.motion import Evidence, evidence, modelled_force
 from identifier.verdict.verdict import Verdict
@@ -29,6 +37,13 @@ from models.recordings import Recording
 from models.recordings.evidence import Windows
 from models.recordings.portion import Portion, portion
 from models.vehicle import Vehicle
+
+_SHARED = 10.0  # windows of all ranges that count in each, so that few windows decide nothing
+_INDEPENDENT = 0.5  # of the windows, which overlap by half
+# of an instant of another drive, over a window of a part left out, by range of slip: means hide
+# errors of quick passes through zero; chosen on 256 random cars, seeds 100 to 131 and 200 to
+# 231
+_ELSEWHERE = (1.65, 0.68, 0.93, 1.1, 1.22, 1.35)
 
 PARTS = 4  # of the drive, each of which is left out once
 
@@ -119,8 +134,8 @@ def _errors_elsewhere(
     """
     windows, shape = found.windows, found.measured.shape
     speeds = windows.mean(recording.v_x) / vehicle.froude_speed
-    within = np.searchsorted(AXLE_CHOSEN.speeds, speeds, side="right")
-    share, scaled, fixed = np.zeros((3, len(AXLE_CHOSEN.centers), *shape))
+    within = np.searchsorted(SPEEDS, speeds, side="right")
+    share, scaled, fixed = np.zeros((3, len(CENTERS), *shape))
     errors = ModelErrors(np.full(shape, np.nan), share, scaled, fixed, within)
     power = np.cumsum(np.sum(found.measured**2, axis=1))
     part = np.minimum((PARTS * power / (power[-1] or 1.0)).astype(np.intp), PARTS - 1)
@@ -147,7 +162,7 @@ def _spread_by_range(
     band: Band, recording: Recording, windows: Windows
 ) -> tuple[Array, Array, Array]:
     """Return share, scaled and fixed of `ModelErrors`, (6, m, 2) each."""
-    size, count = np.abs(band.model.lagged_slip(recording)), len(AXLE_CHOSEN.centers)
+    size, count = np.abs(band.model.lagged_slip(recording)), len(CENTERS)
     within, v_x = ranges_of(size), np.tile(windows.mean(recording.v_x), count)
     share = np.array([windows.mean(1.0 * (within == k)) for k in range(count)])
     total = np.array([windows.mean(size * (within == k)) for k in range(count)])
@@ -163,8 +178,8 @@ def calibration(
     noise : variance of the sensors' white noise in them (2,).
     """
     factors, speeds = (
-        np.ones((2, len(AXLE_CHOSEN.centers))),
-        np.ones((2, len(AXLE_CHOSEN.at_speeds))),
+        np.ones((2, len(CENTERS))),
+        np.ones((2, len(AT_SPEEDS))),
     )
     for i in range(2):
         known = np.isfinite(errors.error[:, i])
@@ -174,9 +189,9 @@ def calibration(
         if not np.isfinite(everywhere):
             continue
         squares = np.array([_shared(*pair, everywhere) for pair in zip(needed, share, strict=True)])
-        factors[i] = CHOSEN.elsewhere * np.sqrt(squares)
-        needed = needed / np.maximum(squares[:, None], AXLE_CHOSEN.least_factor**2)
-        for k in range(len(AXLE_CHOSEN.at_speeds)):
+        factors[i] = _ELSEWHERE * np.sqrt(squares)
+        needed = needed / np.maximum(squares[:, None], LEAST_FACTOR**2)
+        for k in range(len(AT_SPEEDS)):
             mine = errors.within[known] == k
             speeds[i, k] = np.sqrt(_shared(needed[:, mine].ravel(), share[:, mine].ravel(), 1.0))
     if (factors == 1.0).all():
@@ -184,17 +199,17 @@ def calibration(
     color = [color_of(errors.error[:, i], windows) for i in range(2)]
     return replace(
         given,
-        factors=np.clip(factors, AXLE_CHOSEN.least_factor, AXLE_CHOSEN.most_factor),
-        speeds=np.clip(speeds, AXLE_CHOSEN.least_factor, AXLE_CHOSEN.most_factor),
+        factors=np.clip(factors, LEAST_FACTOR, MOST_FACTOR),
+        speeds=np.clip(speeds, LEAST_FACTOR, MOST_FACTOR),
         color=np.array(color),
     )
 
 
 def _shared(values: Array, share: Array, everywhere: float) -> float:
-    """Return the quantile of a range, `CHOSEN.shared` windows of all ranges counted in."""
+    """Return the quantile of a range, `_SHARED` windows of all ranges counted in."""
     here, count = quantile(values, share), float(share.sum())
     return (
-        (count * here + CHOSEN.shared * everywhere) / (count + CHOSEN.shared)
+        (count * here + _SHARED * everywhere) / (count + _SHARED)
         if np.isfinite(here)
         else everywhere
     )
@@ -208,7 +223,7 @@ def quantile(values: Array, share: Array) -> float:
     count = np.cumsum(share[order])
     total = float(count[-1]) if count.size else 0.0
     # As if one more window were farther out than all.
-    needed = LEVEL * (total + 1.0 / CHOSEN.independent)
+    needed = LEVEL * (total + 1.0 / _INDEPENDENT)
     at = int(np.searchsorted(count, needed))
     return float(values[order[at]]) if at < values.size else float("inf")
 
@@ -235,11 +250,7 @@ def color_of(error: Array, windows: Windows) -> float:
         if alike <= 0.0:
             break
         total += 2.0 * alike
-    return float(
-        np.clip(
-            total * windows.duration / Regression().correlation_time, 1.0, AXLE_CHOSEN.most_color
-        )
-    )
+    return float(np.clip(total * windows.duration / Regression().correlation_time, 1.0, MOST_COLOR))
 
 
 def _road_felt(history: History, part: Portion) -> Array | None:

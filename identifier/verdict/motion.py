@@ -14,16 +14,23 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from identifier.axle.car import Car, axle_impulse, car_numbers
 from identifier.tire_model import TireModel
-from identifier.verdict.chosen import CHOSEN
 from models.recordings import Recording
 from models.recordings.evidence import Windows
 from models.recordings.samples import white_noise
 from models.vehicle import GRAVITY, Vehicle
 
+WINDOW = 0.3  # T [s]: shorter ones show the noise of the sensors, longer ones no transient
+BRISK = 0.6  # speed in sqrt(g L) from which a window counts; slower, slip angles mean little
+FEWEST = 8  # windows, below which nothing can be said
+_SEGMENT = 0.3  # share of the windows that may be missed in one piece
+_REST_MISSED = 0.08  # of the force elsewhere, where a piece is missed
+_CONFINED = 0.6  # of what is missed with that piece, what the rest may miss
+_MOMENT = 0.2  # s, over which both are meant
+
 
 def brisk_windows(recording: Recording, min_speed: float) -> Windows:
     """Return windows of 0.3 s, half-overlapping, where a car is never slower than a speed [m/s]."""
-    return Windows.where(recording.v_x >= min_speed, recording, CHOSEN.window)
+    return Windows.where(recording.v_x >= min_speed, recording, WINDOW)
 
 
 def measured_force(
@@ -121,9 +128,9 @@ class Evidence:
         One segment may be missed, as before a sensor has settled, where all the rest is explained:
         it is left out. None is where all is explained, or more than one segment is missed.
         """
-        if (self.model_error <= CHOSEN.rest_missed).all():
+        if (self.model_error <= _REST_MISSED).all():
             return self, None
-        n = max(1, int(CHOSEN.segment * len(self.windows)))
+        n = max(1, int(_SEGMENT * len(self.windows)))
         size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
         residual = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
         total = np.concatenate([[0.0], np.cumsum(residual)])
@@ -131,9 +138,9 @@ class Evidence:
         last = first + n
         place = np.arange(len(self.windows))
         rest = self.where((place < first) | (place >= last))
-        most = min(CHOSEN.rest_missed, CHOSEN.confined * float(self.model_error.max()))
+        most = min(_REST_MISSED, _CONFINED * float(self.model_error.max()))
         confined = (rest.model_error <= most).all()
-        if len(rest.windows) >= CHOSEN.fewest and confined:
+        if len(rest.windows) >= FEWEST and confined:
             return rest, (first, last)
         return self, None
 
@@ -148,14 +155,14 @@ def clean_rms(signal: Array, noise: Array) -> Array:
 
 def brisk_from(model: TireModel) -> float:
     """Return the speed [m/s] from which a window counts."""
-    return max(model.min_speed, CHOSEN.brisk * model.vehicle.froude_speed)
+    return max(model.min_speed, BRISK * model.vehicle.froude_speed)
 
 
 def evidence(model: TireModel, recording: Recording, road: Array | None = None) -> Evidence | None:
     """Return what a model explains of a drive; None where too little of it is driven."""
     vehicle = model.vehicle
     windows = brisk_windows(recording, brisk_from(model))
-    if len(windows) < CHOSEN.fewest:
+    if len(windows) < FEWEST:
         return None
     return Evidence(
         windows=windows,
@@ -171,7 +178,7 @@ def evidence(model: TireModel, recording: Recording, road: Array | None = None) 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MotionError:
-    """What forces miss of the measured motion, root mean square of means over `CHOSEN.moment`.
+    """What forces miss of the measured motion, root mean square of means over `_MOMENT`.
 
     The noise of the sensors, another mass or inertia and a banked road are in it too: where it is
     small the forces are right, where it is large they need not be wrong.
@@ -198,7 +205,7 @@ def motion_error(
     force : lateral axle forces (n, 2) [N], frame of the body.
     counted : samples that count (n,); a window counts where all of its samples do, in one segment.
     """
-    windows = Windows.where(counted, recording, CHOSEN.moment, 1)
+    windows = Windows.where(counted, recording, _MOMENT, 1)
     if not len(windows):
         return None
     m, I_z, l_f, l_r = vehicle.bicycle[:4]

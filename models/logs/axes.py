@@ -14,9 +14,18 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from models.logs.chosen import CHOSEN
 from models.logs.log import Channel
 from models.logs.units import ACCELERATION, FACTORS, RATE, SPEED, is_given, quantities
+
+_STEP = 0.1  # [s] between instants
+_WINDOW = 0.3  # [s] over which means are taken there
+_MOST = 20_000  # instants
+_SLOW = 3.0  # [m/s]: slower samples tell nothing
+_CLEAR = 3.0  # times that the speed is larger than what is measured across it
+_SURE = 0.7  # correlation from which axes are known
+_LIKELY = 0.4  # correlation from which their signs are known
+_NEAR = 0.25  # share of gravity by which a mean of it may be off
+_TILT = 0.4  # share of it along another axis from which a box lies oblique
 
 _LETTERS = "xyz"
 _GRAVITY = FACTORS[ACCELERATION]["g"]
@@ -97,12 +106,12 @@ class _Grid:
         there = [seen[name].t for name in names if name in seen and seen[name].t.size > 1]
         begin = max((float(t[0]) for t in there), default=0.0)
         end = min((float(t[-1]) for t in there), default=0.0)
-        count = int(max(min((end - begin) / CHOSEN.step, CHOSEN.most), 0.0))
-        self.t = begin + CHOSEN.step * np.arange(count)
+        count = int(max(min((end - begin) / _STEP, _MOST), 0.0))
+        self.t = begin + _STEP * np.arange(count)
         self._seen, self._means = seen, dict[str, Array]()
 
     def __getitem__(self, name: str) -> Array:
-        """Return a channel at the instants, (n,); means over `CHOSEN.axes_window`."""
+        """Return a channel at the instants, (n,); means over `_WINDOW`."""
         if name not in self._means:
             self._means[name] = self._mean(name)
         return self._means[name]
@@ -115,7 +124,7 @@ class _Grid:
             return np.full(self.t.size, np.nan)
         steps = np.diff(t) * (values[1:] + values[:-1]) / 2.0
         total = np.concatenate([[0.0], np.cumsum(steps)])
-        half = CHOSEN.axes_window / 2.0
+        half = _WINDOW / 2.0
         low, high = (np.clip(self.t + side, t[0], t[-1]) for side in (-half, half))
         mean = np.interp(high, t, total) - np.interp(low, t, total)
         return np.asarray(mean / np.maximum(high - low, 1e-9))
@@ -187,7 +196,7 @@ def _forward(grid: _Grid, triad: Triad, v: Array | None) -> tuple[str, float] | 
     sizes = {letter: math.sqrt(float(np.nanmean(one**2))) for letter, one in values.items()}
     best = max(sizes, key=lambda letter: sizes[letter])
     second = sorted(sizes.values())[-2]
-    if best == "x" or sizes[best] < CHOSEN.axes_clear * second or not sizes[best] > 0.0:
+    if best == "x" or sizes[best] < _CLEAR * second or not sizes[best] > 0.0:
         return None
     if v is not None and _alike(np.abs(values[best]), v) < 0.0:
         return None
@@ -202,9 +211,9 @@ def _sideways(grid: _Grid, names: Sequence[str], v: Array, r: Array, a_y: Array)
     if not size or not slope:
         return []
     missed = lateral / slope - turning  # in the units of v r, which may be no SI: signs are asked
-    alike = {name: _alike(np.gradient(grid[name], CHOSEN.step), missed) for name in names}
+    alike = {name: _alike(np.gradient(grid[name], _STEP), missed) for name in names}
     best = max(alike, key=lambda name: abs(alike[name]))
-    if abs(alike[best]) < CHOSEN.axes_sure:
+    if abs(alike[best]) < _SURE:
         return []
     why = "its change is what ay has beside vx r"
     return [_Axis(best, "v_y", math.copysign(1.0, alike[best]), why)]
@@ -216,11 +225,11 @@ def _up(means: Mapping[str, float]) -> tuple[str, float]:
     "" where gravity is not in it, "?" where the box lies oblique.
     """
     size = math.sqrt(sum(one * one for one in means.values()))
-    if not any(abs(size / one - 1.0) < CHOSEN.axes_near for one in (1.0, _GRAVITY)):
+    if not any(abs(size / one - 1.0) < _NEAR for one in (1.0, _GRAVITY)):
         return "", 0.0
     best = max(means, key=lambda letter: abs(means[letter]))
     rest = math.sqrt(max(size * size - means[best] ** 2, 0.0))
-    return (best if rest < CHOSEN.tilt * size else "?"), math.copysign(1.0, means[best])
+    return (best if rest < _TILT * size else "?"), math.copysign(1.0, means[best])
 
 
 def _of_a_box(
@@ -233,7 +242,7 @@ def _of_a_box(
     steering: str,
 ) -> list[_Axis] | None:
     """Return what the channels of a box are; None where they are what their letters say."""
-    moving = v > CHOSEN.slow / 2.0 if np.nanmax(v) > CHOSEN.slow else np.ones(v.size, dtype=bool)
+    moving = v > _SLOW / 2.0 if np.nanmax(v) > _SLOW else np.ones(v.size, dtype=bool)
     values = {letter: grid[name] for letter, name in box.names.items()}
     turns = {} if gyro is None else {letter: grid[name] for letter, name in gyro.names.items()}
     if yaw_rate:
@@ -247,7 +256,7 @@ def _of_a_box(
         if along not in (about, up[0])
     }
     about, along = max(pairs, key=lambda pair: abs(pairs[pair]), default=("", ""))
-    if abs(pairs.get((about, along), 0.0)) < CHOSEN.axes_sure:
+    if abs(pairs.get((about, along), 0.0)) < _SURE:
         return None if up[0] in ("", "z") else []
     as_lettered = along == "y" and "z" in (about or "z", up[0] or "z")
     if as_lettered and (not up[1] or (up[1] > 0.0 and pairs[about, along] > 0.0)):
@@ -255,7 +264,7 @@ def _of_a_box(
     r = turns[about]
     sign = (up[1] or 1.0) if about else 1.0
     steers = _alike((v * grid[steering])[moving], r[moving]) if about and steering else 0.0
-    if abs(steers) > CHOSEN.likely:
+    if abs(steers) > _LIKELY:
         sign = math.copysign(1.0, steers)
     axes = []
     if about and gyro is not None:
@@ -264,8 +273,8 @@ def _of_a_box(
     axes.append(_Axis(box.names[along], "a_y", side, f"along {along} it goes as vx r"))
     vertical = about or up[0]
     left = next(one for one in _LETTERS if one not in (along, vertical))
-    change = _alike(np.gradient(v, CHOSEN.step)[moving], values[left][moving])
-    if vertical and abs(change) > CHOSEN.likely:
+    change = _alike(np.gradient(v, _STEP)[moving], values[left][moving])
+    if vertical and abs(change) > _LIKELY:
         why = f"along {left} it goes as the change of the speed"
         axes.append(_Axis(box.names[left], "a_x", math.copysign(1.0, change), why))
     return axes

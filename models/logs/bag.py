@@ -23,6 +23,7 @@ from codegen.arrays import Array
 from models.limits import limits
 from models.logs.cdr import (
     ORDERS,
+    PREFIX,
     CdrError,
     Definitions,
     Field,
@@ -32,7 +33,6 @@ from models.logs.cdr import (
     layout_of,
     numbers,
 )
-from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.growing import Growing
@@ -40,6 +40,12 @@ from models.logs.log import Listed, RecordingError, dense, few
 from models.logs.magic import BAG_METADATA, MCAP, ROS1, SQLITE
 from models.logs.stamps import typical_rate
 from models.schema import CHUNK, most_unpacked, read_text
+
+_NS = 1e9  # in a second
+_OTHER_CLOCK = 3600  # seconds between stamps and the bag's own time, above which these differ
+_PROBED_MESSAGES = 20  # messages that a rate is taken from
+_MESSAGES_AT_ONCE = 2048  # messages that are read at a time
+_MOST_BYTES = 1 << 24  # of messages that are read at a time, at most
 
 _STAMPS = ("header.stamp.", "stamp.")
 _TIME = ("sec", "nanosec")
@@ -86,7 +92,7 @@ def open_(path: Path) -> GroupedLog[_Place]:
     zero = min((topic.zero for topic in topics if topic.stamp), default=first)
     found: list[tuple[str, Listed, _Place]] = [
         (_TF, Listed(name=f"{one.name}/{field}", unit="m" * (k < 3), samples=one.t.size,
-                    rate=typical_rate((one.t - one.t[0]) / CHOSEN.ns)), (one, k))
+                    rate=typical_rate((one.t - one.t[0]) / _NS)), (one, k))
         for one in moving
         for k, field in enumerate(_OF_TF)
     ]  # fmt: skip
@@ -125,9 +131,7 @@ def _samples(
             frames.setdefault(moving.name, (moving, {}))[1][listed.name] = moving.values[:, k]
         else:
             fields.setdefault(place[0], {})[listed.name] = place[1]
-    done = [
-        Samples(one.name, (one.t - zero) / CHOSEN.ns, values) for one, values in frames.values()
-    ]
+    done = [Samples(one.name, (one.t - zero) / _NS, values) for one, values in frames.values()]
     readings = {
         topic.name: _Reading(path, definitions, topic, some) for topic, some in fields.items()
     }
@@ -159,13 +163,13 @@ def _transforms(raw: bytes) -> Iterator[tuple[str, int, tuple[float, ...]]]:
     """Yield the transforms of a message: parent to child, stamp [ns], translation and rotation.
     It is a sequence of: seconds, nanoseconds, name of the parent, name of the child, 7 doubles.
     """
-    order, place = ORDERS.get(bytes(raw[:2])), CHOSEN.prefix
+    order, place = ORDERS.get(bytes(raw[:2])), PREFIX
     if order is None:
         raise CdrError("a message is not plain CDR")
 
     def read(form: str, size: int) -> tuple[Any, ...]:
         nonlocal place
-        place += -(place - CHOSEN.prefix) % size
+        place += -(place - PREFIX) % size
         values = struct.unpack_from(order + form, raw, place)
         place += struct.calcsize(order + form)
         return values
@@ -273,7 +277,7 @@ def _topics(
     both = [(topic.zero, first) for topic, first in found if topic.stamp is not None]
     zero = min((first for _, first in found), default=0)
     of_stamps = min((one for one, _ in both), default=zero)
-    if not any(abs(one - first) > CHOSEN.other_clock * CHOSEN.ns for one, first in both):
+    if not any(abs(one - first) > _OTHER_CLOCK * _NS for one, first in both):
         zero = of_stamps = min(zero, of_stamps)
     topics = [one._replace(zero=zero if one.stamp is None else of_stamps) for one, _ in found]
     return topics, rates, skipped
@@ -285,7 +289,7 @@ def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int 
     """
     received: list[int] = []
     stamps: list[int] = []
-    for _, time, raw in islice(_messages(bag, [topic]), CHOSEN.probed_messages):
+    for _, time, raw in islice(_messages(bag, [topic]), _PROBED_MESSAGES):
         try:
             layout = layout_of(definitions, topic.kind, raw)
         except CdrError:
@@ -299,7 +303,7 @@ def _first(bag: Any, definitions: Definitions, topic: _Topic) -> tuple[int, int 
         raise CdrError("it holds no message")
     first = stamps[0] if stamps else 0
     times = np.array(stamps if first else received, dtype=np.int64)
-    return received[0], first or None, typical_rate((times - times[0]) / CHOSEN.ns)
+    return received[0], first or None, typical_rate((times - times[0]) / _NS)
 
 
 def _messages(bag: Any, topics: Sequence[_Topic]) -> Iterator[tuple[str, int, bytes]]:
@@ -328,7 +332,7 @@ class _Reading:
         self.times.append(time)
         self.raws.append(raw)
         self.bytes += len(raw)
-        if len(self.raws) == CHOSEN.messages_at_once or self.bytes > CHOSEN.most_bytes:
+        if len(self.raws) == _MESSAGES_AT_ONCE or self.bytes > _MOST_BYTES:
             self._read()
 
     def _read(self) -> None:
@@ -355,7 +359,7 @@ class _Reading:
                 f"{self.path}: {self.topic.name} must have {self.topic.messages} messages, it has "
                 f"{len(self.clock)}; was the bag cut off?"
             )
-        t = (self.clock.finished() - self.topic.zero) / CHOSEN.ns
+        t = (self.clock.finished() - self.topic.zero) / _NS
         values = {name: one.finished() for name, one in self.parts.items()}
         return Samples(self.topic.name, t, values)
 

@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 from codegen.arrays import Array, blocks, filled
 from codegen.escape import shown
 from models.limits import limits
-from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples
 from models.logs.growing import Growing
@@ -35,6 +34,17 @@ from models.logs.magic import HEAD, frames_in
 from models.logs.mdf import is_bus, opened
 from models.logs.stamps import nanoseconds, since, typical_rate
 from models.schema import LONGEST_NAME, read_bytes
+
+_FRAMES_AT_ONCE = 1 << 16  # frames that are stored at a time
+_SHORT = 0x7FF  # largest identifier of 11 bits
+_IDENTIFIER = (1 << 29) - 1  # mask of the 29 bits of the longest identifier
+_INFLATION = 1032  # most bytes that deflate makes of one
+_CONTAINER = 10  # kind of an object of a BLF that holds others
+_DEFLATED = 2  # way in which one is packed that is read: by zlib
+_FROM_ALL = 0xFE  # address that a database of J1939 gives where any may send
+_FLOATS = (16, 32, 64)  # bits of a signal that is a float
+_LONGEST_SIGNAL = 64  # bits
+CALENDAR = 1e8  # [s]: times above count from 1970
 
 _FRAME = "CAN_DataFrame"  # of MDF
 _NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
@@ -89,7 +99,7 @@ class _Gathered:
     def add(self, time: float, data: bytes) -> None:
         self._times.append(time)
         self._bytes += data[: self.width]
-        if len(self._times) == CHOSEN.frames_at_once:
+        if len(self._times) == _FRAMES_AT_ONCE:
             self._store()
 
     def extend(self, times: Array, data: NDArray[np.uint8]) -> None:
@@ -131,11 +141,11 @@ def _gather(path: Path, kind: str, given: _Dbc) -> _Log:
                 found[key] = _Gathered(known.length)
             found[key].add(message.timestamp, message.data)
             count += 1
-            if count % CHOSEN.frames_at_once == 0:
+            if count % _FRAMES_AT_ONCE == 0:
                 few(path, count, "samples", "frames")
     frames = {key: one.finished() for key, one in found.items()}
     first = min((float(kept.t.min()) for kept in frames.values()), default=0.0)
-    if first > CHOSEN.calendar:
+    if first > CALENDAR:
         for key, kept in frames.items():
             frames[key] = kept._replace(t=since(kept.t, first))
     return frames, others
@@ -240,14 +250,14 @@ def _of_table(path: Path) -> Iterator[_Frame]:
                 # SavvyCAN counts whole microseconds, all others seconds.
                 time = float(cell) * (1e-6 if many and "." not in cell else 1.0)
                 given = row[at["long"]].strip().lower() if at["long"] >= 0 else ""
-                extended = given in ("true", "1") if given else identifier > CHOSEN.short
+                extended = given in ("true", "1") if given else identifier > _SHORT
                 bus = row[at["bus"]].strip() if at["bus"] >= 0 else "0"
             except (ValueError, IndexError):
                 raise RecordingError(
                     f"{path}: line {number} must hold a frame: time, identifier and bytes in "
                     f"hexadecimal, not {shown(','.join(row))}"
                 ) from None
-            yield _Frame(time, identifier & CHOSEN.identifier, data, bus, extended)
+            yield _Frame(time, identifier & _IDENTIFIER, data, bus, extended)
 
 
 def _require_whole_blf(path: Path) -> None:
@@ -265,10 +275,10 @@ def _require_whole_blf(path: Path) -> None:
             if signature != b"LOBJ" or length < _OBJECT.size or length > size:
                 return  # the reader says so
             body = length - _OBJECT.size
-            if kind == CHOSEN.container and body * CHOSEN.inflation > most:
+            if kind == _CONTAINER and body * _INFLATION > most:
                 data = file.read(body)
                 size_of = len(data) - _METHOD.size
-                if size_of > 0 and _METHOD.unpack_from(data)[0] == CHOSEN.deflated:
+                if size_of > 0 and _METHOD.unpack_from(data)[0] == _DEFLATED:
                     unpacked = zlib.decompressobj().decompress(data[_METHOD.size :], int(most) + 1)
                     size_of = len(unpacked)
                 few(path, size_of / 1e6, "block", "megabytes of a block")
@@ -293,8 +303,8 @@ def _of_mdf(path: Path, given: _Dbc) -> _Log:
                 known_others = {name.partition(".")[0] for name in names} & set(_NO_DATA)
                 others["error and remote" if known_others else "other"] += samples
                 continue
-            for first in range(0, samples, CHOSEN.frames_at_once):
-                count = min(CHOSEN.frames_at_once, samples - first)
+            for first in range(0, samples, _FRAMES_AT_ONCE):
+                count = min(_FRAMES_AT_ONCE, samples - first)
                 _add_part(file, names, number, slice(first, first + count), given, found, others)
     frames = {key: one.finished() for key, one in found.items()}
     for key, (t, data) in frames.items():
@@ -332,8 +342,8 @@ def _add_part(
     identifiers = signal("ID")
     data = np.asarray(signal("DataBytes").samples, dtype=np.uint8).reshape(count, -1)
     raw = identifiers.samples.astype(np.int64)
-    ids = raw & CHOSEN.identifier
-    is_long = whole("IDE", (raw & _EXTENDED != 0) | (ids > CHOSEN.short)) != 0
+    ids = raw & _IDENTIFIER
+    is_long = whole("IDE", (raw & _EXTENDED != 0) | (ids > _SHORT)) != 0
     ids, buses = np.where(is_long, ids | _EXTENDED, ids), whole("BusChannel", 0)
     sizes = np.minimum(whole("DataLength", data.shape[1]), data.shape[1])
     t = np.asarray(identifiers.timestamps, dtype=np.float64)
@@ -490,16 +500,16 @@ def _read_dbc(path: Path) -> _Dbc:
     groups = {
         _group_of(key): key
         for key, one in messages.items()
-        if key & _EXTENDED and (j1939 or one.protocol == "j1939" or key & 0xFF == CHOSEN.from_all)
+        if key & _EXTENDED and (j1939 or one.protocol == "j1939" or key & 0xFF == _FROM_ALL)
     }
     return _Dbc(messages, groups, faults)
 
 
 def _fault(message: Any, signal: Any) -> str:
     """Return the rule that a signal breaks, with the value; "" where it breaks none."""
-    sizes = CHOSEN.floats if signal.is_float else range(1, CHOSEN.longest_signal + 1)
+    sizes = _FLOATS if signal.is_float else range(1, _LONGEST_SIGNAL + 1)
     if signal.length not in sizes:
-        allowed = "16, 32 or 64" if signal.is_float else f"1 to {CHOSEN.longest_signal}"
+        allowed = "16, 32 or 64" if signal.is_float else f"1 to {_LONGEST_SIGNAL}"
         return f"must have {allowed} bits, it has {signal.length}"
     _, end = _bytes_of(signal)
     return "" if end <= message.length else f"lies beyond its frame of {message.length} bytes"

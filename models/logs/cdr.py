@@ -14,7 +14,12 @@ from numpy.typing import NDArray
 
 from codegen.errors import TireidError
 from models.limits import limits
-from models.logs.chosen import CHOSEN
+
+PREFIX = 4  # bytes
+_BASE = 1  # kind of a node of a definition: a number or text
+_NAME = 2  # likewise: another definition
+_ARRAY = 3  # likewise: of a fixed length
+_SEQUENCE = 4  # likewise: of any length
 
 ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
 # numpy's kind and bytes of what has a fixed size; no signals are what is given by a bool, or words.
@@ -62,11 +67,11 @@ def fields_of(
     for name, node in _fields(definitions, kind, len(owners)):
         inner = (*owners, (kind, name))
         number, value = _kind(node), node[1]
-        if number == CHOSEN.name:
+        if number == _NAME:
             yield from fields_of(definitions, value, f"{prefix}{name}.", inner)
-        elif number == CHOSEN.base and value[0] in _NUMBERS:
+        elif number == _BASE and value[0] in _NUMBERS:
             yield Field(prefix + name, inner, _NUMBERS[value[0]])
-        elif number in (CHOSEN.array, CHOSEN.sequence) and _kind(value[0]) == CHOSEN.name:
+        elif number in (_ARRAY, _SEQUENCE) and _kind(value[0]) == _NAME:
             list(fields_of(definitions, value[0][1], "", inner))  # it must be known, too
 
 
@@ -76,7 +81,7 @@ def layout_of(definitions: Definitions, kind: str, raw: bytes) -> Layout:
         raise CdrError("a message is not plain CDR")
     walk = _Walk(definitions, order, raw)
     walk.message(kind, "", 0)
-    if walk.place + CHOSEN.prefix > len(raw):
+    if walk.place + PREFIX > len(raw):
         raise CdrError(f"a message of {kind} is cut off")
     return Layout(order, len(raw), tuple(walk.lengths), walk.places)
 
@@ -112,17 +117,17 @@ class _Walk:
         for name, node in _fields(self.definitions, kind, depth):
             path = None if prefix is None else prefix + name
             number, value = _kind(node), node[1]
-            if number in (CHOSEN.base, CHOSEN.name):
+            if number in (_BASE, _NAME):
                 self.one(node, path, depth)
             else:
-                count = value[1] if number == CHOSEN.array else self.length()
+                count = value[1] if number == _ARRAY else self.length()
                 self.many(value[0], count, depth)
 
     def one(self, node: Any, path: str | None, depth: int) -> None:
         number, value = _kind(node), node[1]
-        if number == CHOSEN.name:
+        if number == _NAME:
             self.message(value, None if path is None else f"{path}.", depth + 1)
-        elif number != CHOSEN.base:
+        elif number != _BASE:
             raise CdrError("a definition has arrays of arrays")
         elif value[0] == "string":
             length = self.length()  # moves the place, too
@@ -130,16 +135,16 @@ class _Walk:
         else:
             size = self.align(value[0])
             if path is not None:
-                self.places[path] = self.place + CHOSEN.prefix
+                self.places[path] = self.place + PREFIX
             self.place += size
-        if self.place + CHOSEN.prefix > len(self.raw):
+        if self.place + PREFIX > len(self.raw):
             raise CdrError("a message is cut off")
 
     def many(self, node: Any, count: int, depth: int) -> None:
         """Go through the values of an array or a sequence."""
         if count > len(self.raw):
             raise CdrError("a message is cut off")
-        if _kind(node) == CHOSEN.base and node[1][0] != "string":
+        if _kind(node) == _BASE and node[1][0] != "string":
             if count:
                 size = self.align(node[1][0])  # moves the place, too
                 self.place += count * size
@@ -157,7 +162,7 @@ class _Walk:
 
     def length(self) -> int:
         self.align("uint32")
-        place = self.place + CHOSEN.prefix
+        place = self.place + PREFIX
         if place + 4 > len(self.raw):
             raise CdrError("a message is cut off")
         value = int(struct.unpack_from(self.order + "I", self.raw, place)[0])

@@ -19,9 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, blocks, filled, large
-from models.logs.chosen import CHOSEN
+from models.logs.can import CALENDAR
 from models.logs.log import Channel, RecordingError
 from models.logs.stamps import not_rising, since
+
+_GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
+_OWN_CLOCK = 0.4  # share of empty cells from which a channel is taken to be slower than its rows
+_ON_STEP = 0.01  # share of a step within which an instant is that of a sample
 
 
 class Segment(NamedTuple):
@@ -49,7 +53,7 @@ def holes(channel: Channel) -> NDArray[np.intp]:
     Where 40 % are empty, or all, there are none: it is a slower channel in a table, or nothing.
     """
     empty = np.flatnonzero(np.isnan(channel.values))
-    return empty if empty.size < CHOSEN.own_clock * channel.values.size else empty[:0]
+    return empty if empty.size < _OWN_CLOCK * channel.values.size else empty[:0]
 
 
 def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
@@ -67,7 +71,7 @@ def gaps(t: Array, longest: float) -> NDArray[np.intp]:
     """Return the index of each sample that comes after a gap.
     t : rising time stamps [s], (n,).   longest : time without a sample that is none yet [s].
     """
-    limit = max(longest * (1.0 + 1e-6), CHOSEN.gap_intervals * typical_step(t))
+    limit = max(longest * (1.0 + 1e-6), _GAP_INTERVALS * typical_step(t))
     found = [
         part.start + 1 + np.flatnonzero(np.diff(t[part.start : part.stop + 1]) > limit)
         for part in blocks(max(t.size - 1, 0))
@@ -103,7 +107,7 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Seg
     longest : time without a sample that is no gap yet [s].
     """
     zero = min(float(raw.t[0]) for raw in raws.values())
-    if zero > CHOSEN.calendar:
+    if zero > CALENDAR:
         times = {id(raw.t): since(raw.t, zero) for raw in raws.values()}
         near = {name: raw._replace(t=times[id(raw.t)]) for name, raw in raws.items()}
         return [_later(one, zero) for one in on_one_clock(near, dt, longest)]
@@ -140,7 +144,7 @@ def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]
     for t in times:
         cuts = gaps(t, longest)
         first = t[np.concatenate([[0], cuts])]
-        last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - CHOSEN.on_step) * _interval(t)
+        last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - _ON_STEP) * _interval(t)
         own = list(zip(first.tolist(), last.tolist(), strict=True))
         found, i, j = [], 0, 0
         while i < len(spans) and j < len(own):
@@ -166,16 +170,16 @@ def sampled(raw: Raw, grid: Array, dt: float) -> Array:
 
 def _sampled(raw: Raw, grid: Array, dt: float, interval: float) -> Array:
     """Return the same at some instants, of a signal with a typical interval [s]."""
-    last = np.searchsorted(raw.t, grid + CHOSEN.on_step * dt, side="right") - 1
+    last = np.searchsorted(raw.t, grid + _ON_STEP * dt, side="right") - 1
     if interval < dt / 1.5:
-        first = np.searchsorted(raw.t, grid - dt + CHOSEN.on_step * dt, side="right")
+        first = np.searchsorted(raw.t, grid - dt + _ON_STEP * dt, side="right")
         first, begin = np.minimum(first, last), min(int(first[0]), int(last[0]))
         total = np.concatenate([[0.0], np.cumsum(raw.values[begin : int(last[-1]) + 1])])
         return np.asarray((total[last + 1 - begin] - total[first - begin]) / (last + 1 - first))
     before = np.maximum(last - 1, 0)
     now, step = raw.values[last], raw.t[last] - raw.t[before]
     ahead = np.maximum(grid - raw.t[last], 0.0)
-    goes_on = (last > 0) & (step <= CHOSEN.gap_intervals * interval) & (ahead > CHOSEN.on_step * dt)
+    goes_on = (last > 0) & (step <= _GAP_INTERVALS * interval) & (ahead > _ON_STEP * dt)
     share = np.minimum(ahead, step) / np.where(step > 0.0, step, 1.0)
     return np.where(goes_on, now + share * (now - raw.values[before]), now)
 

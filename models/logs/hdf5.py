@@ -11,12 +11,14 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array
-from models.logs.chosen import CHOSEN
 from models.logs.foreign import need
 from models.logs.grouped import require_room
 from models.logs.log import few
 from models.logs.tree import Leaf, Tree, Unread
 from models.schema import swells
+
+_LONGEST_TEXT = 1_000_000  # bytes of all texts of a dataset
+_MOST_TEXTS = 10_000  # of a dataset
 
 _OWN = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
 
@@ -100,14 +102,14 @@ class _Reader:
 
     def text(self, node: Any, is_numbers: bool) -> Tree:
         read_at_once = max(node.size, _chunk(node)) * node.dtype.itemsize
-        if read_at_once > CHOSEN.longest_text or (not is_numbers and node.size > CHOSEN.most_texts):
+        if read_at_once > _LONGEST_TEXT or (not is_numbers and node.size > _MOST_TEXTS):
             return Unread("a long text")
         if is_numbers:
             codes = np.asarray(node[()])
             rows = [codes] if codes.ndim < 2 else list(codes.T)
             words: list[Tree] = ["".join(chr(int(one)) for one in row) for row in rows]
         else:
-            words, left = [], CHOSEN.longest_text
+            words, left = [], _LONGEST_TEXT
             for place in np.ndindex(node.shape):  # many may refer to one that is long
                 one = node[place]
                 words.append(

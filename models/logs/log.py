@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from codegen.errors import TireidError
 from codegen.escape import shown, visible
-from models.logs.chosen import CHOSEN
 from models.schema import require_dense, require_few
+
+_SOME = 12  # names in a message
+_LONGEST = 200  # characters of them
 
 _T = TypeVar("_T")
 
@@ -153,8 +155,8 @@ def one_run(path: Path, runs: Sequence[str], run: str | None) -> str | None:
     return runs[0] if run is None else run
 
 
-def some(names: Sequence[str], most: int = CHOSEN.some) -> str:
+def some(names: Sequence[str], most: int = _SOME) -> str:
     """Return names for a message, the first of many, on one line."""
     listing = visible(", ".join(names[:most]))
-    cut = len(names) > most or len(listing) > CHOSEN.longest
-    return listing[: CHOSEN.longest] + (f", ... ({len(names)})" if cut else "")
+    cut = len(names) > most or len(listing) > _LONGEST
+    return listing[:_LONGEST] + (f", ... ({len(names)})" if cut else "")

@@ -17,12 +17,20 @@ import numpy as np
 
 from codegen.arrays import Array, filled
 from models.limits import limits
-from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples, noted, require_room
 from models.logs.log import Listed, RecordingError, dense, few
 from models.logs.stamps import typical_rate
 from models.schema import LONGEST_NAME
+
+_FORMULA_4 = 3  # kind of conversion of MDF 4 that is a formula
+_FORMULA_3 = 10  # the same of MDF 3
+_VALUES = (0, 6)  # types of a channel that holds numbers
+_TIME = 1  # type of a master that counts seconds
+_NUMBERS_AT_ONCE = 1 << 23  # numbers that are read at a time
+_PROBED_SAMPLES = 200  # samples of a clock that its rate is taken from
+_MOST_BLOCKS = 1_000_000  # of data
+_BUS_EVENT = 1 << 1  # flag of a group of channels that holds frames of a bus
 
 _NUMERIC_4, _NUMERIC_3 = frozenset(range(6)), frozenset((0, 1, 2, 3, *range(9, 17)))
 _WORDS_4, _WORDS_3 = frozenset((7, 8, 9, 10, 11)), frozenset((11, 12))
@@ -56,7 +64,7 @@ def _samples(path: Path, asked: Sequence[_Asked]) -> list[Samples]:
     found = []
     with opened(path, "MDF") as file:
         for mine in groups.values():  # as many channels at a time as the memory takes
-            several = max(1, CHOSEN.numbers_at_once // max(mine[0][0].samples, 1))
+            several = max(1, _NUMBERS_AT_ONCE // max(mine[0][0].samples, 1))
             values: dict[str, Array] = {}
             for k in range(0, len(mine), several):
                 t = _read(path, file, mine[k : k + several], values)
@@ -100,11 +108,11 @@ def open_(path: Path) -> GroupedLog[_Place]:
             samples, master = int(about.cycles_nr), file.masters_db.get(number)
             # Other masters are angles, distances or counts.
             clock = master is not None and (
-                not is_4 or int(group.channels[master].sync_type) in (0, CHOSEN.time)
+                not is_4 or int(group.channels[master].sync_type) in (0, _TIME)
             )
             rate = float("nan")
             if clock and samples:
-                probed = min(samples, CHOSEN.probed_samples)
+                probed = min(samples, _PROBED_SAMPLES)
                 t = file.get_master(number, record_offset=0, record_count=probed)
                 rate = typical_rate(np.asarray(t, dtype=np.float64))
             for index, channel in enumerate(group.channels):
@@ -134,7 +142,7 @@ def _kind(group: Any, index: int, is_4: bool) -> str:
     channel = group.channels[index]
     if group.channel_dependencies[index]:
         return "array"
-    if (is_4 and int(channel.channel_type) not in CHOSEN.values) or channel.data_type not in (
+    if (is_4 and int(channel.channel_type) not in _VALUES) or channel.data_type not in (
         _NUMERIC_4 if is_4 else _NUMERIC_3
     ):
         return "word"
@@ -145,7 +153,7 @@ def _kind_of_conversion(conversion: Any, is_4: bool) -> str:
     if conversion is None:
         return "number"
     kind = int(conversion.conversion_type)
-    if kind == (CHOSEN.formula_4 if is_4 else CHOSEN.formula_3):
+    if kind == (_FORMULA_4 if is_4 else _FORMULA_3):
         raw = conversion.formula
         text = raw.decode("latin-1").strip(" \0") if isinstance(raw, bytes) else str(raw)
         return "number" if _FORMULA.fullmatch(text) else "formula"
@@ -185,7 +193,7 @@ def _numbers(path: Path, name: str, samples: Any) -> Array:
 
 def is_bus(group: Any) -> bool:
     """Whether a group of channels of an MDF4 file holds frames of a bus."""
-    return bool(int(group.channel_group.flags) & CHOSEN.bus_event)
+    return bool(int(group.channel_group.flags) & _BUS_EVENT)
 
 
 class _Form(NamedTuple):
@@ -275,7 +283,7 @@ def _require_fitting(path: Path, group: Any, is_4: bool) -> None:
         dense(path, total, packed, "groups of channels")
         here = group.data_location == 0
         if (
-            number > CHOSEN.most_blocks
+            number > _MOST_BLOCKS
             or total > 1e6 * limits().megabytes
             or (here and int(block.address) + stored > file_size)
         ):

@@ -21,7 +21,6 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.logs.axes import Triad, along_axes, triads
-from models.logs.chosen import CHOSEN
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import BETA, COLUMNS, POSE, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import unit_in_name, without_ending
@@ -39,6 +38,21 @@ from models.logs.units import (
     to_si,
     unit_of_range,
 )
+
+SURE = 0.8  # confidence from which a proposal is used without being declared
+_STANDARD = 1.0  # confidence in our own name of a channel
+_KNOWN = 0.95  # confidence in the name that a logger gives
+_NAMES_WORDS = 0.9  # confidence in the words of a name
+_VAGUE = 0.82  # confidence in one such word
+HINT = 0.5  # a word of the name beside a unit that fits: named, never taken
+_NO_UNIT_LOSS = 0.25  # of confidence, where neither file nor name tells the unit
+_FILTERED_LOSS = 0.08  # of confidence, so that the channel that was filtered stands back
+STILL = 0.25  # of confidence that is left to a channel that never changes
+_APART = 0.04  # of confidence: nearer ones are equal
+_LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
+_LOOKED_AT = 20_000  # samples at most, in telling contents apart
+_SPIKES = 1e-3  # share of samples that say nothing of the unit
+_SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 _HAND = "steering wheel"  # an angle that wants a ratio
 # Units that are met where none is given, "" SI.
@@ -166,7 +180,7 @@ class Proposal:
         return (
             guess is not None
             and name not in self.rivals
-            and guess.confidence >= CHOSEN.names_sure
+            and guess.confidence >= SURE
             and not guess.hand
         )
 
@@ -222,10 +236,10 @@ def _name_confidence(signal: str, name: str) -> float:
     """
     ours = (COLUMNS.get(signal, signal), signal)
     if name in ours:
-        return CHOSEN.standard
+        return _STANDARD
     listed = _words_of(name)
     if signal in WHEELS:
-        return CHOSEN.words if _wheel_words(signal, listed) else 0.0
+        return _NAMES_WORDS if _wheel_words(signal, listed) else 0.0
     while name.startswith("/") and len(listed) > 1 and listed[-1] in _GENERIC:
         listed = listed[:-1]
     rule, words = _RULES[signal], _with_parts(listed)
@@ -234,17 +248,17 @@ def _name_confidence(signal: str, name: str) -> float:
         listed = listed[:-1]
         ends += ["".join(listed[k:]) for k in range(len(listed))]
     if rule.known & {ends[0], "".join(listed)}:
-        return CHOSEN.known
+        return _KNOWN
     if _with_parts(_words_of(_field(name))).union(ends) & rule.never:
         return 0.0
     if (
         len(ends) > 1 and name[-2:-1] not in "./" and name[-1:] != "v"
     ):  # the R of "M_Mtr_D2_R" is a side, or anything
         ends = [end for end in ends if len(end) > 1]
-    loss = CHOSEN.filtered_loss if words & _FILTERED else 0.0
+    loss = _FILTERED_LOSS if words & _FILTERED else 0.0
     if rule.known & set(ends) or any(_matches(group, words) for group in rule.words):
-        return CHOSEN.words - loss
-    return CHOSEN.vague if rule.vague & set(ends) else 0.0
+        return _NAMES_WORDS - loss
+    return _VAGUE if rule.vague & set(ends) else 0.0
 
 
 def _is_hint(signal: str, one: Heading) -> bool:
@@ -285,7 +299,7 @@ def propose(
         ranked = sorted((one for one in found if one.confidence > 0.0), key=_rank)
         if not ranked:
             continue
-        hand, least = _rank(ranked[0])[0], ranked[0].confidence - CHOSEN.apart
+        hand, least = _rank(ranked[0])[0], ranked[0].confidence - _APART
         equal = [one for one in ranked if one.confidence > least and _rank(one)[0] == hand]
         if len(equal) > 1:
             equal.sort(key=lambda one: -_rate(seen[one.channel[0]]))
@@ -324,9 +338,9 @@ def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     if not measured:
         return {}
     some = whole[measured[0]]
-    sure = CHOSEN.known if len(measured) == 1 else CHOSEN.hint
+    sure = _KNOWN if len(measured) == 1 else HINT
     why = "" if len(measured) == 1 else "there are several poses"
-    lost = CHOSEN.no_unit_loss if measured[0] and not is_given(some["x"].unit) else 0.0
+    lost = _NO_UNIT_LOSS if measured[0] and not is_given(some["x"].unit) else 0.0
     turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
     turned = [some["h"].name] if "h" in some else turned[-2:] if len(turned) < 4 else turned
     angle = some["h"].unit if "h" in some else ""
@@ -378,7 +392,7 @@ def _along_axes(
     found = along_axes(boxes, seen, speed, best("r"), best("a_y"), best("delta_f"))
     mended = {
         name: [
-            replace(_said(one, _OBLIQUE), confidence=min(one.confidence, CHOSEN.hint))
+            replace(_said(one, _OBLIQUE), confidence=min(one.confidence, HINT))
             if found.oblique & set(one.channel)
             else one
             for one in some
@@ -388,7 +402,7 @@ def _along_axes(
     }
     for one in found.axes:
         unit = units[one.name].strip()
-        sure = CHOSEN.known - (0.0 if is_given(unit) else CHOSEN.no_unit_loss)
+        sure = _KNOWN - (0.0 if is_given(unit) else _NO_UNIT_LOSS)
         mended[one.signal].append(
             Guess(channel=(one.name,), confidence=sure, unit=unit, factor=one.factor, why=one.why)
         )
@@ -398,12 +412,12 @@ def _along_axes(
 def _likeliest(found: Sequence[Guess]) -> str:
     """Return the channel of the surest guess; "" where there is none."""
     likely = max(found, key=lambda one: one.confidence, default=None)
-    return likely.channel[0] if likely and likely.confidence > CHOSEN.still else ""
+    return likely.channel[0] if likely and likely.confidence > STILL else ""
 
 
 def _rank(guess: Guess) -> tuple[bool, float]:
     """Return what guesses are sorted by: a clear one that needs no ratio first, then the surest."""
-    return guess.hand or guess.confidence < CHOSEN.words, -guess.confidence
+    return guess.hand or guess.confidence < _NAMES_WORDS, -guess.confidence
 
 
 def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -> bool:
@@ -422,7 +436,7 @@ def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -
     here, beside = (
         x * scale for x, scale in zip((first.values[good], beside), scales, strict=True)
     )
-    return _root_mean_square(here - beside) <= CHOSEN.same * _root_mean_square(here)
+    return _root_mean_square(here - beside) <= _SAME * _root_mean_square(here)
 
 
 def _rate(channel: Channel) -> float:
@@ -463,8 +477,8 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
             )  # fmt: skip
         elif _is_hint(signal, one):
             unit, why = one.unit.strip(), "by a word of its name and its unit"
-            found.append(Guess(channel=(one.name,), confidence=CHOSEN.hint, unit=unit, why=why))
-    if signal in _PER_WHEEL and all(one.hand or one.confidence < CHOSEN.words for one in found):
+            found.append(Guess(channel=(one.name,), confidence=HINT, unit=unit, why=why))
+    if signal in _PER_WHEEL and all(one.hand or one.confidence < _NAMES_WORDS for one in found):
         found += _pairs(signal, listed)
     return found
 
@@ -477,9 +491,9 @@ def _with_given_unit(one: Heading) -> Heading:
 def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
     quantity = quantity_of(signal, one.unit)
     if not is_given(one.unit):
-        if guess.confidence == CHOSEN.standard:  # names of ours are in SI, as the documents say
+        if guess.confidence == _STANDARD:  # names of ours are in SI, as the documents say
             return guess
-        loss = guess.confidence - CHOSEN.no_unit_loss
+        loss = guess.confidence - _NO_UNIT_LOSS
         return replace(guess, confidence=loss, why="no unit in the file")
     possible, unit = quantities(one.unit), one.unit.strip()
     if quantity in possible:
@@ -519,7 +533,7 @@ def _pairs(signal: str, listed: Sequence[Heading]) -> list[Guess]:
             right = by_corner.get((second, rest))
             named = any(_matches(group, rest) for group in _PER_WHEEL[signal])
             if corner == first and right is not None and named:
-                guess = Guess(channel=(left.name, right.name), confidence=CHOSEN.words)
+                guess = Guess(channel=(left.name, right.name), confidence=_NAMES_WORDS)
                 pairs.append(_said(_with_unit(signal, left, guess), why))
     return pairs
 
@@ -535,25 +549,25 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
             return replace(guess, confidence=0.0)
         values = seen[name].values
         finite = values[np.isfinite(values)]
-        finite = finite[:: max(1, finite.size // CHOSEN.looked_at)]
+        finite = finite[:: max(1, finite.size // _LOOKED_AT)]
         if not finite.size or (signal != "delta_r" and np.ptp(finite) == 0.0):
-            left = CHOSEN.still if guess.confidence < CHOSEN.standard else 1.0
+            left = STILL if guess.confidence < _STANDARD else 1.0
             left *= guess.confidence
             return replace(_said(guess, "it never changes"), confidence=left)
         size = max(size, float(np.abs(finite).max()))
         usual = max(usual, _usual(finite))
-    if guess.confidence == CHOSEN.standard or signal in WHEELS:
+    if guess.confidence == _STANDARD or signal in WHEELS:
         return guess
     if not guess.unit:
         return _by_range(signal, guess, size, usual)
-    if QUANTITIES[signal] == RATE and guess.confidence <= CHOSEN.vague:
+    if QUANTITIES[signal] == RATE and guess.confidence <= _VAGUE:
         usual *= to_si(guess.unit, RATE, signal)  # wheels and shafts turn faster than any car
         if unit_of_range(RATE, usual):
             return replace(_said(guess, f"goes to {usual:.3g} rad/s"), confidence=0.0)
     if QUANTITIES[signal] != ANGLE:
         return guess
     largest = size * to_si(guess.unit, ANGLE, signal)
-    if signal != BETA and largest > CHOSEN.largest_road and not guess.hand:
+    if signal != BETA and largest > _LARGEST_ROAD and not guess.hand:
         why = f"goes to {math.degrees(largest):.0f} deg, as a hand wheel does"
         return replace(_said(guess, why), hand=True)
     return guess
@@ -565,14 +579,14 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
     A name that may mean hand or road wheels, as "steer", means these where it stays as near.
     """
     quantity = QUANTITIES[signal]
-    vague = max(_name_confidence(_HAND, name) for name in guess.channel) <= CHOSEN.vague
+    vague = max(_name_confidence(_HAND, name) for name in guess.channel) <= _VAGUE
     if guess.hand and vague and not unit_of_range(quantity, usual):
         return _said(replace(guess, hand=False), f"goes to {size:.3g}, as road wheels do in rad")
     if quantity == ACCELERATION:
         return guess  # `_beside_turning` sets it beside v_x and r
     unit = unit_of_range(HAND_WHEEL if guess.hand else quantity, usual)
     if unit and quantity == ANGLE and signal != BETA and not guess.hand:
-        hand = usual * to_si(unit, quantity, signal) > CHOSEN.largest_road
+        hand = usual * to_si(unit, quantity, signal) > _LARGEST_ROAD
         guess = replace(guess, hand=hand)
     if not unit:
         return _said(guess, f"goes to {size:.3g}") if quantity in (ANGLE, SPEED) else guess
@@ -590,7 +604,7 @@ def _beside_turning(
     best = {
         name: max(likely, key=lambda one: one.confidence)
         for name in ("v_x", "r", "a_y")
-        if (likely := [one for one in candidates[name] if one.confidence > CHOSEN.still])
+        if (likely := [one for one in candidates[name] if one.confidence > STILL])
     }
     mended = dict(candidates)
     for name in _ASSUMED:
@@ -613,7 +627,7 @@ def _beside_turning(
 
 def _is_given(guess: Guess) -> bool:
     """Return whether the unit of a guess is known; names of ours are in SI."""
-    return bool(guess.unit) or guess.confidence == CHOSEN.standard
+    return bool(guess.unit) or guess.confidence == _STANDARD
 
 
 def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
@@ -639,7 +653,7 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
 def _usual(values: Array) -> float:
     """Return how far the finite ones go from zero, but for spikes."""
     finite = values[np.isfinite(values)]
-    return float(np.quantile(np.abs(finite), 1.0 - CHOSEN.spikes)) if finite.size else 0.0
+    return float(np.quantile(np.abs(finite), 1.0 - _SPIKES)) if finite.size else 0.0
 
 
 def _root_mean_square(values: Array) -> float:

@@ -10,13 +10,15 @@ import numpy as np
 
 from codegen.escape import shown
 from models.logs.arrow import doubles, whole_numbers, words
-from models.logs.chosen import CHOSEN
 from models.logs.foreign import need, one_line
 from models.logs.log import RecordingError, dense, few
 from models.logs.spelling import unit_in_name
 from models.logs.stamps import MISSING, nanoseconds
 from models.logs.table import Cells, Columns, Gathered, Kind, TableLog
 from models.schema import LONGEST_NAME, require_file
+
+_HEAD = 400  # rows that tell what columns are
+_BATCH = 1 << 16  # rows that are read at once
 
 _WHAT = "a Parquet file"  # that a file is read as
 
@@ -59,7 +61,7 @@ class _ParquetTable:
     def first_rows(self, column: int) -> list[str]:
         with one_line(self.path, _WHAT):
             if column not in self._head:
-                return ["?"] * min(self.rows, CHOSEN.head)
+                return ["?"] * min(self.rows, _HEAD)
             return _as_text(self._head[column], self.schema.field(column).type)
 
     @cached_property
@@ -72,7 +74,7 @@ class _ParquetTable:
             for k, one in enumerate(self.schema)
             if _is_numeric(one.type) or _is_text(one.type) or is_timestamp(one.type)
         ]
-        first = next(self._batches(columns, CHOSEN.head), [])
+        first = next(self._batches(columns, _HEAD), [])
         return dict(zip(columns, first, strict=False))
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
@@ -92,7 +94,7 @@ class _ParquetTable:
         gathered = Gathered(self.path, wanted, self.columns.names, "row", run)
         order = list(wanted)
         with one_line(self.path, _WHAT):
-            for batch in self._batches(order, CHOSEN.batch):
+            for batch in self._batches(order, _BATCH):
                 rows = np.arange(1, len(batch[0]) + 1) + len(gathered)
                 columns = {
                     column: self._column(column, wanted[column], cells, rows)

@@ -19,12 +19,18 @@ from pathlib import Path
 from typing import NamedTuple
 
 from codegen.escape import shown
-from models.logs.chosen import CHOSEN
 from models.logs.log import RecordingError, few
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
 from models.logs.stamps import nanoseconds
 from models.logs.table import Columns
 from models.logs.units import PER_SECOND, quantities, time_unit
+
+_ROWS = 400  # of data that tell what columns are
+_TAIL = 40  # last lines of them that tell how cells are written
+_MANY = 300  # cells of a line that tell how all are written
+_CLEAR = 0.9  # share of cells that a way of reading must make numbers to be sure
+_RATES = (1.0, 1e5)  # [Hz], least and most
+_LONGEST_INSTANT = 60  # characters
 
 HEAD, _LINES = 1 << 18, 1500  # bytes and lines that are looked at
 BLANKS = " "  # the delimiter of columns that any number of blanks and tabs set apart
@@ -122,7 +128,7 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     if section is not None:
         return _racelogic(path, lines, encoding, section)
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
-    way = _way(filled[-CHOSEN.tail :])
+    way = _way(filled[-_TAIL:])
     if way is None:
         raise RecordingError(f"{path}: there is a header but no row of data with numbers")
     few(path, way.width, "columns", "columns")
@@ -216,7 +222,7 @@ def _is_number(cell: str, decimal: str, thousands: str = "") -> bool:
 
 
 def _is_instant(cell: str) -> bool:
-    maybe = len(cell) < CHOSEN.longest_instant and _MAYBE_INSTANT.fullmatch(cell) is not None
+    maybe = len(cell) < _LONGEST_INSTANT and _MAYBE_INSTANT.fullmatch(cell) is not None
     return maybe and nanoseconds(cell) is not None
 
 
@@ -228,7 +234,7 @@ def _way(tail: list[str]) -> _Way | None:
         width, often = Counter(map(len, rows)).most_common(1)[0] if rows else (0, 0)
         if width < 2:
             continue
-        cells = [cell for row in rows if len(row) == width for cell in row[: CHOSEN.many] if cell]
+        cells = [cell for row in rows if len(row) == width for cell in row[:_MANY] if cell]
         for decimal, thousands in ((".", ""), (",", ""), (".", ","), (",", ".")):
             if thousands == delimiter and not any(thousands in cell for cell in cells):
                 continue
@@ -248,7 +254,7 @@ def _numbers(delimiter: str, decimal: str) -> re.Pattern[str]:
 
 
 def _numbers_in(line: _Line, way: _Way) -> int:
-    cells = [cell for cell in line.cells[: CHOSEN.many] if cell]
+    cells = [cell for cell in line.cells[:_MANY] if cell]
     return sum(_is_number(cell, way.decimal, way.thousands) for cell in cells)
 
 
@@ -258,7 +264,7 @@ def _is_data(line: _Line, way: _Way) -> bool:
         return True  # as most lines are: nothing but numbers, not all of them 1, which is a unit
     cells = line.cells
     right = _numbers_in(line, way)
-    return 2 * right >= max(sum(map(bool, cells[: CHOSEN.many])), 1) and not is_units_row(cells)
+    return 2 * right >= max(sum(map(bool, cells[:_MANY])), 1) and not is_units_row(cells)
 
 
 # From the data upwards to header and units.
@@ -295,10 +301,10 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     ]
     again = (names_line.text,) if units_line is None else (names_line.text, units_line.text)
     rows = (line.cells for line in lines[first:])
-    data = tuple(islice((row for row in rows if len(row) == len(names)), CHOSEN.rows))
+    data = tuple(islice((row for row in rows if len(row) == len(names)), _ROWS))
     made_by = _maker(lines[:first])
     share = way.share
-    sure = "sure" if share > CHOSEN.preamble_clear else "likely" if share > 0.6 else "a guess"
+    sure = "sure" if share > _CLEAR else "likely" if share > 0.6 else "a guess"
     words = [
         _encoding_word(encoding),
         f"cells apart by {_DELIMITERS[way.delimiter]} ({sure})",
@@ -335,7 +341,7 @@ def _given_rate(preamble: Sequence[str]) -> float:
             rate = PER_SECOND[time_unit(found[2] or "s")] / step if step else 0.0
         else:
             continue
-        if CHOSEN.rates[0] <= rate <= CHOSEN.rates[1]:
+        if _RATES[0] <= rate <= _RATES[1]:
             return rate
     return 0.0
 
@@ -343,7 +349,7 @@ def _given_rate(preamble: Sequence[str]) -> float:
 def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
     """Return the lines above the data, the nearest first, and the index of the first data."""
     above = [k for k, line in enumerate(lines) if line.text.strip(_PADDING)]
-    counts = sorted(_numbers_in(lines[k], way) for k in above[-CHOSEN.tail :])
+    counts = sorted(_numbers_in(lines[k], way) for k in above[-_TAIL:])
     full = counts[len(counts) // 2]
     first = None
     zone: list[int] = []
@@ -474,7 +480,7 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
     ]
     first = at["data"] + 1
     data = [cells for line in lines[first:] if len(cells := cells_of(line, BLANKS)) == len(names)]
-    way = _way([line for line in lines[first:] if line.strip()][-CHOSEN.tail :])
+    way = _way([line for line in lines[first:] if line.strip()][-_TAIL:])
     decimal = "." if way is None else way.decimal
     point = "decimal comma" if decimal == "," else "decimal point"
     words = (_encoding_word(encoding), "Racelogic VBOX sections (sure)", point)
@@ -484,7 +490,7 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
         columns=Columns(names, tuple(units), (True,) * len(names), words),
         first=first + 1,
         decimal=decimal,
-        rows=tuple(data[: CHOSEN.rows]),
+        rows=tuple(data[:_ROWS]),
         made_by="Racelogic VBOX",
     )
 

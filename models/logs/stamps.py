@@ -21,11 +21,25 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks, filled
 from codegen.escape import shown
-from models.logs.chosen import CHOSEN
 from models.logs.growing import LONGEST_IN_MEMORY
 from models.logs.log import Clock, RecordingError
 from models.logs.spelling import unit_in_name
 from models.logs.units import PER_SECOND, TABLES, time_unit
+
+_FASTEST = 1e-5  # [s] between samples of a car's log, at least
+_SLOWEST = 0.11  # [s] between samples of a car's log, at most
+_COARSEST = 1.0  # [s] between stamps without a unit: more than that are no seconds
+_WORTH = 0.05  # share of a step by which rounding must shift stamps to be taken out
+_MOST_STEPS = 100_000  # samples that a rate is taken from
+_SHARED = 1.2  # samples that share a stamp, on average: with fewer they are doubled, not rounded
+_JITTER = 1.2  # steps that stamps of an even clock may lie apart
+_AVERAGED = 50  # samples of a mean over such stamps
+PAUSE = 10.0  # [s] before a clock that starts again: a gap, which cuts the log
+_BACK = 1.0  # [s] that a clock goes back: less is a sample astray
+_FEWEST = 10  # samples that go on from there: fewer are astray
+_REPEATED = 0.2  # share of stamps of a column that repeat, of which another may be finer
+_OTHER_RATE = 0.2  # share of a step by which that of another clock differs
+_SAME_DRIVE = 60.0  # [s] between the beginnings of two clocks of one drive, at most
 
 MISSING = -(2**63)  # an instant that is not there, in ns
 _DAY = 86400.0
@@ -197,18 +211,18 @@ def _is_beside(
     times = []
     for advice, column in ((clock, cells), (first, first_cells)):
         numbers = [value for cell in column if (value := _number(cell)) is not None]
-        if advice.unit not in PER_SECOND or len(numbers) < CHOSEN.fewest:
+        if advice.unit not in PER_SECOND or len(numbers) < _FEWEST:
             return False
         times.append(np.array(numbers) / PER_SECOND[advice.unit])
     if (
         any((np.diff(t) <= 0.0).any() for t in times)
-        or abs(times[0][0] - times[1][0]) > CHOSEN.same_drive
+        or abs(times[0][0] - times[1][0]) > _SAME_DRIVE
     ):
         return False
     if _plain(clock.name) == _plain(first.name):
         return not np.array_equal(times[0], times[1])
     steps = [float(np.median(np.diff(t))) for t in times]
-    return abs(steps[0] / steps[1] - 1.0) > CHOSEN.other_rate
+    return abs(steps[0] / steps[1] - 1.0) > _OTHER_RATE
 
 
 def given_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
@@ -262,7 +276,7 @@ def _is_any(_: Array) -> bool:
 
 def _moves(steps: Array) -> bool:
     """Return whether steps rise, and hardly any stands still."""
-    return _rises(steps) and not (steps.size and float((steps == 0.0).mean()) > CHOSEN.repeated)
+    return _rises(steps) and not (steps.size and float((steps == 0.0).mean()) > _REPEATED)
 
 
 def _rises(steps: Array) -> bool:
@@ -288,9 +302,9 @@ def _unit(t: Array, advice: str) -> tuple[str, bool]:
             return unit, True
     if advice:
         return advice, False
-    if not _step(finite, "s") < CHOSEN.coarsest:
+    if not _step(finite, "s") < _COARSEST:
         for unit in ("ms", "us", "ns"):
-            if CHOSEN.fastest <= _step(finite, unit) <= CHOSEN.slowest:
+            if _FASTEST <= _step(finite, unit) <= _SLOWEST:
                 return unit, False
     return "s", False
 
@@ -437,8 +451,8 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
     falls = (np.flatnonzero(np.diff(t) < 0.0) + 1).tolist()
     begins = [0]
     for first, end in pairwise([*falls, t.size]):
-        lasts = end - first >= CHOSEN.fewest and t[end - 1] - t[first] >= CHOSEN.back
-        if lasts and t[first - 1] - t[first] >= CHOSEN.back:
+        lasts = end - first >= _FEWEST and t[end - 1] - t[first] >= _BACK
+        if lasts and t[first - 1] - t[first] >= _BACK:
             begins.append(first)
     if len(begins) > 1 and not restarts:
         return None
@@ -450,10 +464,10 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
         risen = piece[order]
         single = np.concatenate([[True], np.diff(risen) > 0.0])
         orders.append(first + order[single])
-        times.append(risen[single] + (times[-1][-1] + CHOSEN.pause - risen[0] if times else 0.0))
+        times.append(risen[single] + (times[-1][-1] + PAUSE - risen[0] if times else 0.0))
     found = np.concatenate(times)
     twice = t.size - found.size
-    if t.size >= CHOSEN.shared * found.size:
+    if t.size >= _SHARED * found.size:
         return None  # rounded, or written twice throughout: who leaves them out leaves out too much
     notes = []
     if late:
@@ -461,14 +475,14 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
     if twice:
         notes.append(f"samples that share their stamp with one before are left out: {twice}")
     if len(begins) > 1:
-        back = f"times it goes back by {CHOSEN.back:g} s or more, and on {CHOSEN.pause:g} s later"
+        back = f"times it goes back by {_BACK:g} s or more, and on {PAUSE:g} s later"
         notes.append(f"{back}: {len(begins) - 1}")
     return Stamps(found, tuple(notes), np.concatenate(orders))
 
 
 def typical_rate(t: Array) -> float:
     """Return the samples per second [Hz] of times, by the first of many; NaN of fewer than two."""
-    steps = np.diff(t[: CHOSEN.most_steps])
+    steps = np.diff(t[:_MOST_STEPS])
     step = float(np.median(steps)) if steps.size else 0.0
     return 1.0 / step if step > 0.0 else math.nan
 
@@ -540,13 +554,11 @@ def _even_clock(t: Array) -> Stamps | None:
     if tick is None or tick > 1.0:
         return None
     repeats = bool(moves.size < steps.size)
-    if repeats and shared < CHOSEN.shared:
+    if repeats and shared < _SHARED:
         return _unjittered(t)
     usual = float(np.median(moves))
     near = moves[moves < usual + 1.5 * tick]
-    if not repeats and (
-        not CHOSEN.worth * usual < tick <= usual / 2.0 or np.ptp(near) < 0.5 * tick
-    ):
+    if not repeats and (not _WORTH * usual < tick <= usual / 2.0 or np.ptp(near) < 0.5 * tick):
         return None  # by a coarser tick a lost sample could look rounded
     return _fitted(t, tick)
 
@@ -556,13 +568,13 @@ def _unjittered(t: Array) -> Stamps | None:
     They must wander about it by less than a step, and not drift by half of one: then none is lost.
     """
     usual = float(np.median(np.diff(t)))
-    dt = _even_step(t, CHOSEN.jitter * usual) if usual > 0.0 else None
-    if dt is None or t.size < 2 * CHOSEN.averaged:
+    dt = _even_step(t, _JITTER * usual) if usual > 0.0 else None
+    if dt is None or t.size < 2 * _AVERAGED:
         return None
     off = t - dt * np.arange(t.size)
-    smooth = np.convolve(off, np.full(CHOSEN.averaged, 1.0 / CHOSEN.averaged), "valid")
+    smooth = np.convolve(off, np.full(_AVERAGED, 1.0 / _AVERAGED), "valid")
     rough = float(np.median(np.abs(np.diff(off))))
-    if np.ptp(off) > CHOSEN.jitter * dt or np.ptp(smooth) > 0.5 * dt or rough < 0.1 * dt:
+    if np.ptp(off) > _JITTER * dt or np.ptp(smooth) > 0.5 * dt or rough < 0.1 * dt:
         return None
     begin = float(off.max() + off.min()) / 2.0
     even = np.round(begin + dt * np.arange(t.size), 9)
@@ -638,7 +650,7 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
     assert k is not None
     said = f"must increase, {place} {rows[k + 1]} has {t[k + 1]:.9g} after {t[k]:.9g}; "
     if t[k + 1] < t[k]:
-        if not restarts and t[k] - t[k + 1] >= CHOSEN.back:
+        if not restarts and t[k] - t[k + 1] >= _BACK:
             return said + "the clock starts again beside others: cut the log there"
         if t[k + 1] - t[0] <= 0.5 * (t[k] - t[0]) and t[k] > t[0]:  # else a sample is astray
             return said + (
@@ -650,7 +662,7 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
     moves = int(np.count_nonzero(steps > 0.0))
     if k == 0 and not moves:
         return said + "it never moves: declare the column of the time"
-    if moves and steps.size / moves >= CHOSEN.shared:
+    if moves and steps.size / moves >= _SHARED:
         return said + (
             f"stamps are rounded, {steps.size / moves:.3g} samples share one, and no even clock "
             "explains them: export time with more digits"

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.escape import shown
-from models.logs.chosen import CHOSEN
 from models.logs.growing import Growing
 from models.logs.log import (
     Channel,
@@ -38,6 +37,9 @@ from models.logs.stamps import (
     typical_rate,
 )
 from models.schema import LONGEST_NAME, limits
+
+_LONG = 8  # columns at most of a table with a row for each value
+_MOST_WORDS = 10_000  # names of runs in one log
 
 _RUN = "run"
 
@@ -173,10 +175,10 @@ class Gathered:
                     f"characters, {self._place} {row} has {shown(word.strip())}"
                 )
         new = [codes.setdefault(word.strip(), len(codes)) for word in words.names]
-        if len(codes) > CHOSEN.most_words:
+        if len(codes) > _MOST_WORDS:
             raise RecordingError(
                 f"{self._path}: {self._names[column]} must name runs, it has more than "
-                f"{CHOSEN.most_words} different words"
+                f"{_MOST_WORDS} different words"
             )
         coded: NDArray[np.int32] = np.array(new, dtype=np.int32)[words.codes]
         return coded
@@ -265,9 +267,7 @@ class TableLog:
     def may_be_long(self) -> bool:
         """Whether a row may be one value of a channel that it names."""
         return (
-            len(self.names) <= CHOSEN.long
-            and not all(self._columns.numeric)
-            and _RUN not in self.names
+            len(self.names) <= _LONG and not all(self._columns.numeric) and _RUN not in self.names
         )
 
     @cached_property

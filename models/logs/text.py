@@ -21,12 +21,16 @@ from numpy.typing import NDArray
 
 from codegen.escape import shown
 from models.logs import arrow
-from models.logs.chosen import CHOSEN
 from models.logs.log import RecordingError, few
 from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
 from models.logs.stamps import nanoseconds
 from models.logs.table import Cells, Columns, Gathered, Kind, TableLog, Words
 from models.schema import pieces
+
+_BLOCK = 1 << 22  # bytes of text that pyarrow reads at once
+_SMALL_BLOCK = 1 << 19  # bytes of text that Python reads at once
+_QUOTES = 8  # that may stand before the end of a block and not close
+_LARGEST_LINE = 1 << 23  # bytes: 10 000 columns of 800
 
 _BLANK = re.compile(rb"[ \t]+")
 _MARGIN = re.compile(rb"^ | $", re.MULTILINE)
@@ -86,9 +90,7 @@ class TextTable:
         reader = _Python(self.path, self.layout, wanted)
         fast = arrow.is_used(self.path) if self.arrow is None else self.arrow
         fast = fast and arrow.is_installed()
-        for line, block in _blocks(
-            self.path, self.layout, CHOSEN.block if fast else CHOSEN.small_block
-        ):
+        for line, block in _blocks(self.path, self.layout, _BLOCK if fast else _SMALL_BLOCK):
             plain = fast and reader.is_plain(block)
             columns = arrow.columns_of(block, self.layout, wanted) if plain else None
             if columns is None:
@@ -120,9 +122,9 @@ def _blocks(path: Path, layout: Layout, size: int) -> Iterator[tuple[int, bytes]
                 yield line, _plain(path, layout, line, rest[:cut])
                 line += rest.count(b"\n", 0, cut)
                 rest, reach = rest[cut:], size
-            elif reach >= CHOSEN.largest_line:
+            elif reach >= _LARGEST_LINE:
                 raise RecordingError(
-                    f"{path}: line {line} is longer than {CHOSEN.largest_line} bytes, or opens a "
+                    f"{path}: line {line} is longer than {_LARGEST_LINE} bytes, or opens a "
                     "quote that is never closed"
                 )
             else:
@@ -149,7 +151,7 @@ def _in_utf8(path: Path, encoding: str) -> Iterator[bytes]:
 def _whole_lines(text: bytes) -> int:
     """Return where the last whole line ends that does not end within quotes; 0 if none is near."""
     cut = text.rfind(b"\n") + 1
-    for _ in range(CHOSEN.quotes):
+    for _ in range(_QUOTES):
         if not (cut and text.count(b'"', 0, cut) % 2):
             return cut
         cut = text.rfind(b"\n", 0, text.rfind(b'"', 0, cut)) + 1

@@ -15,8 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from models.logs.chosen import CHOSEN
 from models.logs.stamps import NAMES
+
+_LEAST_RATE = 1.0  # [Hz]
+_MOST_RATE = 1e5  # [Hz]
+_MOST_COLUMNS = 1000  # of a matrix that is a table of signals
 
 # Of a variable: a name that a clock has, and the unit that may follow it.
 _CLOCK = re.compile(r"([a-z_ ]+?)(?:_?(s|sec|ms|us|ns))?")
@@ -177,7 +180,7 @@ class _Walk:
             if word in _RATES + _STEPS and leaf.shape == (1, 1):
                 value = float(leaf.load()[0, 0])
                 rate = value if word in _RATES or not value else 1.0 / value
-                if CHOSEN.least_rate <= rate <= CHOSEN.most_rate:
+                if _LEAST_RATE <= rate <= _MOST_RATE:
                     self.rate = rate
             return
         for clock in clocks:
@@ -185,7 +188,7 @@ class _Walk:
             if samples not in leaf.shape:
                 continue
             along = 0 if rows == samples else 1
-            if leaf.shape[1 - along] > CHOSEN.most_columns:
+            if leaf.shape[1 - along] > _MOST_COLUMNS:
                 break
             self.signals += _lines(leaf, name, unit, along, clock, columns)
             return
@@ -251,7 +254,7 @@ def _unit_of_clock(name: str) -> str | None:
 
 def _clock_inside(leaf: Leaf, name: str) -> Clock | None:
     """Return the first column of a matrix, or row of a wide one, where it rises as a clock does."""
-    if min(leaf.shape) < 2 or min(leaf.shape) > CHOSEN.most_columns or max(leaf.shape) < 3:
+    if min(leaf.shape) < 2 or min(leaf.shape) > _MOST_COLUMNS or max(leaf.shape) < 3:
         return None
     clock = Clock(name, leaf, 0, "")
     steps = np.diff(times_of(clock))

@@ -17,10 +17,15 @@ from typing import Any, NamedTuple
 import casadi as ca
 
 from models.friction import MAX_PLACES, place_change
-from models.plant.chosen import CHOSEN
 from models.rules import require_positive
 from models.tires import MagicFormula, Tire
 from models.vehicle import Vehicle, load_ratio
+
+_LEAST_SPEED = 1.0  # below this wheel speed slip decays as if at it [m/s]
+_LEAST_LOAD = 1.0  # a tire is asked at this load or more, and its force scaled down below it [N]
+_LARGEST_KAPPA = 0.1  # about where a passenger tire has its largest longitudinal force [-]
+N_STATES = 18  # of the car
+_LOAD_LAG = 0.01  # unsprung mass on the tire spring, about 15 Hz [s]
 
 # Slip and force of the four wheels in the paper's sign: α = δ - atan2(v_y, v_x), F_y = +C α.
 #
@@ -75,7 +80,7 @@ def _relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> A
     v_x, v_y = velocity
     along = v_x * ca.cos(delta) + v_y * ca.sin(delta)
     aside = v_y * ca.cos(delta) - v_x * ca.sin(delta)
-    return (-aside - ca.fmax(ca.fabs(along), CHOSEN.least_speed) * slip) / length
+    return (-aside - ca.fmax(ca.fabs(along), _LEAST_SPEED) * slip) / length
 
 
 def _tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: Any) -> Any:
@@ -84,11 +89,11 @@ def _tire_force(tire: Tire, slip: Any, camber: Any, drive: Any, load: Any, mu: A
     drive : wanted longitudinal force [N]; the tire gives less at large side slip.
     load : vertical load [N].   mu : friction over the tire's own [-].
     """
-    floored = ca.fmax(load, CHOSEN.least_load)
+    floored = ca.fmax(load, _LEAST_LOAD)
     # A tire may push at zero slip (its shifts); a free wheel then slips to where it does not.
     at_rest = tire.forces(0.0, 0.0, 0.0, floored, mu)[0]
     kappa = (drive - at_rest) / tire.slip_stiffness(floored)
-    kappa = ca.fmin(ca.fmax(kappa, -CHOSEN.largest_kappa), CHOSEN.largest_kappa)
+    kappa = ca.fmin(ca.fmax(kappa, -_LARGEST_KAPPA), _LARGEST_KAPPA)
     F_x, F_y = tire.forces(ca.atan(slip), kappa, camber, floored, mu)
     return ca.vertcat(F_x, F_y) * (load / floored)
 
@@ -192,7 +197,7 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
     """
     m, I_z, l_f, l_r = vehicle.mass, vehicle.yaw_inertia, vehicle.l_f, vehicle.l_r
     c, h = vehicle.require_chassis(), vehicle.roll_arm
-    x = ca.SX.sym("x", CHOSEN.n_states)
+    x = ca.SX.sym("x", N_STATES)
     command, v_ref, mu = ca.SX.sym("command", 2), ca.SX.sym("v_ref"), ca.SX.sym("mu")
     places, aside = ca.SX.sym("places", 3, MAX_PLACES), ca.SX.sym("aside", 2)
     slope, wind = aside[0], aside[1]
@@ -244,8 +249,8 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
         r,
         *slip_dot,
         (command - delta) / c.steering_lag,
-        (ca.vertcat(*axle_force) - F_lagged) / CHOSEN.load_lag,
-        (a_x - a_x_lagged) / CHOSEN.load_lag,
+        (ca.vertcat(*axle_force) - F_lagged) / _LOAD_LAG,
+        (a_x - a_x_lagged) / _LOAD_LAG,
         integral_dot,
     )
     outputs = [ca.vertcat(*v) for v in (F_x, F_y)] + [F_z]
@@ -262,7 +267,7 @@ def runge_kutta(car: ca.Function, dt: float) -> ca.Function:
     Its outputs are those of the state before the step.
     car : from `dynamics`.   dt : step [s].
     """
-    x = ca.MX.sym("x", CHOSEN.n_states)
+    x = ca.MX.sym("x", N_STATES)
     rest = [ca.MX.sym(car.name_in(i), *car.size_in(i)) for i in range(1, car.n_in())]
     k1, *outputs = car(x, *rest)
     k2 = car(x + 0.5 * dt * k1, *rest)[0]

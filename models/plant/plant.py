@@ -15,12 +15,16 @@ from codegen.errors import TireidError
 from codegen.graph import lifted
 from models.friction import Friction
 from models.maneuvers import Maneuver
-from models.plant.chosen import CHOSEN
-from models.plant.dynamics import Driver, dynamics, runge_kutta
+from models.plant.dynamics import N_STATES, Driver, dynamics, runge_kutta
 from models.recordings import Recording
 from models.sensors import Sensors
 from models.tires import MagicFormula, Tire, TirError
 from models.vehicle import GRAVITY, Vehicle, VehicleError
+
+_LEAST = 0.5  # stiffness over load [1/rad or -]: about 20 of real tires
+_MOST = 500.0  # stiffness over load [1/rad or -]
+_LEAST_GRIP = 0.05  # largest side force over load [-]: about 1 of real tires
+_MOST_GRIP = 10.0  # largest side force over load [-]
 
 # What a plant recorded: the motion, and the forces behind it, which no car measures.
 
@@ -150,9 +154,9 @@ def tire_of(vehicle: Vehicle) -> MagicFormula:
         F_z = ca.DM(0.5 * load)
         grip = ca.mmax(tire.forces(ca.DM(_GRIP_SLIPS), 0.0, 0.0, F_z).F_y)
         for what, force, least, most in (
-            ("cornering stiffness", tire.cornering_stiffness(F_z), CHOSEN.least, CHOSEN.most),
-            ("slip stiffness", tire.slip_stiffness(F_z), CHOSEN.least, CHOSEN.most),
-            ("largest side force", grip, CHOSEN.least_grip, CHOSEN.most_grip),
+            ("cornering stiffness", tire.cornering_stiffness(F_z), _LEAST, _MOST),
+            ("slip stiffness", tire.slip_stiffness(F_z), _LEAST, _MOST),
+            ("largest side force", grip, _LEAST_GRIP, _MOST_GRIP),
         ):
             if not least <= (ratio := float(force / F_z) + 0.0) <= most:
                 raise TirError(
@@ -226,7 +230,7 @@ class Plant:
         if not v_ref[0] > 0.0:
             raise ValueError(f"speed must be positive at the start, it is {v_ref[0]}")
         road = friction if friction is not None else Friction()
-        start = np.zeros(CHOSEN.n_states)
+        start = np.zeros(N_STATES)
         start[0] = v_ref[0]
         values = {"x": start, "command": command, "v_ref": v_ref}
         values |= {"mu": road.over_time(middle), "places": road.over_place()}
@@ -299,7 +303,7 @@ class StepwisePlant:
         """
         scan, constants = self.plant.loop(self.dt)
         places = self.friction.over_place()
-        values = {"x": np.zeros(CHOSEN.n_states), "constants": constants, "places": places}
+        values = {"x": np.zeros(N_STATES), "constants": constants, "places": places}
         return Stepper(scan, values), Stepper(scan, values, self._every + 1)
 
     def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> PlantState:
@@ -308,7 +312,7 @@ class StepwisePlant:
         """
         if not v_x > 0.0:
             raise ValueError(f"v_x must be positive at the start, it is {v_x}")
-        x = np.zeros(CHOSEN.n_states)
+        x = np.zeros(N_STATES)
         x[[0, 5, 6, 7]] = v_x, X, Y, psi
         return self._run(self._steppers[0], 0, 1, x, np.zeros(2), v_x)
 

@@ -9,7 +9,6 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from codegen.arrays import Array, filled
-from models.logs.chosen import CHOSEN as LOGS_CHOSEN
 from models.logs.clock import (
     Raw,
     Segment,
@@ -35,13 +34,24 @@ from models.logs.signals import (
 )
 from models.logs.units import is_given, to_si
 from models.recordings.choice import chosen_signals, column_of, has_wheels, missing_signals
-from models.recordings.chosen import CHOSEN
 from models.recordings.map import AXES, CUT, LogMap
 from models.recordings.pose import with_pose
-from models.recordings.record import LARGEST, Recording, joined, resample, side_by_side
+from models.recordings.record import (
+    LARGEST,
+    MINIMUM_SAMPLES,
+    Recording,
+    joined,
+    resample,
+    side_by_side,
+)
 from models.recordings.rolled import rolled
 from models.recordings.wheels import Scale, identified_scales, scale_text, wheel_factor
 from models.schema import require_few
+
+_SLOWEST_CHANNEL = 0.11  # [s]: longest typical interval of a channel, 10 Hz with jitter
+_FASTEST = 5e-4  # [s]: shortest step by which a unit of the time is guessed
+_SHORTEST = 1.0  # [s]: a segment of less teaches nothing, since learning waits half a second
+_LEAST_LOW_PASS = 0.01  # Hz: nothing of a drive passes, and the filter's numbers are still right
 
 _FIELDS = {
     "Fyf": "axle_force",
@@ -238,10 +248,10 @@ def _segments(
         )
     longest = max(found, key=lambda one: one.t.size)
     kept = [one for one in found if one.t.size * dt >= _shortest(dt)] or [longest]
-    if longest.t.size < CHOSEN.minimum_samples:
+    if longest.t.size < MINIMUM_SAMPLES:
         t = longest.t
         raise RecordingError(
-            f"{label}: the run lasts {t[-1] - t[0]:.4g} s, at least {CHOSEN.minimum_samples} "
+            f"{label}: the run lasts {t[-1] - t[0]:.4g} s, at least {MINIMUM_SAMPLES} "
             f"steps of {dt:g} s are needed"
         )
     return _Segments(kept, len(found) - len(kept))
@@ -249,18 +259,18 @@ def _segments(
 
 def _shortest(dt: float) -> float:
     """Return how long a segment must be [s]: to teach something, and to be a recording."""
-    return max(CHOSEN.shortest, CHOSEN.minimum_samples * dt)
+    return max(_SHORTEST, MINIMUM_SAMPLES * dt)
 
 
 def _judge_time(label: str, raw: Raw) -> None:
     """Refuse time that does not rise, is not in seconds, or too coarse."""
-    if raw.t.size < CHOSEN.minimum_samples:
+    if raw.t.size < MINIMUM_SAMPLES:
         raise RecordingError(
-            f"{label}: there are {raw.t.size} rows, at least {CHOSEN.minimum_samples} needed"
+            f"{label}: there are {raw.t.size} rows, at least {MINIMUM_SAMPLES} needed"
         )
     require_rising(label, raw)
     typical = typical_step(raw.t)
-    if typical > LOGS_CHOSEN.slowest_channel:
+    if typical > _SLOWEST_CHANNEL:
         raise RecordingError(
             f"{label}: t must be in s with at least 10 samples per second, its typical step is "
             f"{typical:.6g}{_other_unit(typical)}"
@@ -270,7 +280,7 @@ def _judge_time(label: str, raw: Raw) -> None:
 def _other_unit(step: float) -> str:
     """Return what the time may be in where samples are so far apart."""
     for power, unit in ((3, "milliseconds"), (6, "microseconds"), (9, "nanoseconds")):
-        if CHOSEN.fastest <= step / 10.0**power <= LOGS_CHOSEN.slowest_channel:
+        if _FASTEST <= step / 10.0**power <= _SLOWEST_CHANNEL:
             return f"; {unit}? divide by 1{power * '0'}"
     return ""
 
@@ -396,9 +406,9 @@ def _on_wheels(
 
 def _low_pass(name: str, signal: Array, cut_off: float, dt: float) -> Array:
     """Return a signal behind a Butterworth filter of second order that begins at its value."""
-    if not CHOSEN.least_low_pass <= cut_off < 0.5 / dt:
+    if not _LEAST_LOW_PASS <= cut_off < 0.5 / dt:
         raise RecordingError(
-            f"{name}: low_pass of the map must be at least {CHOSEN.least_low_pass:g} Hz and below "
+            f"{name}: low_pass of the map must be at least {_LEAST_LOW_PASS:g} Hz and below "
             f"half the sampling rate, {0.5 / dt:g} Hz, it is {cut_off:g}"
         )
     from scipy.signal import butter, lfilter, lfilter_zi  # takes longer than to read a short log

@@ -12,8 +12,9 @@ import numpy as np
 from codegen.arrays import Array, thinning
 from models.bicycle import measured_slip
 from models.logs.log import RecordingError
-from models.recordings.chosen import CHOSEN
 from models.recordings.evidence import (
+    STRIDE,
+    WINDOW,
     Fit,
     Means,
     Pair,
@@ -31,6 +32,17 @@ from models.recordings.evidence import (
 from models.recordings.record import Recording, peak
 from models.recordings.samples import multiple
 from models.vehicle import Vehicle
+
+_LARGEST_STEERING = 1.2  # [rad], 69 degrees: beyond every road wheel and scale car (about 50)
+_LARGEST_SPEED = 110.0  # [m/s], 396 km/h; a sedan's 110 km/h reads 110
+_LARGEST_V_X_R = 60.0  # [m/s^2], 6 g: beyond downforce cars; 1 m/s^2 in degrees reads 57
+_SURE_PAIR = 0.9  # correlation from which two channels are of one bend
+_NO_PAIR = 0.3  # correlation up to which they are of none
+_LACKS = 0.35  # slope of a_y on v_x r, below zero, up to which it is not turned but lacks v_x r
+_SLOPE = (0.5, 2.0)  # a_y on v_x r is 1, with roll up to 1.2; km/h 0.28, g 0.10, degrees 0.017
+_LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart with driver has 150
+_LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars; in kN 0.3 at most
+_LARGEST_SLIP = 0.7  # [rad], 40 degrees in the median window: nobody drives a whole run like that
 
 _DOCTOR = "tireid doctor LOG --vehicle FILE looks for other faults, and repairs them"
 
@@ -53,15 +65,15 @@ def physics_contradiction(recording: Recording) -> str | None:
         return world
     w = windows(recording)
     found = _check_peaks(recording)
-    if found is not None or w.r.size * CHOSEN.stride < 2.0:
+    if found is not None or w.r.size * STRIDE < 2.0:
         return found
     found = _check_signs_are_there(recording)
     if found is not None:
         return found
     largest = float(np.percentile(np.abs(w.v_x_r), 95))
-    if largest > CHOSEN.largest_v_x_r:
+    if largest > _LARGEST_V_X_R:
         return (
-            f"r must be in rad/s, |v_x r| below {CHOSEN.largest_v_x_r:g} m/s^2, it is "
+            f"r must be in rad/s, |v_x r| below {_LARGEST_V_X_R:g} m/s^2, it is "
             f"{largest:.4g}; degrees per second? multiply r by pi/180"
         )
     turn = steering(w)
@@ -76,16 +88,16 @@ def _check_peaks(recording: Recording) -> str | None:
     """Answer with steering beyond 1.2 rad, speeds beyond 110 m/s, and cars that drive backwards."""
     for column in ("delta_f", "delta_r"):
         largest = peak(getattr(recording, column))
-        if largest > CHOSEN.largest_steering:
+        if largest > _LARGEST_STEERING:
             return (
                 f"{column} must be the road-wheel angle in rad, below "
-                f"{CHOSEN.largest_steering}, its peak is {largest:.4g}; degrees or a hand-wheel "
+                f"{_LARGEST_STEERING}, its peak is {largest:.4g}; degrees or a hand-wheel "
                 "angle? convert it (degrees: multiply by pi/180)"
             )
     fastest = peak(recording.v_x)
-    if fastest > CHOSEN.largest_speed:
+    if fastest > _LARGEST_SPEED:
         return (
-            f"vx must be in m/s, below {CHOSEN.largest_speed:g}, its peak is "
+            f"vx must be in m/s, below {_LARGEST_SPEED:g}, its peak is "
             f"{fastest:.4g}; km/h? divide by 3.6"
         )
     some = recording.v_x[:: thinning(len(recording))]
@@ -135,7 +147,7 @@ def world_axes(recording: Recording) -> str | None:
     course, r = found
     turns = np.abs(r) > 0.2 * np.percentile(np.abs(r), 99)
     course, r = course[turns], r[turns]
-    if r.size * CHOSEN.evidence_window < 2.0 or not float(np.sqrt(np.mean(r**2))) > 0.01:
+    if r.size * WINDOW < 2.0 or not float(np.sqrt(np.mean(r**2))) > 0.01:
         return None
     slope = float(course @ r) / float(r @ r)
     if not (abs(abs(slope) - 1.0) < 0.2 and abs(correlation(course, r)) > 0.9):
@@ -180,9 +192,9 @@ def _check_turns(w: Means) -> str | None:
     if r_delta.sign < 0 and a_delta.sign >= 0 and r_a.sign > 0:
         return _check_two(r_delta)  # a_y says nothing of the steering
     if (
-        abs(a_delta.correlation) > CHOSEN.sure_pair
+        abs(a_delta.correlation) > _SURE_PAIR
         and a_delta.sign
-        and max(abs(r_a.correlation), abs(r_delta.correlation)) < CHOSEN.no_pair
+        and max(abs(r_a.correlation), abs(r_delta.correlation)) < _NO_PAIR
     ):
         return (
             "r must be the yaw rate, it goes neither with ay nor with the steering (correlations "
@@ -218,7 +230,7 @@ def _check_lateral_acceleration(w: Means) -> str | None:
         return None
     moved, felt = w.v_x_r[some], w.a_y[some]
     mean, spread = abs(float(np.mean(w.v_x_r))), float(np.std(moved))
-    alike = correlation(felt - np.mean(felt), moved - np.mean(moved)) > CHOSEN.sure_pair
+    alike = correlation(felt - np.mean(felt), moved - np.mean(moved)) > _SURE_PAIR
     if spread >= max(0.3, 0.5 * mean) or (alike and float(np.std(felt)) >= 0.3):
         X = np.column_stack([X, np.ones(w.r.size)])
     elif mean < 1.5:
@@ -227,7 +239,7 @@ def _check_lateral_acceleration(w: Means) -> str | None:
     slope, error = fit.theta[0], 4.0 * fit.error[0]
     dot, dot_error = _of_v_y(fit, w)
     law = f"must be v̇_y + v_x r (ISO axes), its slope on v_x r is {slope:.3g} instead of 1"
-    if slope + error < CHOSEN.slope[0] or (slope - error > CHOSEN.slope[1] and fit.r_squared > 0.5):
+    if slope + error < _SLOPE[0] or (slope - error > _SLOPE[1] and fit.r_squared > 0.5):
         return _blame(slope, law)
     if _turned(dot, dot_error, w) and slope - error > 0.0:
         return (
@@ -271,7 +283,7 @@ def _blame(slope: float, law: str) -> str:
         factor = min(_BLAMED, key=lambda one: abs(np.log(slope / one)))
         if abs(np.log(slope / factor)) < np.log(1.3):
             return _BLAMED[factor].format(law)
-    elif abs(slope) < CHOSEN.lacks:
+    elif abs(slope) < _LACKS:
         return (
             f"ay {law}; it lacks the centripetal part (the change of a body's velocity, as some "
             "simulators give?): add v_x r, or leave the column ay out"
@@ -368,7 +380,7 @@ def _check_forces(w: Means, turn: Steering | None) -> str | None:
         )
     L = shortest_wheelbase(w, turn)
     mass = float(total @ a) / float(a @ a)
-    if mass < CHOSEN.lightest * min(L, CHOSEN.longest_wheelbase) ** 3:
+    if mass < _LIGHTEST * min(L, _LONGEST_WHEELBASE) ** 3:
         return (
             f"Fyf and Fyr must be in N, they imply a mass of {mass:.3g} kg on "
             f"an effective wheelbase of {L:.3g} m; kN? multiply by 1000"
@@ -396,7 +408,7 @@ def vehicle_contradiction(recording: Recording, vehicle: Vehicle) -> str | None:
     """Return how a recording contradicts a vehicle, by the rules of `check_against_vehicle`."""
     w = windows(recording)
     a = w.acceleration
-    if w.r.size * CHOSEN.stride < 2.0 or np.sqrt(np.mean(a**2)) < 0.3:
+    if w.r.size * STRIDE < 2.0 or np.sqrt(np.mean(a**2)) < 0.3:
         return None
     l_f, l_r = vehicle.l_f, vehicle.l_r
     slip = None
@@ -404,10 +416,10 @@ def vehicle_contradiction(recording: Recording, vehicle: Vehicle) -> str | None:
         motion = {"v_x": w.v_x, "v_y": w.v_y, "r": w.r}
         slip = measured_slip(l_f, l_r, **motion, delta_f=w.delta_f, delta_r=w.delta_r)
         typical = float(np.median(np.abs(slip[:, 1])))
-        if typical > CHOSEN.largest_slip:
+        if typical > _LARGEST_SLIP:
             return (
                 f"vy and r must be in m/s and rad/s, the median rear slip angle is "
-                f"{typical:.3g} rad, above {CHOSEN.largest_slip}; check units, and l_r = {l_r:g} m"
+                f"{typical:.3g} rad, above {_LARGEST_SLIP}; check units, and l_r = {l_r:g} m"
             )
     turn, other = steering(w), ""
     if turn is not None and turn.correlation > 0.7:

@@ -11,9 +11,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from codegen.escape import shown
-from models.logs.chosen import CHOSEN as LOGS_CHOSEN
 from models.logs.log import Heading, LogFile, RecordingError, some
-from models.logs.names import Proposal, propose
+from models.logs.names import HINT, STILL, Proposal, propose
 from models.logs.signals import (
     BETA,
     COLUMNS,
@@ -218,7 +217,7 @@ def aside_text(found: Mapping[str, Signal], proposal: Proposal) -> str:
     """Return which channel was left aside that may be v_y, or beside it a_y; empty where none."""
     if has_v_y(found):
         a_y = proposal.guesses.get("a_y")
-        if "a_y" in found or a_y is None or a_y.confidence < LOGS_CHOSEN.hint:
+        if "a_y" in found or a_y is None or a_y.confidence < HINT:
             return ""
         likely, word = likely_text("a_y", proposal), column_word("a_y", proposal)
         return f"ay is left aside, as it is not sure: {likely}; declare it by --columns {word}"
@@ -242,9 +241,9 @@ def stand_ins(name: str, proposal: Proposal) -> list[str]:
     there = {one: guess.confidence for one, guess in proposal.guesses.items()}
     if name != "v_y":
         return [name] if name in there else []
-    measured = [one for one in ("v_y", BETA) if there.get(one, 0.0) > LOGS_CHOSEN.still]
+    measured = [one for one in ("v_y", BETA) if there.get(one, 0.0) > STILL]
     best = [max(measured, key=lambda one: there[one])] if measured else []
-    return best + ["a_y"] * (there.get("a_y", 0.0) > LOGS_CHOSEN.still)
+    return best + ["a_y"] * (there.get("a_y", 0.0) > STILL)
 
 
 def _missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: list[str]) -> str:

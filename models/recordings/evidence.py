@@ -11,8 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, filled, thinning
-from models.recordings.chosen import CHOSEN
 from models.recordings.record import Recording
+
+WINDOW = 0.2  # [s]: keeps maneuvers up to 2 Hz, averages 20 samples of noise at 100 Hz
+# [s], longer where a recording is: evenly over it, as many as of `codegen.arrays.LONG` samples
+STRIDE = 0.05
+_SLOWEST = 0.5  # [m/s]: below it slip and curvature are noise, for scale cars too
+_TURNS = 0.2  # of what a channel reaches, beyond which the car turns
+_ALIKE = 0.7  # least correlation of a sign
+_BEYOND_CHANCE = 16.0  # least square of its t, of a sign
+_LEAST = 0.1  # [m/s^2], rms, below which nothing turns
+_LONGEST = 8.0  # [m], wheelbase by which steering says how much it turns at least
+_TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may countersteer
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +110,7 @@ class Means(NamedTuple):
         """Where the tail is not out, so that steering and turn go together, (k,)."""
         if self.v_y is None:
             return np.ones(self.r.size, dtype=np.bool_)
-        return ~((self.v_y * self.r < 0.0) & (np.abs(self.v_y) > CHOSEN.tail_out * self.v_x))
+        return ~((self.v_y * self.r < 0.0) & (np.abs(self.v_y) > _TAIL_OUT * self.v_x))
 
     @property
     def acceleration(self) -> Array:
@@ -141,7 +151,7 @@ def moving(speed: Array) -> float:
     speed : of samples (n,).
     """
     usual = np.percentile(speed[:: thinning(speed.size)], 95) if speed.size else 0.0
-    return max(CHOSEN.slowest, 0.3 * float(usual))
+    return max(_SLOWEST, 0.3 * float(usual))
 
 
 def windows(recording: Recording) -> Means:
@@ -149,9 +159,9 @@ def windows(recording: Recording) -> Means:
 
     No window reaches from one segment into the next.
     """
-    every = max(round(CHOSEN.stride / recording.dt), 1) * thinning(len(recording))
+    every = max(round(STRIDE / recording.dt), 1) * thinning(len(recording))
     counts = recording.v_x >= moving(recording.v_x)
-    w = Windows.where(counts, recording, CHOSEN.evidence_window, every)
+    w = Windows.where(counts, recording, WINDOW, every)
     v_y, force = recording.logged_v_y, recording.axle_force
     return Means(
         v_x=w.mean(recording.v_x),
@@ -174,7 +184,7 @@ def least_squares(X: Array, y: Array) -> Fit:
     size = np.sqrt(np.mean(X**2, axis=0)) + 1e-300
     theta, *_ = np.linalg.lstsq(X / size, y, rcond=None)
     rest = y - (X / size) @ theta
-    independent = max(y.size * CHOSEN.stride / CHOSEN.evidence_window - X.shape[1], 1.0)
+    independent = max(y.size * STRIDE / WINDOW - X.shape[1], 1.0)
     covariance = np.linalg.pinv((X / size).T @ (X / size) / y.size) * np.mean(rest**2) / independent
     total = float(np.sum((y - y.mean()) ** 2)) + 1e-300
     return Fit(
@@ -199,7 +209,7 @@ def turning(a: Array, b: Array) -> NDArray[np.bool_]:
     """
     some: NDArray[np.bool_] = np.zeros(a.size, dtype=np.bool_)
     for one in (a, b):
-        some |= np.abs(one) > CHOSEN.turns * np.percentile(np.abs(one), 99)
+        some |= np.abs(one) > _TURNS * np.percentile(np.abs(one), 99)
     return some
 
 
@@ -210,13 +220,13 @@ def pair(a: Array, b: Array, keep: NDArray[np.bool_] | None = None) -> Pair:
     some = turning(a, b)
     if keep is not None:
         some &= keep
-    seconds = float(np.count_nonzero(some)) * CHOSEN.stride
+    seconds = float(np.count_nonzero(some)) * STRIDE
     if seconds < 2.0:
         return Pair(0.0, 0, seconds)
     x, y = (_less_offset(one, some) for one in (a, b))
     rho = correlation(x, y)
     chance = rho**2 * max(seconds - 2.0, 0.5) / max(1.0 - rho**2, 1e-9)
-    sure = abs(rho) > CHOSEN.evidence_alike and chance > CHOSEN.beyond_chance
+    sure = abs(rho) > _ALIKE and chance > _BEYOND_CHANCE
     return Pair(rho, int(np.sign(rho)) if sure else 0, seconds)
 
 
@@ -237,7 +247,7 @@ def course_rate(recording: Recording) -> tuple[Array, Array] | None:
     if v_y is None:
         return None
     speed = filled(len(recording), lambda part: np.hypot(v_x[part], v_y[part]))
-    n = max(round(CHOSEN.evidence_window / recording.dt), 1)
+    n = max(round(WINDOW / recording.dt), 1)
     both = Windows.where(
         speed >= moving(speed), recording, 2 * n * recording.dt, n * thinning(len(recording))
     )
@@ -246,7 +256,7 @@ def course_rate(recording: Recording) -> tuple[Array, Array] | None:
         w.mean(v_x) + 1j * w.mean(v_y) for w in (before, replace(before, starts=both.starts + n))
     )
     turned: Array = np.angle(second * np.conj(first)) / (n * recording.dt)
-    enough = turned.size * CHOSEN.evidence_window >= 2.0
+    enough = turned.size * WINDOW >= 2.0
     return (turned, both.mean(recording.r)) if enough else None
 
 
@@ -268,7 +278,7 @@ def proportional(w: Means) -> bool:
     size = np.abs(w.v_x * w.delta)
     most = float(np.percentile(size, 95))
     large, middle = size > 0.7 * most, (size > 0.3 * most) & (size <= 0.7 * most)
-    if min(np.count_nonzero(large), np.count_nonzero(middle)) * CHOSEN.stride < 0.5:
+    if min(np.count_nonzero(large), np.count_nonzero(middle)) * STRIDE < 0.5:
         return False
     steered, turned = (
         float(np.sqrt(np.mean(one[large] ** 2) / max(np.mean(one[middle] ** 2), 1e-300)))
@@ -297,8 +307,8 @@ def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
     together = pair(r[keep], kinematic[keep])
     felt = 0.0 if w.a_y is None else float(np.std(w.a_y))
     turned, steered = (float(np.sqrt(np.mean((w.v_x * one) ** 2))) for one in (r, kinematic))
-    moving = max(turned, felt, steered / CHOSEN.longest)
-    if together.sign == 0 or moving < CHOSEN.least:
+    moving = max(turned, felt, steered / _LONGEST)
+    if together.sign == 0 or moving < _LEAST:
         return None
     r, kinematic = r[keep], kinematic[keep]
     some = turning(r, kinematic)

@@ -21,7 +21,6 @@ from typing import Any
 
 from codegen.escape import shown
 from models.files import resolved, write_atomically
-from models.logs.chosen import CHOSEN as LOGS_CHOSEN
 from models.logs.door import open_log
 from models.logs.log import LogFile, RecordingError
 from models.logs.signals import (
@@ -38,6 +37,8 @@ from models.logs.units import to_si
 from models.recordings.repair import Repair
 from models.recordings.wheels import Wheels
 from models.schema import Table, changed, read_toml, toml_table
+
+LONGEST_GAP = 0.1  # [s]
 
 AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of all but v_x and a_x: y left and z up, or both turned
 _REFUSE, CUT = "refuse", "cut"  # what becomes of cells without a value
@@ -86,7 +87,7 @@ class LogMap:
     clock: str = ""
     clock_unit: str = ""
     rate: float | None = None
-    longest_gap: float = LOGS_CHOSEN.longest_gap
+    longest_gap: float = LONGEST_GAP
     holes: str = _REFUSE
     order: str = _REFUSE
     low_pass: float | None = None

@@ -8,9 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, blocks
-from models.recordings.chosen import CHOSEN
 from models.recordings.record import Recording
 from models.vehicle import GRAVITY
+
+_SEGMENT = 20.0  # s of one, where a quarter of the samples are enough for that
+_STEPS = 4  # beginnings that a segment may have in the time of one
+_FEWEST_SEGMENTS = 4  # segments, so that there are some on both sides of a middle
+_REST = 0.6  # s that the car stands at the end of a segment: a delay of that leaves the next alone
 
 _HARDEST = 2.0 * GRAVITY  # m/s² that count: what is beyond is a sensor, not a drive
 
@@ -41,34 +45,34 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
     n = len(recording)
     if n <= LONG:
         return Portion(recording, np.arange(n))
-    step = min(round(CHOSEN.segment / recording.dt), LONG // CHOSEN.fewest_segments) // CHOSEN.steps
+    step = min(round(_SEGMENT / recording.dt), LONG // _FEWEST_SEGMENTS) // _STEPS
     power = np.zeros(-(-n // step))  # sum of (v_x r)² over each `step` samples
     for part in blocks(n):
         turning = np.clip(recording.v_x[part] * recording.r[part], -_HARDEST, _HARDEST) ** 2
         np.add.at(power, np.arange(part.start, part.stop) // step, turning)
-    count = LONG // (CHOSEN.steps * step)
+    count = LONG // (_STEPS * step)
     if middle is None or not 0 < middle < n:
         sides = [(0, n, count)]
     else:
         sides = [(0, middle, count // 2), (middle, n, count // 2)]
     begins = [begin for side in sides for begin in _hardest(power, step, *side)]
-    samples = np.unique(np.add.outer(begins, np.arange(CHOSEN.steps * step)))
+    samples = np.unique(np.add.outer(begins, np.arange(_STEPS * step)))
     samples = recording.without_scraps(samples[samples < n])
     taken = recording.taken(samples)
     ends = np.array([piece.stop for piece in taken.segments])
     v_x = taken.v_x.copy()
-    v_x[np.maximum(ends[:, None] - 1 - np.arange(round(CHOSEN.rest / recording.dt)), 0)] = 0.0
+    v_x[np.maximum(ends[:, None] - 1 - np.arange(round(_REST / recording.dt)), 0)] = 0.0
     return Portion(replace(taken, v_x=v_x), samples)
 
 
 def _hardest(power: Array, step: int, first: int, last: int, count: int) -> list[int]:
     """Return where the hardest segment begins of each of `count` parts of samples."""
-    length = CHOSEN.steps * step
+    length = _STEPS * step
     if last - first <= count * length:
         return list(range(first, last, length))
     begins = []
     for low, high in pairwise(np.linspace(first, last, count + 1).astype(int) // step):
         # Each beginning's.
-        turned = np.convolve(power[low:high], np.ones(CHOSEN.steps), mode="valid")
+        turned = np.convolve(power[low:high], np.ones(_STEPS), mode="valid")
         begins.append(step * (int(low) + int(np.argmax(turned))))
     return begins

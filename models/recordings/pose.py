@@ -15,11 +15,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from models.logs.chosen import CHOSEN as LOGS_CHOSEN
 from models.logs.clock import Raw, gaps, typical_step
 from models.logs.log import RecordingError
 from models.logs.signals import POSE, Signal
-from models.recordings.chosen import CHOSEN
+from models.recordings.map import LONGEST_GAP
+
+_NO_SLIP = 2e-3  # v_y over v_x of a pose that is integrated along its heading
+_SLOW = 0.025  # [s] between poses from which a gyro tells the yaw rate
+_FEWEST_SAMPLES = 30  # samples of a piece that is differentiated
+_STANDS = 0.05  # [m/s], a pose that never goes faster does not move
+_MOVES = 0.2  # share of the largest speed below which the direction of travel is not asked
+_ALONG = 0.35  # [rad] that the direction of travel may lie off the heading, or a quarter of a turn
+_ALONG_ALL = 0.9  # length of the mean direction of travel against the heading, 1 where all agree
+_LATEST = 0.3  # [s] that a gyro may be late against a pose
+_LATE = 0.01  # [s] that it is late, more of which is taken out of it
+_ALIKE = 0.9  # correlation of the two yaw rates from which that is known
 
 _TURN = math.pi / 2.0
 _STRENGTHS = np.geomspace(1e-3, 1e9, 49)  # λ [-]
@@ -40,20 +50,20 @@ def with_pose(
         pose["heading"] = _of_quaternion(label, parts["heading"])
     motion = _motion_of(label, pose)
     sideways = float(np.sqrt(np.mean(motion.v_y.values**2)))
-    if sideways < CHOSEN.no_slip * float(np.sqrt(np.mean(motion.v_x.values**2))):
+    if sideways < _NO_SLIP * float(np.sqrt(np.mean(motion.v_x.values**2))):
         raise RecordingError(
             f"{label}: the pose never leaves its heading, as one that is integrated from wheels: "
             "vy is not in it; give the pose of another sensor, or leave it out"
         )
     found = {name: raws for name, raws in parts.items() if name not in POSE}
     gyro = parts["r"][0] if "r" in parts else None
-    slow = typical_step(motion.r.t) > CHOSEN.pose_slow
+    slow = typical_step(motion.r.t) > _SLOW
     of_pose = {"v_x": motion.v_x, "v_y": motion.v_y}
     of_pose |= {} if slow and gyro is not None else {"r": motion.r}
     what = "vx, vy and r" if "r" in of_pose else "vx and vy"
     said = [f"{what} are taken from the pose{motion.said}"]
     late = None if gyro is None else _lateness(gyro, motion.r)
-    if late is not None and abs(late) > CHOSEN.late:
+    if late is not None and abs(late) > _LATE:
         box = [name for name in ("r", "a_y", "a_x") if name in found]
         for name in box:
             found[name] = [_earlier(raw, late, motion.r.t) for raw in found[name]]
@@ -71,7 +81,7 @@ def with_pose(
 def _earlier(raw: Raw, late: float, t: Array) -> Raw:
     """Return a channel as much earlier, on the clock of the pose (n,) where it has no gap."""
     moved = raw._replace(t=raw.t - late)
-    if gaps(moved.t, LOGS_CHOSEN.longest_gap).size or typical_step(raw.t) > CHOSEN.pose_slow:
+    if gaps(moved.t, LONGEST_GAP).size or typical_step(raw.t) > _SLOW:
         return moved
     inside = t[(t >= moved.t[0]) & (t <= moved.t[-1])]
     rows = raw.rows[np.minimum(np.searchsorted(moved.t, inside), raw.rows.size - 1)]
@@ -110,14 +120,14 @@ def _motion_of(label: str, parts: Mapping[str, Raw]) -> _Motion:
     values = (x.values, parts["y"].values, np.unwrap(psi, period=period))
     of_pose = zip(POSE, values, strict=True)
     z = np.column_stack([np.interp(t, parts[name].t, one) for name, one in of_pose])
-    cuts = [0, *gaps(t, LOGS_CHOSEN.longest_gap).tolist(), t.size]
+    cuts = [0, *gaps(t, LONGEST_GAP).tolist(), t.size]
     pieces = []
     for first, end in itertools.pairwise(cuts):
-        if end - first >= CHOSEN.fewest_samples:
+        if end - first >= _FEWEST_SAMPLES:
             pieces.append(_piece(t[first:end], z[first:end], x.rows[first:end]))
     if not pieces:
         raise RecordingError(
-            f"{label}: the pose must have at least {CHOSEN.fewest_samples} samples without a gap, "
+            f"{label}: the pose must have at least {_FEWEST_SAMPLES} samples without a gap, "
             f"it has {t.size}"
         )
     angles, turned = _heading(label, pieces)
@@ -196,9 +206,9 @@ def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
     """Return the headings, counted from x to y in rad, and what was done to them in words."""
     speeds = [np.hypot(*piece.rates.T) for piece in pieces]
     most = max(float(speed.max()) for speed in speeds)
-    if not most > CHOSEN.stands:
+    if not most > _STANDS:
         raise RecordingError(f"{label}: the pose must move, its largest speed is {most:.3g} m/s")
-    fast = CHOSEN.moves * most
+    fast = _MOVES * most
     moving = [(piece, speed > fast) for piece, speed in zip(pieces, speeds, strict=True)]
     travel = np.concatenate([np.arctan2(p.rates[m, 1], p.rates[m, 0]) for p, m in moving])
     heading = np.concatenate([p.heading[m] for p, m in moving])
@@ -206,14 +216,14 @@ def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
     means = [np.mean(np.exp(1j * (travel - sign * unit * heading))) for sign, unit in ways]
     best = int(np.argmax(np.abs(means) > max(np.abs(means)) - 0.02))
     (sign, unit), mean = ways[best], means[best]
-    if not abs(mean) >= CHOSEN.along_all:
+    if not abs(mean) >= _ALONG_ALL:
         raise RecordingError(
             f"{label}: the heading must go along with the direction of travel of x and y, it does "
             "not: another channel, or other axes?"
         )
     away = float(np.angle(mean))
     whole = _TURN * round(away / _TURN)
-    shift = whole if abs(away - whole) < CHOSEN.along else away
+    shift = whole if abs(away - whole) < _ALONG else away
     said = ["its heading is clockwise"] if sign < 0 else []
     said += ["its heading is in degrees"] if unit != 1.0 else []
     said += [f"its heading lies {math.degrees(shift):.0f} deg off the travel"] if shift else []
@@ -225,21 +235,21 @@ def _lateness(gyro: Raw, pose: Raw) -> float | None:
     """Return by how much a gyro is late against the yaw rate of a pose [s]; None if not known."""
     dt = max(typical_step(gyro.t), typical_step(pose.t)) / 2.0
     begin, end = (
-        max(gyro.t[0], pose.t[0]) + CHOSEN.latest,
-        min(gyro.t[-1], pose.t[-1]) - CHOSEN.latest,
+        max(gyro.t[0], pose.t[0]) + _LATEST,
+        min(gyro.t[-1], pose.t[-1]) - _LATEST,
     )
-    if end - begin < 10.0 * CHOSEN.latest:
+    if end - begin < 10.0 * _LATEST:
         return None
     grid = np.arange(begin, end, dt)
     reference = np.interp(grid, pose.t, pose.values)
-    lags = dt * np.arange(-int(CHOSEN.latest / dt), int(CHOSEN.latest / dt) + 1)
+    lags = dt * np.arange(-int(_LATEST / dt), int(_LATEST / dt) + 1)
     if np.std(reference) == 0.0 or np.std(gyro.values) == 0.0:
         return None
     alike = np.array(
         [np.corrcoef(reference, np.interp(grid + lag, gyro.t, gyro.values))[0, 1] for lag in lags]
     )
     k = int(np.argmax(alike))
-    if alike[k] < CHOSEN.pose_alike or not 0 < k < lags.size - 1:
+    if alike[k] < _ALIKE or not 0 < k < lags.size - 1:
         return None
     low, peak, high = alike[k - 1 : k + 2]
     return float(lags[k] + dt * 0.5 * (low - high) / (low - 2.0 * peak + high))

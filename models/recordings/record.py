@@ -22,8 +22,13 @@ from codegen.arrays import LONG, Array, blocks, large
 from models.bicycle import measured_slip
 from models.files import write_atomically
 from models.logs.log import RecordingError
-from models.recordings.chosen import CHOSEN
 from models.rules import LARGEST_FORCE
+
+MINIMUM_SAMPLES = 10  # of a segment: fewer are no recording
+_PAUSE = 1.0  # [s] between logs that are joined and whose clocks overlap
+_JITTER = 0.02  # largest departure of a sample from the uniform grid, as a share of one step
+_ON_GRID = 0.01  # share of a step within which time stamps are those of the grid, with jitter
+_SAME = 1e-6  # share of a step within which they already are the grid, but for rounding
 
 ALL = slice(None)
 _OPTIONAL = ("v_y", "a_x", "a_y", "axle_force")
@@ -96,10 +101,10 @@ class Recording:
         if not set(self.estimated) <= {"v_y"}:
             raise RecordingError(f"{self.name}: estimated may name v_y, not {self.estimated}")
         for piece in self.segments:
-            if min(piece.stop, n) - piece.start < CHOSEN.minimum_samples:
+            if min(piece.stop, n) - piece.start < MINIMUM_SAMPLES:
                 whole = "a recording" if not self.breaks else "each segment of a recording"
                 raise RecordingError(
-                    f"{self.name}: {whole} needs at least {CHOSEN.minimum_samples} samples, it has "
+                    f"{self.name}: {whole} needs at least {MINIMUM_SAMPLES} samples, it has "
                     f"{max(min(piece.stop, n) - piece.start, 0)}"
                 )
         for name in _SIGNALS:
@@ -129,7 +134,7 @@ class Recording:
         step = self._step
         for piece in self.segments:
             off_grid = _off_grid(self.t[piece], step)
-            if not (step > 0.0 and off_grid <= CHOSEN.jitter * step):
+            if not (step > 0.0 and off_grid <= _JITTER * step):
                 raise RecordingError(
                     f"{self.name}: t must rise in equal steps, mean step {step:.6g} s, "
                     f"largest departure {off_grid:.3g} s; read the log with read_recording"
@@ -245,10 +250,10 @@ class Recording:
         last = int(np.searchsorted(self.t, t1 + slack, side="right"))
         keep = slice(first, max(first, last))
         count = keep.stop - keep.start
-        if count < CHOSEN.minimum_samples:
+        if count < MINIMUM_SAMPLES:
             raise RecordingError(
                 f"{self.name}: between {t0:g} and {t1:g} s there are {count} "
-                f"samples, at least {CHOSEN.minimum_samples} are needed; the recording runs from "
+                f"samples, at least {MINIMUM_SAMPLES} are needed; the recording runs from "
                 f"{self.t[0]:g} to {self.t[-1]:g} s"
             )
         return self.taken(keep)
@@ -288,10 +293,10 @@ class Recording:
         kept : consecutive samples as a slice, which is not copied, or indices that rise.
         """
         pieces = self._pieces(kept)
-        whole = [piece for piece in pieces if piece.stop - piece.start >= CHOSEN.minimum_samples]
+        whole = [piece for piece in pieces if piece.stop - piece.start >= MINIMUM_SAMPLES]
         if not whole:
             raise RecordingError(
-                f"{self.name}: each segment of a recording needs at least {CHOSEN.minimum_samples} "
+                f"{self.name}: each segment of a recording needs at least {MINIMUM_SAMPLES} "
                 f"samples, of {len(self)} samples none is left that has them"
             )
         scraps = len(pieces) - len(whole)
@@ -309,16 +314,14 @@ class Recording:
         notes = self.notes
         if scraps:
             several = "s" if scraps > 1 else ""
-            notes += (
-                f"left out: {scraps} segment{several} of under {CHOSEN.minimum_samples} samples",
-            )
+            notes += (f"left out: {scraps} segment{several} of under {MINIMUM_SAMPLES} samples",)
         return replace(self, **cut, breaks=tuple(int(k) for k in ends[:-1]), notes=notes)
 
     def without_scraps(self, samples: NDArray[np.intp]) -> NDArray[np.intp]:
         """Return samples but for those of segments that `taken` would leave out."""
         pieces = self._pieces(samples)
         lengths = np.array([piece.stop - piece.start for piece in pieces], dtype=np.intp)
-        return samples[np.repeat(lengths >= CHOSEN.minimum_samples, lengths)]
+        return samples[np.repeat(lengths >= MINIMUM_SAMPLES, lengths)]
 
     def _pieces(self, kept: slice | NDArray[np.intp]) -> list[slice]:
         """Return the segments that samples make, counted from the first of them."""
@@ -364,13 +367,13 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
     n, breaks, notes = len(first), list(first.breaks), list(first.notes)
     t[:n] = first.t
     for one in recordings[1:]:
-        if abs(one.dt - first.dt) > CHOSEN.jitter * first.dt / len(one):
+        if abs(one.dt - first.dt) > _JITTER * first.dt / len(one):
             raise RecordingError(
                 f"{one.name} is sampled at {one.dt:g} s, {first.name} at {first.dt:g} s: logs that "
                 f"are used together need one sampling interval"
             )
         end = float(t[n - 1])
-        moved = 0.0 if one.t[0] > end + first.dt else end + CHOSEN.pause - float(one.t[0])
+        moved = 0.0 if one.t[0] > end + first.dt else end + _PAUSE - float(one.t[0])
         t[n : n + len(one)] = one.t
         if moved:
             t[n : n + len(one)] += moved
@@ -522,8 +525,8 @@ def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dic
     dt : step of the grid [s].
     """
     off = _off_grid(t, dt)
-    if off <= CHOSEN.on_grid * dt:
-        return (t if off <= CHOSEN.same * dt else _grid(t[0], dt, t.size)), columns
+    if off <= _ON_GRID * dt:
+        return (t if off <= _SAME * dt else _grid(t[0], dt, t.size)), columns
     count = int(np.floor((t[-1] - t[0]) / dt + 1e-6)) + 1
     grid = _grid(t[0], dt, count, t[-1])
     slower = float(np.median(np.diff(t[: LONG + 1]))) > dt / 1.5

@@ -16,8 +16,7 @@ import numpy as np
 from codegen.arrays import Array, blocks, filled, large
 from codegen.escape import shown
 from models.logs.log import RecordingError
-from models.recordings.chosen import CHOSEN
-from models.recordings.record import CHANNELS, Recording
+from models.recordings.record import CHANNELS, MINIMUM_SAMPLES, Recording
 from models.schema import Table, changed
 from models.vehicle import AREAS, BICYCLE, Vehicle
 
@@ -149,7 +148,7 @@ class Repair:
         if not (first or last):
             return repaired
         segments = [slice(one.start + first, one.stop - last) for one in repaired.segments]
-        kept = [one for one in segments if one.stop - one.start >= CHOSEN.minimum_samples]
+        kept = [one for one in segments if one.stop - one.start >= MINIMUM_SAMPLES]
         if not kept:
             whole = "any segment of its" if repaired.breaks else "its"
             raise RecordingError(

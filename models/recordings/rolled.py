@@ -22,8 +22,20 @@ from codegen import Scan
 from codegen.arrays import Array, blocks, large
 from models.logs.log import RecordingError
 from models.logs.signals import AXLES, WHEELS
-from models.recordings.chosen import CHOSEN
 from models.recordings.wheels import DRIVEN, Wheels
+
+SLIP = 0.03  # share of the speed; more, and `noise`, is no usual slip
+NOISE = 0.05  # [m/s]
+# share of the speed: wheels that differ by less, and `noise`, have no slip that tells them
+# apart
+ALIKE = 0.01
+_WINDOW = 0.05  # [s], over which the acceleration of a wheel is taken
+MEMORY = 0.15  # [s], over which that of the car is
+BRAKED = -1.0  # [m/s²]: wheels are braked below
+ROLLS_OUT = -0.3  # [m/s²]: wheels are driven above
+UNSURE = 0.25  # of the largest acceleration: how far it may have changed while nothing is trusted
+PATIENCE = 2.0  # [s]: after it wheels that all agree again are believed the sooner
+SLOW = 1.0  # [m/s]: below it sensors of wheels show nothing
 
 
 class _Rolled(NamedTuple):
@@ -46,11 +58,11 @@ def rolled(
     """
     names, most = _sources(speeds, wheels), wheels.acceleration
     v_x = large((r.size,))
-    span = max(1, round(CHOSEN.rolled_window / dt))
+    span = max(1, round(_WINDOW / dt))
     driven = DRIVEN[wheels.driven] if wheels.driven else WHEELS
     pushed = {*driven, WHEELS[4]} if driven else set()  # a lone encoder counts with the motor
     free = [not pushed & set(group) for group in names]
-    rule = np.array([dt, most, most + CHOSEN.noise / (span * dt)])
+    rule = np.array([dt, most, most + NOISE / (span * dt)])
     scan, constants = _trust_scan(len(names)), {"rule": rule, "free": np.array(free, dtype=float)}
     gated = untrusted = 0
     trust: Array | None = None
@@ -73,7 +85,7 @@ def rolled(
         v_x[part] = record["v"].ravel()
         untrusted += int(np.count_nonzero(record["untrusted"] > 0.0))
         now = v_x[part, None]
-        agree = np.abs(rows - now) <= CHOSEN.noise + CHOSEN.slip * np.abs(now)
+        agree = np.abs(rows - now) <= NOISE + SLIP * np.abs(now)
         gated += int(np.count_nonzero(~agree.all(axis=1)))
     return _Rolled(v_x, gated, untrusted)
 
@@ -100,16 +112,14 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: ca.SX, free: ca.SX) ->
     v, a, since, known = trust
     dt, most, limit = ca.vertsplit(rule)
     ahead, passed = v + a * dt, since + dt
-    near, alike = (
-        CHOSEN.noise + share * ca.fabs(ahead) for share in (CHOSEN.slip, CHOSEN.rolled_alike)
-    )
+    near, alike = (NOISE + share * ca.fabs(ahead) for share in (SLIP, ALIKE))
 
     steady = ca.fabs(rates) <= limit
     agree = ca.logic_and(ca.mmax(c) - ca.mmin(c) <= near, ca.logic_all(steady))
-    doubt = CHOSEN.unsure * most * since
-    doubt = ca.if_else(agree, doubt * (1.0 + since / CHOSEN.patience), doubt)
-    slow = ca.fmax(ca.fabs(ahead), ca.mmax(ca.fabs(c))) < CHOSEN.rolled_slow
-    doubt = ca.if_else(slow, CHOSEN.rolled_slow, doubt)
+    doubt = UNSURE * most * since
+    doubt = ca.if_else(agree, doubt * (1.0 + since / PATIENCE), doubt)
+    slow = ca.fmax(ca.fabs(ahead), ca.mmax(ca.fabs(c))) < SLOW
+    doubt = ca.if_else(slow, SLOW, doubt)
     likely = ca.logic_and(ca.logic_or(slow, steady), ca.fabs(c - ahead) <= near + doubt)
     some = ca.logic_any(likely)
 
@@ -118,20 +128,20 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: ca.SX, free: ca.SX) ->
     v_held, a_held = ca.if_else(astray, v, ahead), ca.if_else(astray, 0.0, a)
 
     # Driven wheels run ahead of the car, however little.
-    likely = _rather(likely, free, ca.logic_not(a > CHOSEN.braked))
-    likely = _rather(likely, ca.fabs(rates - a) <= CHOSEN.unsure * most, ca.SX(0.0))
+    likely = _rather(likely, free, ca.logic_not(a > BRAKED))
+    likely = _rather(likely, ca.fabs(rates - a) <= UNSURE * most, ca.SX(0.0))
     best = ca.if_else(
-        a > CHOSEN.rolls_out,
+        a > ROLLS_OUT,
         _lowest(c, likely),
-        ca.if_else(a < CHOSEN.braked, -_lowest(-c, likely), _nearest(c, likely, ahead)),
+        ca.if_else(a < BRAKED, -_lowest(-c, likely), _nearest(c, likely, ahead)),
     )
     kept = ca.logic_and(likely, ca.fabs(c - best) <= alike)
     reach = most * dt + doubt
     now = ca.fmin(ca.fmax(_mean(c, kept), ahead - reach), ahead + reach)
     # After a while, what was trusted before says little of how it goes on.
-    slope = ca.if_else(since > CHOSEN.memory, _mean(rates, kept), (now - known) / passed)
+    slope = ca.if_else(since > MEMORY, _mean(rates, kept), (now - known) / passed)
     slope = ca.fmin(ca.fmax(slope, -most), most)
-    a_now = a + (1.0 - ca.exp(-passed / CHOSEN.memory)) * (slope - a)
+    a_now = a + (1.0 - ca.exp(-passed / MEMORY)) * (slope - a)
     return _Trust(
         ca.if_else(some, now, v_held),
         ca.if_else(some, a_now, a_held),

@@ -15,10 +15,21 @@ from models.logs.clock import Raw
 from models.logs.log import RecordingError
 from models.logs.signals import AXLES, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.units import SPEED, is_given
-from models.recordings.chosen import CHOSEN
 from models.rules import require_within
 from models.schema import Table, changed
 from models.vehicle import Vehicle
+
+_RADII = (0.01, 2.0)  # of a wheel [m], of model cars to dump trucks
+_LENGTHS = (0.05, 20.0)  # of a track and a wheelbase [m]
+_ACCELERATIONS = (0.5, 100.0)  # [m/s²]
+_STRAIGHT = 0.05  # [rad/s], largest yaw rate
+_EVEN = 0.5  # [m/s²], largest acceleration
+_FAST = 0.3  # of the speed that 5 % of the samples exceed: slower ones do not count
+_LONG_ENOUGH = 2.0  # [s] of such driving, at least
+_AGREES = 0.02  # of the median: farther off, a wheel slips
+_SPREAD = 0.05  # between quartiles, as a share of the median, beyond which nothing is learnt
+_SPEEDS = (0.8, 1.25)  # speed over ground per speed of a wheel, of one that shows a speed
+_MOST = 200_000  # samples that are looked at
 
 DRIVEN: Mapping[str, tuple[str, ...]] = {
     "front": AXLES[0],
@@ -57,13 +68,13 @@ class Wheels:
             given = getattr(self, name)
             if len(given) not in sizes:
                 raise RecordingError(f"wheels: {name} must be {words}, not {len(given)} numbers")
-        for name, ends in (("radius", CHOSEN.radii), ("track", CHOSEN.lengths)):
+        for name, ends in (("radius", _RADII), ("track", _LENGTHS)):
             for one in getattr(self, name):
                 require_within(RecordingError, *ends, **{f"wheels: {name}": one})
         if self.wheelbase is not None:
-            require_within(RecordingError, *CHOSEN.lengths, **{"wheels: wheelbase": self.wheelbase})
+            require_within(RecordingError, *_LENGTHS, **{"wheels: wheelbase": self.wheelbase})
         require_within(
-            RecordingError, *CHOSEN.accelerations, **{"wheels: acceleration": self.acceleration}
+            RecordingError, *_ACCELERATIONS, **{"wheels: acceleration": self.acceleration}
         )
         if self.driven and self.driven not in DRIVEN:
             raise RecordingError(
@@ -141,7 +152,7 @@ def identified_scales(
     parts : by signal its channels in SI; v_x, wheels, and r where it is there.
     """
     t = parts["v_x"][0].t
-    t = t[:: -(-t.size // CHOSEN.most)]
+    t = t[:: -(-t.size // _MOST)]
 
     def at(name: str) -> Array:
         one_clock = [np.interp(t, one.t, one.values) for one in parts[name]]
@@ -156,10 +167,10 @@ def identified_scales(
         if given is None:
             continue
         value, seconds = given
-        unit, (low, high) = units[name], CHOSEN.speeds
+        unit, (low, high) = units[name], _SPEEDS
         speed = low <= value <= high and (not is_given(unit) or quantity_of(name, unit) == SPEED)
         turns = not speed and (not is_given(unit) or quantity_of(name, unit) != SPEED)
-        if speed or (turns and CHOSEN.radii[0] <= value <= CHOSEN.radii[1]):
+        if speed or (turns and _RADII[0] <= value <= _RADII[1]):
             found[name] = Scale(value, turns, seconds)
     return found
 
@@ -175,19 +186,19 @@ def _identified_scale(t: Array, v_x: Array, r: Array, wheel: Array) -> tuple[flo
     half = max(1, round(0.25 / step))
     k = np.arange(t.size)
     low, high = np.maximum(k - half, 0), np.minimum(k + half, t.size - 1)
-    even: NDArray[np.bool_] = np.abs(v_x[high] - v_x[low]) <= CHOSEN.even * (t[high] - t[low])
-    fast = np.abs(v_x) > CHOSEN.fast * float(np.percentile(np.abs(v_x), 95))
-    kept = even & fast & (np.abs(r) <= CHOSEN.straight) & np.isfinite(wheel) & (wheel != 0.0)
-    if np.count_nonzero(kept) * step < CHOSEN.long_enough:
+    even: NDArray[np.bool_] = np.abs(v_x[high] - v_x[low]) <= _EVEN * (t[high] - t[low])
+    fast = np.abs(v_x) > _FAST * float(np.percentile(np.abs(v_x), 95))
+    kept = even & fast & (np.abs(r) <= _STRAIGHT) & np.isfinite(wheel) & (wheel != 0.0)
+    if np.count_nonzero(kept) * step < _LONG_ENOUGH:
         return None
     v, w = v_x[kept], wheel[kept]
     quarter, middle, other = np.percentile(v / w, [25, 50, 75])
-    if abs(other - quarter) > CHOSEN.spread * abs(middle):
+    if abs(other - quarter) > _SPREAD * abs(middle):
         return None
-    rolls = np.abs(v / w - middle) <= CHOSEN.agrees * abs(middle)
+    rolls = np.abs(v / w - middle) <= _AGREES * abs(middle)
     v, w = v[rolls], w[rolls]
     seconds = float(w.size * step)
-    return (float(v @ w) / float(w @ w), seconds) if seconds >= CHOSEN.long_enough else None
+    return (float(v @ w) / float(w @ w), seconds) if seconds >= _LONG_ENOUGH else None
 
 
 def scale_text(scales: Mapping[str, Scale]) -> str:

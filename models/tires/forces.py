@@ -9,7 +9,10 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import casadi as ca
 
-from models.tires.chosen import CHOSEN
+_ROLLING_FLOOR = 1e-3  # 1 + κ of a locked wheel: slides in the same direction, divides by no zero
+_COSINE_FLOOR = 1e-3  # |cos α| of a wheel that moves sideways
+NO_FORCE = 1e-6  # N; rounds the root of a sum of squares at zero, so that its derivative exists
+
 
 Expression: TypeAlias = Any  # float, casadi.DM, SX or MX; CasADi has no stubs
 
@@ -98,11 +101,11 @@ def _slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float)
     kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
     C_alpha : cornering stiffness [N/rad].   C_kappa : longitudinal slip stiffness [N].
     """
-    tan_alpha = ca.sin(alpha) / ca.fmax(ca.fabs(ca.cos(alpha)), CHOSEN.cosine_floor)
+    tan_alpha = ca.sin(alpha) / ca.fmax(ca.fabs(ca.cos(alpha)), _COSINE_FLOOR)
     p_x = C_kappa * kappa
     p_y = C_alpha * tan_alpha
-    size = ca.sqrt(p_x**2 + p_y**2 + CHOSEN.no_force**2)
-    return Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, CHOSEN.rolling_floor))
+    size = ca.sqrt(p_x**2 + p_y**2 + NO_FORCE**2)
+    return Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, _ROLLING_FLOOR))
 
 
 # What tires share whose stiffness is the same at every load: methods of such tires.

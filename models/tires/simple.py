@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 from models.rules import require_positive_fields
 from models.tires import forces as constant_stiffness
-from models.tires.chosen import CHOSEN
-from models.tires.forces import Expression, Slips, TireForces, positive, smaller
+from models.tires.forces import NO_FORCE, Expression, Slips, TireForces, positive, smaller
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +69,7 @@ class FialaTire:
         """Force over the demand of a tread that never slides [-]."""
         sliding = 3.0 * mu * self.friction * positive(F_z)  # demand at which all contact slides
         demand = s.size / s.rolling
-        x = smaller(demand / (sliding + CHOSEN.no_force), 1.0)
+        x = smaller(demand / (sliding + NO_FORCE), 1.0)
         return (1.0 - x + x**2 / 3.0) * smaller(1.0 / s.rolling, sliding / s.size)
 
     forces = constant_stiffness.brush_forces

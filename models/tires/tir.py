@@ -19,8 +19,12 @@ from typing import Literal, NamedTuple
 from codegen.errors import TireidError
 from codegen.escape import shown
 from models.schema import read_bytes
-from models.tires.chosen import CHOSEN
 from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
+
+_LARGEST = 1e12  # of a number, in the unit of the file: a stiffness in N/km fits
+_SOME = 10  # lines in a message
+_FITTYPS = (5, 6, 21, 51, 52)  # MF-Tyre up to 5.2 under its several numbers; 60 and above is 6.x
+_PKY4_OF_52 = 2.0  # PKY4, as MF-Tyre 5.2 has it fixed
 
 # Units of a tire property file: which keys have one, and what it is in SI.
 #
@@ -108,10 +112,8 @@ class TirFile:
     def _parsed(self, key: str, entry: _Entry) -> float:
         if _NUMBER.fullmatch(entry.value):
             value = float(entry.value.upper().replace("D", "E"))
-            if CHOSEN.largest < abs(value) < math.inf:
-                raise self.error(
-                    f"line {entry.line}: {key} must be below {CHOSEN.largest:g}, is {value}"
-                )
+            if _LARGEST < abs(value) < math.inf:
+                raise self.error(f"line {entry.line}: {key} must be below {_LARGEST:g}, is {value}")
             if math.isfinite(value):
                 return value
         raise self.error(
@@ -133,7 +135,7 @@ class TirFile:
 
     def _require_one(self, key: str, lines: Collection[int]) -> None:
         if len(lines) > 1:
-            some = ", ".join(str(line) for line in list(lines)[: CHOSEN.some])
+            some = ", ".join(str(line) for line in list(lines)[:_SOME])
             raise self.error(f"{key} has different values in lines {some}")
 
     def _unit(self, key: str) -> float:
@@ -277,7 +279,7 @@ def _require_mf52(tir: TirFile) -> None:
     """Refuse other models, whose coefficients have the same names and another meaning."""
     fittyp = tir.number("FITTYP")
     model = tir.text("PROPERTY_FILE_FORMAT", "")
-    if fittyp is not None and fittyp not in CHOSEN.fittyps:
+    if fittyp is not None and fittyp not in _FITTYPS:
         what = "Magic Formula 6.x" if fittyp >= 60 else "an unknown model"
         raise tir.error(
             f"FITTYP = {fittyp:g} is {what}; its equations differ, only MF 5.2 and PAC2002 are read"
@@ -292,7 +294,7 @@ def _require_mf52(tir: TirFile) -> None:
     if "PHY3" in tir and (model or fittyp is not None):
         same = {
             *_PRESSURES_OF_OTHERS,
-            *(["PKY4"] if found.get("PKY4") == CHOSEN.pky4_of_52 else []),
+            *(["PKY4"] if found.get("PKY4") == _PKY4_OF_52 else []),
         }
         found = {key: value for key, value in found.items() if key not in same}
     if marks := [f"{key} = {value:g}" for key, value in found.items()]:

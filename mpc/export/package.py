@@ -15,7 +15,6 @@ from codegen.arrays import Array
 from codegen.package import rows
 from codegen.template import Values, Words, filled
 from identifier.frozen import vehicle_numbers
-from mpc.export.chosen import CHOSEN
 from mpc.prediction import build_stage, state_size
 from mpc.problem import Problem
 from mpc.realtime import Measurement, Status, Tracker
@@ -23,6 +22,20 @@ from mpc.realtime.c_source import PREFIX, c_sources
 from mpc.realtime.tracker import TOLERANCE as SOLVER_TOLERANCE
 from mpc.tires import PredictionTire
 from mpc.tires.tire import ALL
+
+_STEPS = 200  # of the drive of the self-test
+_SPEED = 20.0  # m/s
+_HEAVIER = 1.08  # mass of the car that is driven, over that of the prediction
+_LATERAL = 4.0  # m/s^2, peak of what the path asks for
+_LANE_CHANGE = 1.5  # s
+_DIGITS = 9  # of its numbers
+_OFF_PATH = 120  # step at which sensors show a car off the path
+_OFF_MAP = 140  # step at which they show a motion beyond the limits
+_SLOW = 10  # steps before the end, the road ahead wants a halt at one place
+# rad, largest difference of the steering that the self-test allows: in double compilers differ
+# by nothing
+_TOLERANCE_DOUBLE = 1e-9
+_TOLERANCE_SINGLE = 1e-3  # rad, likewise: float solves each problem to a tolerance of its own
 
 _Params = NDArray[np.void]
 MACROS = {"tolerance": "TOLERANCE"}  # members that are other in float
@@ -42,10 +55,10 @@ def _initializer(value: NDArray[Any]) -> str:
 
 
 FAULTS: dict[int, dict[str, float]] = {
-    CHOSEN.off_path: {"e_y": 9.0},
-    CHOSEN.off_path + 1: {"e_psi": -2.0},
-    CHOSEN.off_map: {"r": 8.0},
-    CHOSEN.off_map + 1: {"v_y": -30.0},
+    _OFF_PATH: {"e_y": 9.0},
+    _OFF_PATH + 1: {"e_psi": -2.0},
+    _OFF_MAP: {"r": 8.0},
+    _OFF_MAP + 1: {"v_y": -30.0},
 }
 
 
@@ -69,7 +82,7 @@ class Vectors(NamedTuple):
         return Measurement(e_y, e_psi, v_y, r, kappa, v_x)
 
 
-def record(tracker: Tracker, steps: int = CHOSEN.steps) -> Vectors:
+def record(tracker: Tracker, steps: int = _STEPS) -> Vectors:
     """Return a drive of a heavier car through a lane change, with faults of the sensors in between.
 
     Numbers are rounded, and the car is computed without a function of a library: the record does
@@ -81,17 +94,17 @@ def record(tracker: Tracker, steps: int = CHOSEN.steps) -> Vectors:
     stride = max(1, round(problem.dt / period))
     offset = round(float(tracker.times[1]) / period)
     road = _road(steps + offset + stride * problem.horizon, period)
-    road[steps - CHOSEN.slow + offset + stride * (problem.horizon - 1), 1] = 1.0
+    road[steps - _SLOW + offset + stride * (problem.horizon - 1), 1] = 1.0
     blank = np.zeros((steps, 4)), np.zeros((steps, 2))
     vectors = Vectors(*blank, road, offset, stride)
     car = _Car(tracker)
     for k in range(steps):
-        vectors.measured[k] = np.round(car.x[:4], CHOSEN.digits)
+        vectors.measured[k] = np.round(car.x[:4], _DIGITS)
         for name, value in FAULTS.get(k, {}).items():
             vectors.measured[k, Measurement._fields.index(name)] = value
         command = tracker.step(vectors.measurement(k, problem.horizon))
         vectors.expected[k] = command.steering, int(command.status)
-        car.advance(command.steering, road[k, 0], CHOSEN.speed)
+        car.advance(command.steering, road[k, 0], _SPEED)
     tracker.reset()
     return vectors
 
@@ -104,7 +117,7 @@ class _Car:
         self.step, self.period, self.weights = build_stage(tire.structure), tracker.period, tire
         self.x = np.zeros(state_size(tire.structure))
         self.x[0] = 0.3
-        self.car = tire.car * np.array([CHOSEN.heavier, CHOSEN.heavier, 1.0, 1.0])
+        self.car = tire.car * np.array([_HEAVIER, _HEAVIER, 1.0, 1.0])
         self.on_the_way = deque([0.0] * round(tracker.delay / tracker.period))
 
     def advance(self, command: float, kappa: float, v_x: float) -> None:
@@ -118,12 +131,12 @@ def _road(n: int, period: float) -> Array:
     """Return a lane change and its way back, bent by cubics, (n, 2)."""
     t = period * np.arange(n, dtype=np.float64)
     kappa = np.zeros(n)
-    for begin, sign in ((0.4, 1.0), (0.4 + CHOSEN.lane_change, -1.0)):
-        z = np.clip((t - begin) / CHOSEN.lane_change, 0.0, 1.0)
+    for begin, sign in ((0.4, 1.0), (0.4 + _LANE_CHANGE, -1.0)):
+        z = np.clip((t - begin) / _LANE_CHANGE, 0.0, 1.0)
         kappa += sign * (1.0 - 2.0 * z) * z * (1.0 - z)
-    kappa *= CHOSEN.lateral / CHOSEN.speed**2 / 0.0962  # the largest value of the cubic
-    road = np.stack([kappa, CHOSEN.speed - 0.25 * t], axis=1)
-    return road.round(CHOSEN.digits)
+    kappa *= _LATERAL / _SPEED**2 / 0.0962  # the largest value of the cubic
+    road = np.stack([kappa, _SPEED - 0.25 * t], axis=1)
+    return road.round(_DIGITS)
 
 
 def vectors_header(name: str, found: Vectors) -> str:
@@ -134,8 +147,8 @@ def vectors_header(name: str, found: Vectors) -> str:
         [
             f"#define VECTORS {len(found.measured)}U\n"
             f"#define VECTOR_OFFSET {found.offset}U\n#define VECTOR_STRIDE {found.stride}U\n"
-            f"#define VECTOR_TOLERANCE_DOUBLE {CHOSEN.tolerance_double:g} /* rad */\n"
-            f"#define VECTOR_TOLERANCE_SINGLE {CHOSEN.tolerance_single:g} /* rad */\n",
+            f"#define VECTOR_TOLERANCE_DOUBLE {_TOLERANCE_DOUBLE:g} /* rad */\n"
+            f"#define VECTOR_TOLERANCE_SINGLE {_TOLERANCE_SINGLE:g} /* rad */\n",
             f"static const double vector_input[VECTORS][4] = {{\n{rows(found.measured)}}};\n",
             f"static const double vector_output[VECTORS][2] = {{\n{rows(found.expected)}}};\n",
             f"static const double vector_road[{len(found.road)}][2] = {{\n{rows(found.road)}}};\n",
@@ -220,8 +233,8 @@ def mpc_readme(package: MpcPackage, about_figures: str) -> str:
                 for speed, row in zip(p["speeds"], p["gains"], strict=True)
             ),
             "samples": str(len(package.vectors.measured)),
-            "tolerance_double": f"{CHOSEN.tolerance_double:g}",
-            "tolerance_single": f"{CHOSEN.tolerance_single:g}",
+            "tolerance_double": f"{_TOLERANCE_DOUBLE:g}",
+            "tolerance_single": f"{_TOLERANCE_SINGLE:g}",
             "figures": about_figures,
             **package.about,
         },

@@ -11,9 +11,14 @@ from codegen.arrays import Array
 from identifier.axle.car import car_numbers
 from identifier.method import Method
 from models.vehicle import GRAVITY, Vehicle
-from mpc.handover.chosen import CHOSEN
 from mpc.tires import PredictionTire
 from mpc.tires.tire import Car, Point
+
+LARGEST_SLIP = 0.25  # rad: an axle slides long before
+_SHARES = (0.02, 0.04, 0.08, 0.16, 0.28, 0.44, 0.64, 1.0)  # of the largest slip that is judged
+_MOST_GRIP = 1.8  # static axle loads: no road tire has more
+_LEAST_GRIP = 0.03  # static axle loads at a slip of 0.1 rad and more: less is no road
+_WRONG_WAY = 0.03  # static axle loads that a force may push the wrong way, for offsets of sensors
 
 
 def law_complaint(method: Method, vehicle: Vehicle) -> str | None:
@@ -27,9 +32,7 @@ def law_complaint(method: Method, vehicle: Vehicle) -> str | None:
     return f"the certificate fails: {'; '.join(failed)}" if failed else None
 
 
-def tire_complaint(
-    tire: PredictionTire, v_x: float, largest: float = CHOSEN.largest_slip
-) -> str | None:
+def tire_complaint(tire: PredictionTire, v_x: float, largest: float = LARGEST_SLIP) -> str | None:
     """Return why a tire must not be steered with at a speed, or None.
 
     Its forces are finite, push against the slip of their axle, rise from zero slip, and lie between
@@ -45,11 +48,11 @@ def tire_complaint(
         return "a force is not finite"
     for i, axle in enumerate(("front", "rear")):
         push = pushes[:, i]
-        if push.max() > CHOSEN.most_grip:
+        if push.max() > _MOST_GRIP:
             return f"the {axle} axle would carry {push.max():.2f} times its load"
-        if push.min() < -CHOSEN.wrong_way:
+        if push.min() < -_WRONG_WAY:
             return f"the {axle} axle would push the wrong way by {-push.min():.2f} of its load"
-        if largest >= 0.1 and push[..., -1].min() < CHOSEN.least_grip:
+        if largest >= 0.1 and push[..., -1].min() < _LEAST_GRIP:
             return f"the {axle} axle would slide at {push[..., -1].min():.2f} of its load"
         if not (push[0].sum(axis=0)[0] > 0.0):
             return f"the force of the {axle} axle does not rise with slip"
@@ -61,7 +64,7 @@ def _forces(tire: PredictionTire, v_x: float, largest: float) -> tuple[Array, Ar
     arm, load = car_numbers(tire.vehicle)[:, [0, 3]].T
     load = load * tire.vehicle.load_ratio(v_x)
     signs = np.array([1.0, -1.0])[:, None]
-    alpha = signs * largest * np.array(CHOSEN.shares)
+    alpha = signs * largest * np.array(_SHARES)
     r = np.array([0.0, 1.0, -1.0])[:, None, None] * GRAVITY / (3.0 * v_x)
     alpha, r = np.broadcast_arrays(alpha[None], r)
     v_y = arm[1] * -r - v_x * np.tan(alpha)  # both axles at the same slip

@@ -7,10 +7,13 @@ import numpy as np
 
 from codegen.arrays import Array
 from mpc.handover.certificate import tire_complaint
-from mpc.handover.chosen import CHOSEN
 from mpc.handover.judge import ChiSquare, Judge, Window
 from mpc.handover.rules import Rules, Verdict
 from mpc.tires import PredictionTire
+
+_LEAST = 0.15  # of the friction that a tire was learnt on: ice, after a dry road
+_GRID = 13  # frictions that are tried at once
+_PRIOR_SD = 0.7  # standard deviation of ln μ where nothing is seen
 
 # A tire on a road of another friction, and the friction that explains the last moments best.
 #
@@ -51,7 +54,7 @@ def fit_friction(
     samples: Array,
     *,
     known: float = 1.0,
-    between: tuple[float, float] = (CHOSEN.least, 1.0),
+    between: tuple[float, float] = (_LEAST, 1.0),
     scale: float = 1.0,
 ) -> _FrictionFit:
     """Return the friction that explains samples best, and what is known of roads beforehand.
@@ -66,11 +69,11 @@ def fit_friction(
         weights = np.stack([at_friction(tire, math.exp(at)).weights for at in log_ratios])
         chi_squares = judge.chi_squares(tire, weights, samples)
         total = np.array([chi_square.total for chi_square in chi_squares])
-        return total / scale + ((log_ratios - center) / CHOSEN.prior_sd) ** 2, chi_squares
+        return total / scale + ((log_ratios - center) / _PRIOR_SD) ** 2, chi_squares
 
-    grid = np.linspace(least, most, CHOSEN.grid)
+    grid = np.linspace(least, most, _GRID)
     cost, _ = costs(grid)
-    around = grid[int(np.argmin(cost))] + (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, CHOSEN.grid)
+    around = grid[int(np.argmin(cost))] + (grid[1] - grid[0]) * np.linspace(-1.0, 1.0, _GRID)
     fine = np.append(np.clip(around, least, most)[:-1], center)  # what is known, too
     cost, chi_squares = costs(fine)
     best = int(np.argmin(cost))
@@ -160,7 +163,7 @@ def look_at_road(
         estimate = road._replace(ratio=found.ratio, changed_at=since)
         return Change(verdict, estimate, found.tire, now.total, found.chi_square.total)
 
-    drop = fit(rules.last_moments, CHOSEN.least, road.ratio, wrong=rules.wrong)
+    drop = fit(rules.last_moments, _LEAST, road.ratio, wrong=rules.wrong)
     if drop is not None:
         found, now = drop
         good = found.chi_square.mean < min(rules.wrong * baseline, 0.5 * now.mean)
@@ -168,7 +171,7 @@ def look_at_road(
             return change(Verdict.FRICTION, found, now, t)
     since = t - road.changed_at
     if since <= rules.follow:
-        better = fit(rules.last_moments + since, CHOSEN.least, 1.0)
+        better = fit(rules.last_moments + since, _LEAST, 1.0)
         if better is not None and better[0].gain >= rules.correction:
             return change(Verdict.CORRECTION, *better, road.changed_at)
     elif window.duration >= judge.lookback(rules.recovery_seconds):

@@ -10,12 +10,15 @@ from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
 from models.vehicle import Vehicle
-from mpc.handover.certificate import law_complaint, tire_complaint
-from mpc.handover.chosen import CHOSEN
+from mpc.handover.certificate import LARGEST_SLIP, law_complaint, tire_complaint
 from mpc.handover.judge import ChiSquare, Judge, Window
 from mpc.handover.road import Road, look_at_road
 from mpc.handover.rules import Decision, Rules, Verdict
 from mpc.tires import PredictionTire, prediction_tire
+
+_LEARNS = 0.005  # rad: below, a tire is a straight line in noise
+_BEYOND = 1.2  # slip that is trusted over the largest one that was learnt from
+_LOST = 5  # samples in a row after which a window is none
 
 
 class Excitation:
@@ -36,7 +39,7 @@ class Excitation:
         r : yaw rate [rad/s].   delta : angle of the front road wheels [rad].
         """
         size = np.abs(slips(np.array([[v_x, v_y, r, delta]]), self._vehicle))[0]
-        self._time += self._dt * (size >= CHOSEN.learns)
+        self._time += self._dt * (size >= _LEARNS)
         self._largest += 0.1 * np.maximum(size - self._largest, 0.0)  # not of one noisy sample
 
     def complaint(self, model: TireModel, samples: Array) -> str | None:
@@ -54,7 +57,7 @@ class Excitation:
         if model.known_slip is not None:
             driven = np.quantile(np.abs(slips(samples, self._vehicle)), 0.95, axis=0)
             for i, axle in enumerate(("front", "rear")):
-                known = CHOSEN.beyond * model.known_slip[i] + CHOSEN.learns
+                known = _BEYOND * model.known_slip[i] + _LEARNS
                 if driven[i] > known:
                     return (
                         f"the {axle} axle slips {driven[i]:.3f} rad, it is known to {known:.3f} rad"
@@ -67,10 +70,8 @@ class Excitation:
         Ladders saturate whatever they have seen; any other tire only as far as the car slipped.
         """
         if tire.structure.saturates:
-            return CHOSEN.largest_slip
-        return float(
-            np.clip(CHOSEN.beyond * self._largest.min(), 2.0 * CHOSEN.learns, CHOSEN.largest_slip)
-        )
+            return LARGEST_SLIP
+        return float(np.clip(_BEYOND * self._largest.min(), 2.0 * _LEARNS, LARGEST_SLIP))
 
 
 def slips(samples: Array, vehicle: Vehicle) -> Array:
@@ -162,7 +163,7 @@ class Supervisor:
             self._lost += 1
             sample = self._sample  # for a moment the last one stands for it
         self._sample = sample
-        if self._lost > CHOSEN.lost or not sample[0] >= self.identifier.method.min_speed:
+        if self._lost > _LOST or not sample[0] >= self.identifier.method.min_speed:
             self._window.clear()
             return None
         self._window.add(sample)

@@ -13,13 +13,15 @@ import numpy as np
 
 from models.sensors import is_shown
 from mpc.cars import CarState, DoubleTrackCar
-from mpc.loop.chosen import CHOSEN
 from mpc.loop.lateral import LateralVelocity
 from mpc.loop.record import Drive, Recorder
 from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
 from mpc.path.path import Path, Projection
 from mpc.realtime.instance import Measurement
 from mpc.realtime.tracker import Tracker
+
+_SPUN = math.radians(45.0)  # side slip of the center of gravity [rad]
+_SLOWEST = 1.0  # m/s
 
 COMPLETED = "reached the end"
 GUIDES = ("X", "Y", "psi", "v_x")  # without which a car does not know where it is, for long
@@ -187,10 +189,10 @@ def _ending(
     """Return why the drive is over, or nothing while it goes on."""
     if abs(here.e_y) > widest:
         return f"left the path by more than {widest:g} m"
-    if abs(math.atan2(state.v_y, state.v_x)) > CHOSEN.spun:
+    if abs(math.atan2(state.v_y, state.v_x)) > _SPUN:
         return "spun"
-    if state.v_x < CHOSEN.slowest:
-        return f"slower than {CHOSEN.slowest:g} m/s"
+    if state.v_x < _SLOWEST:
+        return f"slower than {_SLOWEST:g} m/s"
     if here.s >= goal:
         return COMPLETED
     return f"not there after {time_limit:g} s" if state.t >= time_limit else ""

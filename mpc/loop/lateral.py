@@ -21,8 +21,10 @@ from identifier.inertial.beliefs import Body
 from identifier.run import OnlineIdentifier
 from models.rules import require_positive_fields
 from models.sensors import is_shown
-from mpc.loop.chosen import CHOSEN
 from mpc.loop.sensing import Measured
+
+_UNKNOWN = 1.0  # m/s: standard deviation of v_y where nothing is known
+_FINEST = 1e-3  # m/s: least deviation that is believed
 
 
 class LateralEstimate(NamedTuple):
@@ -99,7 +101,7 @@ class LateralVelocity:
         self._rolls = (0.0, 0.0)  # ä and its rate [m/s²], [m/s³]
         self._place: Array | None = None  # X, Y [m], dead reckoned
         self._v_y, self._bias, self._roll = math.nan, 0.0, self._body.roll
-        self._P = np.diag([0.0, CHOSEN.unknown**2, self.trust.bias**2, self._body.sd_roll**2])
+        self._P = np.diag([0.0, _UNKNOWN**2, self.trust.bias**2, self._body.sd_roll**2])
         self._surprise = 1.0  # mean square of the identifier's errors over what it tells of them
         self._last: tuple[Measured, float] | None = None  # a sample ago, and a + b - v_x r of it
 
@@ -114,9 +116,7 @@ class LateralVelocity:
         silent = not found or identifier.stale or identifier.diverged
         v_y, sd = (math.nan if silent else float(found[k].item()) for k in ("v_y", "v_y_sd"))
         if math.isnan(self._v_y):
-            self._v_y, self._P[1, 1] = (
-                (v_y, sd**2) if math.isfinite(v_y) else (0.0, CHOSEN.unknown**2)
-            )
+            self._v_y, self._P[1, 1] = (v_y, sd**2) if math.isfinite(v_y) else (0.0, _UNKNOWN**2)
         felt = m.a_y - self._bias
         if is_shown("a_y", m.a_y):
             level = felt - self._roll * self._rolls[0]
@@ -135,7 +135,7 @@ class LateralVelocity:
 
     def _listen(self, v_y: float, sd: float) -> None:
         """Correct by the identifier's v_y [m/s], as far as it has been as right as it says."""
-        time, innovation, sd = self.trust.correlation_time, v_y - self._v_y, max(sd, CHOSEN.finest)
+        time, innovation, sd = self.trust.correlation_time, v_y - self._v_y, max(sd, _FINEST)
         surprise = innovation**2 / (self._P[1, 1] + sd**2)
         self._surprise += min(self._dt / time, 1.0) * (surprise - self._surprise)
         self._correct(1, innovation, sd**2 * max(self._surprise, 1.0), 2.0 * time / self._dt)

@@ -18,8 +18,13 @@ from models.sensors import Sensor, SensorError
 from models.tires import Tire
 from models.vehicle import GRAVITY, Vehicle
 from mpc.cars import CarState
-from mpc.loop.chosen import CHOSEN
 from mpc.path.path import Path
+
+_BIAS_A_Y = 0.05  # m/s²: standard deviation from one unit to the next
+_BIAS_R = 0.001  # rad/s: standard deviation from one unit to the next
+_RAMP_TIME = 20.0  # s
+_RAMP_SPEED = 20.0  # m/s
+_LARGEST_ANGLE = 0.3  # rad at friction 1: beyond the peak of any tire for the road
 
 _EXACT = Sensor()
 
@@ -126,7 +131,7 @@ def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
     """
     if rng is None:
         return CarSensors(v_y=None, body_fixed=True)
-    same, (bias_r, bias_a_y) = inertial_unit(), rng.normal(0.0, [CHOSEN.bias_r, CHOSEN.bias_a_y])
+    same, (bias_r, bias_a_y) = inertial_unit(), rng.normal(0.0, [_BIAS_R, _BIAS_A_Y])
     return replace(
         same,
         v_y=None,
@@ -268,10 +273,8 @@ def cornering_limit(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0)
 @cache
 def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float) -> float:
     """Drive the ramp once for each car and road: setting up a drive asks a dozen times."""
-    rate = CHOSEN.largest_angle * mu / CHOSEN.ramp_time
-    ramp = StepSteer(
-        amplitude=CHOSEN.largest_angle * mu, rate_limit=rate, onset=0.1, duration=CHOSEN.ramp_time
-    )
+    rate = _LARGEST_ANGLE * mu / _RAMP_TIME
+    ramp = StepSteer(amplitude=_LARGEST_ANGLE * mu, rate_limit=rate, onset=0.1, duration=_RAMP_TIME)
     plant = Plant(vehicle, cast(Tire | None, tire))
-    run = plant.simulate(ramp, speed=CHOSEN.ramp_speed, friction=Friction(scale=mu))
+    run = plant.simulate(ramp, speed=_RAMP_SPEED, friction=Friction(scale=mu))
     return float(np.abs(run.a_y).max())

@@ -10,8 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from codegen.arrays import Array
-from mpc.path.chosen import CHOSEN
-from mpc.path.gates import iso_3888_1, iso_3888_2, slalom
+from mpc.path.gates import SPACING, iso_3888_1, iso_3888_2, slalom
 from mpc.path.line import Line, PathError, line_from_heading
 from mpc.path.path import Path
 
@@ -81,7 +80,7 @@ def line_along(sections: Sequence[Section]) -> Line:
     """Put sections one after another, from the origin along X."""
     starts = np.append(0.0, np.cumsum([section.length for section in sections]))
     headings = np.append(0.0, np.cumsum([section.angle for section in sections]))
-    steps = max(4, math.ceil(starts[-1] / CHOSEN.spacing - 1e-9))
+    steps = max(4, math.ceil(starts[-1] / SPACING - 1e-9))
     s = np.linspace(0.0, starts[-1], 4 * steps + 1)
     which = np.clip(np.searchsorted(starts, s, side="right") - 1, 0, len(sections) - 1)
     psi, kappa = np.empty_like(s), np.empty_like(s)

@@ -17,10 +17,22 @@ import numpy as np
 from scipy.interpolate import BSpline
 
 from codegen.arrays import Array
-from mpc.path.chosen import CHOSEN
 from mpc.path.line import Line, PathError
 from mpc.path.path import Path
 from mpc.path.waypoints import sample
+
+_KNOTS = 1.0  # m, about their distance
+_PER_INTERVAL = 4  # places between two knots where limits hold
+_GENTLY = 5.0  # m³: weight of ∫ (dκ/ds)² ds against the peak of |κ| [1/m]
+_CONE_SPACING = 3.0  # m
+_CAR_WIDTH = 1.8  # m
+_LANE_MARGIN = 0.05  # m, between the side of a car and the cones of a lane
+_SLALOM_MARGIN = 0.3  # m, and those of a slalom
+_RUN = 40.0  # m, before the first cones and after the last
+SPACING = 0.25  # m, longest step of the samples
+_NARROWEST = 1.0  # m, of a car
+_WIDEST = 2.6  # m, of a car
+_EASING = 6.0  # m
 
 _DEGREE = 5
 _OPTIONS: dict[str, Any] = {
@@ -49,9 +61,7 @@ class Gate:
 
     def cones(self) -> Array:
         """Return X, Y of its cones [m], (k, 2), at most 3 m from one another."""
-        x = np.linspace(
-            self.start, self.end, ceil((self.end - self.start) / CHOSEN.cone_spacing) + 1
-        )
+        x = np.linspace(self.start, self.end, ceil((self.end - self.start) / _CONE_SPACING) + 1)
         rows = [np.column_stack((x, np.full_like(x, y))) for y in (self.right, self.left)]
         return np.vstack([row for row in rows if np.isfinite(row).all()])
 
@@ -73,7 +83,7 @@ def line_through_gates(
         if gate.left - gate.right < 2.0 * clearance:
             raise PathError(f"gates: {gate} is too narrow for a clearance of {clearance} m")
     spline, inner = _straightest(tuple(gates), start, end, clearance, easing)
-    return sample(spline, inner, CHOSEN.spacing, "gates")
+    return sample(spline, inner, SPACING, "gates")
 
 
 @lru_cache(maxsize=16)
@@ -85,7 +95,7 @@ def _straightest(
     easing: float,
 ) -> tuple[BSpline, Array]:
     """Return the line as a spline and its knots; a course is asked for once for each drive."""
-    intervals = max(_DEGREE + 1, ceil((end[0] - start[0]) / CHOSEN.knots))
+    intervals = max(_DEGREE + 1, ceil((end[0] - start[0]) / _KNOTS))
     inner = np.linspace(start[0], end[0], intervals + 1)
     t = np.concatenate((np.full(_DEGREE, start[0]), inner, np.full(_DEGREE, end[0])))
     c = _coefficients(t, inner, gates, start, end, clearance, easing)
@@ -104,7 +114,7 @@ def _coefficients(
 ) -> Array:
     n = t.size - _DEGREE - 1
     edges = np.concatenate([[gate.start, gate.end] for gate in gates])
-    x = np.linspace(inner[0], inner[-1], CHOSEN.per_interval * (inner.size - 1) + 1)
+    x = np.linspace(inner[0], inner[-1], _PER_INTERVAL * (inner.size - 1) + 1)
     x = np.unique(np.concatenate((x, edges[(edges > x[0]) & (edges < x[-1])])))
     c, k = ca.MX.sym("c", n), ca.MX.sym("k")
     basis = [_basis(t, x, order) for order in range(4)]
@@ -124,7 +134,7 @@ def _coefficients(
     rows = ca.vertcat(y, ends, kappa - k, -kappa - k, easing * kappa_ds - k, -easing * kappa_ds - k)
     upper = np.concatenate((high, np.zeros(4 + 4 * x.size)))
     lower = np.concatenate((low, np.zeros(4), np.full(4 * x.size, -np.inf)))
-    cost = k + CHOSEN.gently * ca.sum1(np.gradient(x) * ca.sqrt(stretch) * kappa_ds**2)
+    cost = k + _GENTLY * ca.sum1(np.gradient(x) * ca.sqrt(stretch) * kappa_ds**2)
     problem = {"x": ca.vertcat(c, k), "f": cost, "g": rows}
     solver: Any = ca.nlpsol("line", "ipopt", problem, _OPTIONS)
     guess = np.append(np.linspace(start[1], end[1], n), 0.05)
@@ -155,7 +165,7 @@ def _basis(t: Array, x: Array, order: int) -> Any:
 # ours is the one of smallest peak curvature, see the gates above.
 
 
-def iso_3888_1(*, car_width: float = CHOSEN.car_width) -> Path:
+def iso_3888_1(*, car_width: float = _CAR_WIDTH) -> Path:
     """Return the double lane change of ISO 3888-1, 125 m between the first and the last cones.
 
     Parameters
@@ -170,10 +180,10 @@ def iso_3888_1(*, car_width: float = CHOSEN.car_width) -> Path:
         Gate(start=45.0, end=70.0, right=right + 3.5, left=right + 3.5 + middle),
         Gate(start=95.0, end=125.0, right=right, left=right + last),
     )
-    return _path("ISO 3888-1", gates, 0.5 * car_width + CHOSEN.lane_margin, 10.0, lanes=True)
+    return _path("ISO 3888-1", gates, 0.5 * car_width + _LANE_MARGIN, 10.0, lanes=True)
 
 
-def iso_3888_2(*, car_width: float = CHOSEN.car_width) -> Path:
+def iso_3888_2(*, car_width: float = _CAR_WIDTH) -> Path:
     """Return the obstacle avoidance of ISO 3888-2, 61 m between the first and the last cones.
 
     Arguments are those of `iso_3888_1`.
@@ -193,14 +203,12 @@ def iso_3888_2(*, car_width: float = CHOSEN.car_width) -> Path:
         Gate(start=25.5, end=36.5, right=side, left=side + middle),
         Gate(start=49.0, end=61.0, right=right, left=right + last),
     )
-    return _path("ISO 3888-2", gates, 0.5 * car_width + CHOSEN.lane_margin, 6.0, lanes=True)
+    return _path("ISO 3888-2", gates, 0.5 * car_width + _LANE_MARGIN, 6.0, lanes=True)
 
 
 def _checked(car_width: float) -> float:
-    if not CHOSEN.narrowest <= car_width <= CHOSEN.widest:
-        raise PathError(
-            f"car_width must be {CHOSEN.narrowest} to {CHOSEN.widest} m, it is {car_width}"
-        )
+    if not _NARROWEST <= car_width <= _WIDEST:
+        raise PathError(f"car_width must be {_NARROWEST} to {_WIDEST} m, it is {car_width}")
     return car_width
 
 
@@ -213,7 +221,7 @@ def _path(
     lanes: bool = False,
 ) -> Path:
     """Drive through the gates; where they are lanes, the car keeps them before and after."""
-    begin, finish = gates[0].start - CHOSEN.run, gates[-1].end + CHOSEN.run
+    begin, finish = gates[0].start - _RUN, gates[-1].end + _RUN
     line = line_through_gates(
         [replace(gates[0], start=begin), *gates[1:-1], replace(gates[-1], end=finish)]
         if lanes
@@ -240,5 +248,5 @@ def slalom(*, gap: float = 18.0, cones: int = 8) -> Path:
     sides = (0.0, math.inf), (-math.inf, 0.0)  # right and left of the gates in turn
     places = [(i * gap, *sides[i % 2]) for i in range(cones)]
     gates = [Gate(start=x, end=x, right=right, left=left) for x, right, left in places]
-    half = 0.5 * CHOSEN.car_width + CHOSEN.slalom_margin
-    return _path("slalom", gates, half, CHOSEN.easing)
+    half = 0.5 * _CAR_WIDTH + _SLALOM_MARGIN
+    return _path("slalom", gates, half, _EASING)

@@ -12,7 +12,9 @@ import numpy as np
 from codegen.arrays import Array
 from codegen.errors import TireidError
 from models.schema import require_few
-from mpc.path.chosen import CHOSEN
+
+_LARGEST_TURN = 0.3  # rad in one step; coarser samples would not carry the cubics between them
+_DISAGREEMENT = 0.02  # of a step, or rad; beside what cubics leave out at that turn
 
 
 class PathError(TireidError, ValueError):
@@ -70,9 +72,9 @@ def check_line(line: Line, name: str, closed: bool) -> None:
     if not (h > 0.0 and np.abs(s - h * np.arange(s.size)).max() <= 1e-6 * h):
         raise PathError(f"{name}: s must rise from 0 in equal steps")
     turn = float(h * np.abs(kappa).max())
-    if turn > CHOSEN.largest_turn:
+    if turn > _LARGEST_TURN:
         raise PathError(
-            f"{name}: a step may turn by at most {CHOSEN.largest_turn} rad, one turns by "
+            f"{name}: a step may turn by at most {_LARGEST_TURN} rad, one turns by "
             f"{turn:.3g}; "
             f"sample it finer than {h:.3g} m"
         )
@@ -83,7 +85,7 @@ def check_line(line: Line, name: str, closed: bool) -> None:
     turned = np.diff(psi) - 0.5 * h * (kappa[:-1] + kappa[1:])
     wrong = np.maximum(np.abs(along - 1.0), np.maximum(np.abs(across), np.abs(turned)))
     worst = int(wrong.argmax())
-    if wrong[worst] > CHOSEN.disagreement + 0.25 * turn**2:
+    if wrong[worst] > _DISAGREEMENT + 0.25 * turn**2:
         raise PathError(
             f"{name}: X, Y, psi and kappa must be one curve over s, at s = {s[worst]:.4g} m they "
             f"disagree by {wrong[worst]:.2g} of a step"

@@ -16,9 +16,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
-from mpc.path.chosen import CHOSEN
 from mpc.path.line import Ends, Line, PathError, check_line
 from mpc.path.waypoints import line_through, read_waypoints
+
+_LONGEST_STEP = 1.0  # m; shorter than any turn that a car can drive, so that no step skips a bend
+_SMALLEST_SLOPE = 0.3  # of 1 - κ e_y: near the center of a turn every s is as close as the next
+_TOLERANCE = 1e-9  # m
+_SEARCH_DISTANCE = 10.0  # m, from the last place of a car
+_STEPS = 200  # in search of the nearest point, at most
 
 # Where a car is along a path: the foot of the perpendicular, found by walking and never jumping.
 #
@@ -64,15 +69,15 @@ def _walk_to_foot(
     deviation there.
     """
     s = near
-    for _ in range(CHOSEN.steps):
+    for _ in range(_STEPS):
         X_s, Y_s, psi, kappa = point_of(s)
         cos_psi, sin_psi = math.cos(psi), math.sin(psi)
         along = (X - X_s) * cos_psi + (Y - Y_s) * sin_psi
         e_y = (Y - Y_s) * cos_psi - (X - X_s) * sin_psi
-        step = along / max(1.0 - kappa * e_y, CHOSEN.smallest_slope)
-        step = min(max(step, -CHOSEN.longest_step), CHOSEN.longest_step)
+        step = along / max(1.0 - kappa * e_y, _SMALLEST_SLOPE)
+        step = min(max(step, -_LONGEST_STEP), _LONGEST_STEP)
         goal = min(max(s + step, near - search_distance), near + search_distance)
-        if abs(goal - s) < CHOSEN.tolerance:
+        if abs(goal - s) < _TOLERANCE:
             break
         s = goal
     return Projection(float(s), float(e_y), float(psi), float(kappa))
@@ -284,7 +289,7 @@ class Path:
         if not (math.isfinite(X) and math.isfinite(Y) and math.isfinite(near or 0.0)):
             raise PathError(f"{self.name}: cannot project X = {X}, Y = {Y}, near = {near}")
         if near is not None:
-            return _walk_to_foot(self._point, X, Y, near, CHOSEN.search_distance)
+            return _walk_to_foot(self._point, X, Y, near, _SEARCH_DISTANCE)
         nearest = int(np.argmin((self.X - X) ** 2 + (self.Y - Y) ** 2))
         start = float(self.s[nearest])
         if nearest in (0, self.s.size - 1) and not self.closed:  # perhaps far beyond an end

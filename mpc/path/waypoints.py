@@ -15,8 +15,12 @@ from codegen.arrays import Array
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.schema import require_few
-from mpc.path.chosen import CHOSEN
 from mpc.path.line import Line, PathError, uniform_grid
+
+_FITS = 4  # of a line, each over the arc length of the one before
+_FARTHEST = 1e8  # of a way-point from the origin [m]: every map of the earth fits
+_SAME = 1e-6  # of the median gap: way-points as near as this are one
+_PIECES = 8  # of every interval between knots, for its length
 
 _LOBES, _SHARES = np.polynomial.legendre.leggauss(8)  # nodes on -1 to 1, and weights
 
@@ -76,7 +80,7 @@ def sample(spline: Any, knots: Array, spacing: float, name: str) -> Line:
     velocity, acceleration = spline.derivative(1), spline.derivative(2)
     # Quadrature needs pieces over which the speed changes little, even between far way-points.
     t = np.interp(
-        np.arange(CHOSEN.pieces * (knots.size - 1) + 1) / CHOSEN.pieces,
+        np.arange(_PIECES * (knots.size - 1) + 1) / _PIECES,
         np.arange(knots.size),
         knots,
     )
@@ -123,14 +127,14 @@ def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
         raise PathError(
             f"{name}: way-points must be finite, number {bad[0] + 1} is {points[bad[0]].tolist()}"
         )
-    far = np.flatnonzero(np.abs(points).max(axis=1) > CHOSEN.farthest)
+    far = np.flatnonzero(np.abs(points).max(axis=1) > _FARTHEST)
     if far.size:
         raise PathError(
-            f"{name}: way-points must lie within +-{CHOSEN.farthest:g} m, number {far[0] + 1} is "
+            f"{name}: way-points must lie within +-{_FARTHEST:g} m, number {far[0] + 1} is "
             f"{points[far[0]].tolist()}"
         )
     gaps = _norm(np.diff(points, axis=0))
-    if closed and gaps.size and _norm(points[0] - points[-1]) <= CHOSEN.same * np.median(gaps):
+    if closed and gaps.size and _norm(points[0] - points[-1]) <= _SAME * np.median(gaps):
         points = points[:-1]
     fewest = 4 if closed else 2
     if len(points) < fewest:
@@ -142,7 +146,7 @@ def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
     if closed:
         points = np.vstack((points, points[:1]))
     gaps = _norm(np.diff(points, axis=0))
-    same = np.flatnonzero(gaps <= CHOSEN.same * np.median(gaps))
+    same = np.flatnonzero(gaps <= _SAME * np.median(gaps))
     if same.size:
         raise PathError(
             f"{name}: neighboring way-points must differ, numbers {same[0] + 1} and "
@@ -154,7 +158,7 @@ def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
 def _fit(points: Array, closed: bool) -> Any:
     """Interpolate by a C2 spline over its own arc length."""
     t = np.append(0.0, np.cumsum(_norm(np.diff(points, axis=0))))
-    for _ in range(CHOSEN.fits):
+    for _ in range(_FITS):
         spline = CubicSpline(t, points, bc_type="periodic" if closed else "natural")
         half = 0.5 * np.diff(t)
         nodes = t[:-1, None] + half[:, None] * (1.0 + _LOBES)

@@ -15,10 +15,9 @@ from codegen.template import Values
 from codegen.tuned import tuned
 from mpc.prediction import build_axles, build_end, build_rk4, build_stage, state_size
 from mpc.problem import N_ERRORS
-from mpc.realtime.chosen import CHOSEN
+from mpc.realtime.caution import N_GRIPS
 from mpc.realtime.fall_back import N_GAINS, N_SPEEDS
-from mpc.tires.chosen import CHOSEN as TIRES_CHOSEN
-from mpc.tires.tire import TireStructure
+from mpc.tires.tire import N_DOUBTS, TireStructure
 
 C = Path(__file__).parents[1] / "c"
 PREFIX = "tireid_mpc"  # of the C as it lies there
@@ -87,8 +86,8 @@ def c_sizes(structure: TireStructure, horizon: int) -> dict[str, tuple[int, str]
         "ERRORS": (N_ERRORS, "e_y, e_psi, course, v_y, yaw rate, delta, progress"),
         "SPEEDS": (N_SPEEDS, "of the fall-back's table"),
         "GAINS": (N_GAINS, "a speed: of e_y, e_psi, v_y, r, wheels; delta, v_y of a turn"),
-        "GRIPS": (CHOSEN.n_grips, "frictions that are possible"),
-        "DOUBTS": (TIRES_CHOSEN.n_doubts, "slips at which the uncertainty of the forces is given"),
+        "GRIPS": (N_GRIPS, "frictions that are possible"),
+        "DOUBTS": (N_DOUBTS, "slips at which the uncertainty of the forces is given"),
     }
 
 

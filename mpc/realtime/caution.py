@@ -12,11 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from mpc.realtime.chosen import CHOSEN
-from mpc.tires.chosen import CHOSEN as TIRES_CHOSEN
-from mpc.tires.tire import Car, Point, PredictionTire, curve_slopes
+from mpc.tires.tire import DOUBT_STEP, Car, Point, PredictionTire, curve_slopes
 
-GRIPS: Array = CHOSEN.least_grip ** (np.arange(CHOSEN.n_grips) / (CHOSEN.n_grips - 1.0))
+N_GRIPS = 9  # frictions that are possible
+_LEAST_GRIP = 0.25  # of the friction that a tire was learnt on: ice, after a dry road
+SURPRISE = 8.0  # -2 ln of how likely a road is to change, as a supervisor has it
+_FORCE_ERROR = 0.045  # static axle loads, of 0.2 s of motion: noise, load transfer, transients
+
+GRIPS: Array = _LEAST_GRIP ** (np.arange(N_GRIPS) / (N_GRIPS - 1.0))
 
 
 def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> None:
@@ -31,11 +34,11 @@ def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> N
     can = _offers_friction(tire)
     params["caution"] = caution
     params["grips"] = GRIPS if can else 1.0
-    params["surprise"] = CHOSEN.surprise
-    params["doubt"], params["doubt_step"] = tire.doubt_or_declared(), TIRES_CHOSEN.doubt_step
-    params["force_error"] = CHOSEN.force_error * np.array(tire.vehicle.axle_loads)
+    params["surprise"] = SURPRISE
+    params["doubt"], params["doubt_step"] = tire.doubt_or_declared(), DOUBT_STEP
+    params["force_error"] = _FORCE_ERROR * np.array(tire.vehicle.axle_loads)
     params["stiffness"] = np.maximum(curve_slopes(tire)[0, 0], 0.1 * params["force_error"][0])
-    params["prior"] = np.where(GRIPS < 1.0, CHOSEN.surprise, 0.0) if can else 0.0
+    params["prior"] = np.where(GRIPS < 1.0, SURPRISE, 0.0) if can else 0.0
 
 
 def _offers_friction(tire: PredictionTire) -> bool:

@@ -13,9 +13,14 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.vehicle import Vehicle
-from mpc.realtime.chosen import CHOSEN
 
-N_GAINS = CHOSEN.n_states + 2  # of x, and what the steady turn asks for
+_N_STATES = 5  # e_y, e_psi, v_y, r and the angle of the wheels
+_STEERING = 0.2  # rad that cost as much as `e_y`, where the car hardly moves
+_DIGITS = 9  # of what is exported: other digits depend on the machine
+_DOUBLINGS = 40  # at most; ten are usual
+_ENOUGH = 1e-13  # change of the cost, in parts
+
+N_GAINS = _N_STATES + 2  # of x, and what the steady turn asks for
 SPEEDS = np.round(np.geomspace(2.0, 100.0, 8), 3)  # m/s; the C takes what lies between by line
 N_SPEEDS = SPEEDS.size
 
@@ -49,7 +54,7 @@ def fall_back(
         # Near the critical speed of an oversteering car a turn needs no steering at all.
         per_steering = v_x**2 / max(abs(turn), 0.2 * vehicle.wheelbase)
         Q = np.diag([1.0 / e_y**2, 0.0, 0.0, 0.0, 0.0])
-        R = np.array([[1.0 / CHOSEN.steering**2 + (per_steering / acceleration) ** 2]])
+        R = np.array([[1.0 / _STEERING**2 + (per_steering / acceleration) ** 2]])
         rows.append([*feedback(A_d, B_d, Q, R).ravel(), turn, drift])
     table = _FallBack(SPEEDS.copy(), np.array([[_rounded(x) for x in row] for row in rows]))
     for numbers in table:
@@ -63,7 +68,7 @@ def motion(vehicle: Vehicle, v_x: float, lag: float) -> tuple[Array, Array]:
     """
     m, I_z, l_f, l_r, C_f, C_r = vehicle.bicycle
     moment = C_f * l_f - C_r * l_r
-    A = np.zeros((CHOSEN.n_states, CHOSEN.n_states))
+    A = np.zeros((_N_STATES, _N_STATES))
     A[0, 1], A[0, 2], A[1, 3] = v_x, 1.0, 1.0
     A[2, 2:] = -(C_f + C_r) / (m * v_x), -moment / (m * v_x) - v_x, C_f / m
     A[3, 2:4] = -moment / (I_z * v_x), -(C_f * l_f**2 + C_r * l_r**2) / (I_z * v_x)
@@ -100,12 +105,12 @@ def _solved(M: Array, right: Array) -> Array:
 def _riccati(A: Array, G: Array, Q: Array) -> Array:
     """Return P of the cost behind 1, 2, 4, … samples, until it stays; G = B R⁻¹ B'."""
     P, eye = Q, np.eye(len(A))
-    for _ in range(CHOSEN.doublings):
+    for _ in range(_DOUBLINGS):
         W = _solved(eye + G @ P, np.hstack([A, G]))
         A_1, G_1 = W[:, : len(A)], W[:, len(A) :]
         step: Array = A.T @ P @ A_1
         A, G, P = A @ A_1, G + A @ G_1 @ A.T, P + 0.5 * (step + step.T)
-        if np.abs(step).max() <= CHOSEN.enough * np.abs(P).max():
+        if np.abs(step).max() <= _ENOUGH * np.abs(P).max():
             break
     return P
 
@@ -119,4 +124,4 @@ def _sampled(A: Array, B: Array, period: float) -> tuple[Array, Array]:
 
 
 def _rounded(x: Any) -> float:
-    return float(f"{x:.{CHOSEN.digits}g}")
+    return float(f"{x:.{_DIGITS}g}")

@@ -19,8 +19,7 @@ from identifier.estimate.model import FittedModel
 from identifier.motion.model import carcass_curve
 from identifier.motion.parameters import curve_index
 from models.vehicle import load_ratio
-from mpc.tires.chosen import CHOSEN
-from mpc.tires.tire import Pair, Point, PredictionTire, TireStructure
+from mpc.tires.tire import DOUBT_STEP, N_DOUBTS, Pair, Point, PredictionTire, TireStructure
 
 _SENSORS, _BESIDE = 4, 4  # weights before those of the axles; of an axle before its curve
 
@@ -193,5 +192,5 @@ def _tire(
         give=give,
         shortest=SHORTEST * car.wheelbase,
     )
-    doubt = model.band.half(CHOSEN.doubt_step * np.arange(CHOSEN.n_doubts, dtype=np.float64)).T
+    doubt = model.band.half(DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)).T
     return PredictionTire(structure, weights, car, doubt)

@@ -12,8 +12,16 @@ from models.plant.dynamics import wheel_loads
 from models.tires import MagicFormula, Tire
 from models.vehicle import Vehicle
 from mpc.tires.axles import LadderAxles, curve_weights
-from mpc.tires.chosen import CHOSEN
 from mpc.tires.tire import PredictionTire
+
+_UNITS = 6  # of the ladder
+_NARROWEST = 0.25  # α_1 over the slip F_max/C at which the linear tire would reach the peak force
+_WORST = 0.02  # largest error of a fit over the largest force
+_SAMPLES = 400  # of a curve that is fitted
+_SMALL = 1e-3  # rad; the slope at zero is read here, well above rounding
+_STRAIGHT = 0.1  # of that slip F_max/C; a slope that is read beyond it is no longer C
+_LARGEST_SLIP = 0.5  # rad, where the table ends; less where friction is low
+_HALVINGS = 50  # of an interval: 1e-15 of it is left
 
 
 class CurveFitError(TireidError, ValueError):
@@ -24,7 +32,7 @@ def slip_grid(largest: float) -> Array:
     """Return slips from near 0 to the largest [rad], dense where the curve bends, (k,).
     largest : end of the grid [rad].
     """
-    grid: Array = largest * (np.arange(1, CHOSEN.samples + 1) / CHOSEN.samples) ** 2
+    grid: Array = largest * (np.arange(1, _SAMPLES + 1) / _SAMPLES) ** 2
     return grid
 
 
@@ -33,7 +41,7 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
     alpha : slips [rad], positive and rising, (k,).
     force : of the axles at these slips [N], (2, k).
     """
-    first = min(int(np.searchsorted(alpha, CHOSEN.small)), alpha.size - 1)
+    first = min(int(np.searchsorted(alpha, _SMALL)), alpha.size - 1)
     peak = np.abs(force).max(axis=1)
     while True:
         stiffness = force[:, first] / alpha[first]
@@ -42,18 +50,18 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
                 f"force must rise with slip at zero, its slope is {stiffness} N/rad"
             )
         bends = peak / stiffness
-        if first == 0 or alpha[first] <= CHOSEN.straight * bends.min():
+        if first == 0 or alpha[first] <= _STRAIGHT * bends.min():
             break
         first //= 2
-    narrowest = CHOSEN.narrowest * float(bends.min())
-    units = CHOSEN.units + int(np.log2(bends.max() / bends.min()))  # both axles share the scales
+    narrowest = _NARROWEST * float(bends.min())
+    units = _UNITS + int(np.log2(bends.max() / bends.min()))  # both axles share the scales
     ladder = np.array([narrowest * 2.0**j for j in range(units)])
     T = np.tanh(alpha[:, None] / ladder)
     W = np.empty((2, units))
     for i, name in enumerate(("front", "rear")):
         W[i] = np.linalg.lstsq(T, force[i], rcond=None)[0]
         error = np.abs(T @ W[i] - force[i]).max() / peak[i]
-        if not error <= CHOSEN.worst:
+        if not error <= _WORST:
             raise CurveFitError(
                 f"the {name} force curve is fitted to {100 * error:.2g} % of its peak only"
             )
@@ -80,7 +88,7 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     """
     chassis = vehicle.require_chassis()
     tire = tire_of(vehicle) if tire is None else tire
-    alpha = slip_grid(CHOSEN.largest_slip * min(mu, 1.0))
+    alpha = slip_grid(_LARGEST_SLIP * min(mu, 1.0))
     grid = np.concatenate([[0.0], alpha])
     force = np.stack([cornering_force(vehicle, tire, axle, grid, mu) for axle in (0, 1)])
     force = force[:, 1:] - force[:, :1]  # wheels that are not mirrored push at zero slip, too
@@ -92,7 +100,7 @@ def mounted_tire(vehicle: Vehicle, tire: Tire, rear: Tire | None = None) -> Pred
     """Return two tires an axle at its static load, without lag.
     vehicle : the car; it needs no chassis.   rear : tire of the rear axle; None takes the same.
     """
-    alpha = slip_grid(CHOSEN.largest_slip)
+    alpha = slip_grid(_LARGEST_SLIP)
     x = ca.SX.sym("alpha")
     force = []
     for one, load in zip((tire, tire if rear is None else rear), vehicle.axle_loads, strict=True):
@@ -116,7 +124,7 @@ def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: f
     made = ca.Function("axle", [x, F], [_both_sides(tire, x, camber, ca.vertsplit(loads), mu)])
     low, high = np.zeros_like(alpha), np.full_like(alpha, 3.0 * max(mu, 1.0) * vehicle.weight)
     # More side force shifts more load, and less is made: one solution.
-    for _ in range(CHOSEN.halvings):
+    for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         more = np.array(made(alpha[None], middle[None])).ravel() > middle
         low, high = np.where(more, middle, low), np.where(more, high, middle)

@@ -13,7 +13,14 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.vehicle import Vehicle
-from mpc.tires.chosen import CHOSEN
+
+N_DOUBTS = 26  # slips at which the uncertainty of the forces is given
+DOUBT_STEP = 0.02  # rad, between these slips
+_RELATIVE = 0.066  # of the force: half a band of 90 % of what a learnt tire misses at best
+_FLOOR = 0.016  # of a static axle load, likewise
+_FLAT = 0.05  # of the slope at zero: the peak is reached within a per cent or two of its force
+LEAST_RISE = 0.04  # of the slope at zero; a little less than where slip ends to be of use
+_SPEED = 15.0  # m/s; curves of slip do not depend on it, but where the car has downforce
 
 Pair: TypeAlias = tuple[Any, Any]  # front, rear: SX expressions or numbers
 
@@ -131,9 +138,9 @@ class PredictionTire(NamedTuple):
         """Return the doubt (2, 26) [N]; where none is given, that of a tire learnt well."""
         if self.doubt is not None:
             return self.doubt
-        slip = CHOSEN.doubt_step * np.arange(CHOSEN.n_doubts, dtype=np.float64)
-        floor = CHOSEN.floor * np.array(self.vehicle.axle_loads)[:, None]
-        return np.hypot(CHOSEN.relative * curves_at(self, slip), floor)
+        slip = DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64)
+        floor = _FLOOR * np.array(self.vehicle.axle_loads)[:, None]
+        return np.hypot(_RELATIVE * curves_at(self, slip), floor)
 
 
 # How far slip is of use, and what the tracker believes beyond: a curve that goes on rising.
@@ -168,10 +175,10 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
     slopes = curve_slopes(tire)
     slip = np.minimum(most, _useful(slopes))
     there = [np.interp(x, SLIPS, axle) for x, axle in zip(slip, slopes, strict=True)]
-    return ValidSlip(slip, np.maximum(np.maximum(there, CHOSEN.least_rise * slopes[:, 0]), 0.0))
+    return ValidSlip(slip, np.maximum(np.maximum(there, LEAST_RISE * slopes[:, 0]), 0.0))
 
 
-def curves_at(tire: PredictionTire, slip: Array, v_x: float = CHOSEN.speed) -> Array:
+def curves_at(tire: PredictionTire, slip: Array, v_x: float = _SPEED) -> Array:
     """Return the axle forces at slips, of a car that slides sideways without yawing, (2, k) [N].
     slip : of both axles [rad], (k,).   v_x : speed [m/s].
     """
@@ -214,7 +221,7 @@ def believed(
 
 
 def _useful(slopes: Array) -> Array:
-    flat = slopes < CHOSEN.flat * slopes[:, :1]
+    flat = slopes < _FLAT * slopes[:, :1]
     found = np.where(flat.any(axis=1), SLIPS[flat.argmax(axis=1)], np.inf)
     return np.where(slopes[:, 0] > 0.0, found, np.inf)
 
@@ -223,7 +230,7 @@ def _useful(slopes: Array) -> Array:
 def _slopes(structure: TireStructure) -> ca.Function:
     """Return dF/dα (2, k) of slips (1, k), straight ahead."""
     slip, w, numbers = ca.SX.sym("slip"), ca.SX.sym("w", structure.n_weights), ca.SX.sym("car", 4)
-    at = Point(0.0, 0.0, 0.0, CHOSEN.speed, Car(*ca.vertsplit(numbers)), w)
+    at = Point(0.0, 0.0, 0.0, _SPEED, Car(*ca.vertsplit(numbers)), w)
     force = ca.vertcat(*structure.force((slip, slip), at))
     slope = ca.Function("slope", [slip, numbers, w], [ca.densify(ca.jacobian(force, slip))])
     return slope.map(SLIPS.size, [False, True, True], [False])

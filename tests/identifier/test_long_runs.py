@@ -190,7 +190,7 @@ def test_a_law_that_diverges_is_noticed_in_the_block_where_it_does(whole, in_blo
 @pytest.fixture
 def short_portions(monkeypatch, in_blocks):
     monkeypatch.setattr(portion, "LONG", 4000)
-    monkeypatch.setattr(portion, "CHOSEN", portion.CHOSEN._replace(segment=5.0))
+    monkeypatch.setattr(portion, "_SEGMENT", 5.0)
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from models.recordings import Recording
-from models.recordings.chosen import CHOSEN as RECORDINGS_CHOSEN
-from models.recordings.evidence import correlation, least_squares, windows
+from models.recordings.evidence import STRIDE, WINDOW, correlation, least_squares, windows
 
 DT = 0.01
 
@@ -13,8 +12,8 @@ DT = 0.01
 def overlapping_means(noise):
     """Means over windows that overlap as those of a recording do."""
     width, stride = (
-        round(RECORDINGS_CHOSEN.evidence_window / DT),
-        round(RECORDINGS_CHOSEN.stride / DT),
+        round(WINDOW / DT),
+        round(STRIDE / DT),
     )
     total = np.concatenate([[0.0], np.cumsum(noise)])
     start = np.arange(0, noise.size - width, stride)
@@ -70,8 +69,8 @@ def turning(dt=DT, v_y=0.3, rear=0.0):
 @pytest.mark.parametrize("dt", [0.002, 0.01, 0.04])
 def test_window_means_and_slopes_are_those_of_the_signals_at_any_rate(dt):
     w = windows(turning(dt))
-    width = max(round(RECORDINGS_CHOSEN.evidence_window / dt), 1) * dt
-    stride = max(round(RECORDINGS_CHOSEN.stride / dt), 1) * dt
+    width = max(round(WINDOW / dt), 1) * dt
+    stride = max(round(STRIDE / dt), 1) * dt
     t_mid = np.arange(w.r.size) * stride + 0.5 * width
     shrink = np.sinc(2.0 * width / 2.0 / np.pi)  # of a sine, averaged over the window
     np.testing.assert_allclose(w.r, 0.5 * shrink * np.sin(2.0 * t_mid), atol=4e-4)

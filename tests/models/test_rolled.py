@@ -5,8 +5,18 @@ import math
 import numpy as np
 import pytest
 
-from models.recordings.chosen import CHOSEN as RECORDINGS_CHOSEN
-from models.recordings.rolled import _trust_scan
+from models.recordings.rolled import (
+    ALIKE,
+    BRAKED,
+    MEMORY,
+    NOISE,
+    PATIENCE,
+    ROLLS_OUT,
+    SLIP,
+    SLOW,
+    UNSURE,
+    _trust_scan,
+)
 
 DT, MOST, LIMIT = 0.01, 12.0, 13.0
 
@@ -15,28 +25,25 @@ def by_hand(state, row, rates, dt, most, limit, free):
     """The speed at the next sample, wheel by wheel in Python: of [v, a, untrusted, known]."""
     v, a, since, known = state
     ahead = v + a * dt
-    near, alike = (
-        RECORDINGS_CHOSEN.noise + share * abs(ahead)
-        for share in (RECORDINGS_CHOSEN.slip, RECORDINGS_CHOSEN.rolled_alike)
-    )
-    doubt = RECORDINGS_CHOSEN.unsure * most * since
+    near, alike = (NOISE + share * abs(ahead) for share in (SLIP, ALIKE))
+    doubt = UNSURE * most * since
     steady = [abs(rate) <= limit for rate in rates]
     if max(row) - min(row) <= near and all(steady):
-        doubt *= 1.0 + since / RECORDINGS_CHOSEN.patience
-    if max(abs(ahead), *map(abs, row)) < RECORDINGS_CHOSEN.rolled_slow:
-        doubt, steady = RECORDINGS_CHOSEN.rolled_slow, [True] * len(row)
+        doubt *= 1.0 + since / PATIENCE
+    if max(abs(ahead), *map(abs, row)) < SLOW:
+        doubt, steady = SLOW, [True] * len(row)
     likely = [k for k, c in enumerate(row) if steady[k] and abs(c - ahead) <= near + doubt]
     if not likely:
         if all((c - ahead) * a < 0.0 for c in row):
             return (v, 0.0, since + dt, known)  # what it went on by leads away from all
         return (ahead, a, since + dt, known)
-    if a > RECORDINGS_CHOSEN.braked:  # driven wheels run ahead of the car, however little
+    if a > BRAKED:  # driven wheels run ahead of the car, however little
         likely = [k for k in likely if free[k]] or likely
-    likely = [k for k in likely if abs(rates[k] - a) <= RECORDINGS_CHOSEN.unsure * most] or likely
+    likely = [k for k in likely if abs(rates[k] - a) <= UNSURE * most] or likely
     speeds = [row[k] for k in likely]
-    if a > RECORDINGS_CHOSEN.rolls_out:
+    if a > ROLLS_OUT:
         best = min(speeds)
-    elif a < RECORDINGS_CHOSEN.braked:
+    elif a < BRAKED:
         best = max(speeds)
     else:
         best = min(speeds, key=lambda c: abs(c - ahead))
@@ -45,10 +52,10 @@ def by_hand(state, row, rates, dt, most, limit, free):
     now = min(max(sum(row[k] for k in kept) / len(kept), ahead - reach), ahead + reach)
     passed = since + dt
     slope = (now - known) / passed
-    if since > RECORDINGS_CHOSEN.memory:  # what was trusted before says little of how it goes on
+    if since > MEMORY:  # what was trusted before says little of how it goes on
         slope = sum(rates[k] for k in kept) / len(kept)
     slope = min(max(slope, -most), most)
-    a += (1.0 - math.exp(-passed / RECORDINGS_CHOSEN.memory)) * (slope - a)
+    a += (1.0 - math.exp(-passed / MEMORY)) * (slope - a)
     return (now, a, 0.0, now)
 
 

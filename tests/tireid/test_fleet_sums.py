@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.estimate.chosen import CHOSEN as ESTIMATE_CHOSEN
 from identifier.estimate.fit import fit
-from identifier.estimate.information import SIZE, Information, coordinates
+from identifier.estimate.information import GRID, SIZE, Information, coordinates
 from identifier.estimate.priors import SENSORS, Priors
 from identifier.estimate.solve import settled
 from identifier.frozen import vehicle_numbers
@@ -143,7 +142,7 @@ def test_a_log_of_a_wet_road_does_not_lower_the_grip_of_the_others():
     wet = row_of(4, told_of(tires(friction=0.5), rng, noise=1.0))
     (alone,), (both,) = merged(dry), merged([*dry, wet])
     assert (alone.elsewhere, both.elsewhere, both.logs) == (0, 1, 5)
-    far = ESTIMATE_CHOSEN.grid.index(0.19)
+    far = GRID.index(0.19)
     alone, both = (coordinates(one.model.p)[0][far] for one in (alone, both))
     assert both == pytest.approx(alone, rel=0.03)
     told = sum((row.learnt()[0] for row in [*dry, wet]), Information.nothing())

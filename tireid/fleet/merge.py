@@ -2,7 +2,7 @@
 
 The information of logs adds up (`identifier.estimate.information`). Sensors are those of the car,
 in each log off by an error of its own (`APART` of their prior). Where the evidence of a log asks
-for another friction, by `ESTIMATE_CHOSEN.price` as inside a log, its friction is its own.
+for another friction, by `PRICE` as inside a log, its friction is its own.
 """
 
 import json
@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.estimate.chosen import CHOSEN as ESTIMATE_CHOSEN
 from identifier.estimate.information import PLACE, SIZE, Information, coordinates
 from identifier.estimate.model import FittedModel
 from identifier.estimate.posterior import Reach
-from identifier.estimate.priors import Priors
+from identifier.estimate.priors import ANOTHER_ROAD, Priors
+from identifier.estimate.roads import LEAST_CHANGE, PRICE
 from identifier.estimate.solve import settled
 from identifier.motion.parameters import INDEX
 from models.vehicle import Vehicle
@@ -161,15 +161,15 @@ class _Sum:
         if self.at is not None:
             u, slopes = self.at
             along = slopes[:, _ROAD]
-            known = along @ one.matrix @ along + ESTIMATE_CHOSEN.another_road**-2
+            known = along @ one.matrix @ along + ANOTHER_ROAD**-2
             ln_m = float(along @ (one.vector - one.matrix @ u) / known)
             if self.road is None:
                 self.ln_m.append(ln_m)
             elif (
-                abs(ln_m - self.road) >= ESTIMATE_CHOSEN.least_change
-                and 0.5 * known * (ln_m - self.road) ** 2 >= ESTIMATE_CHOSEN.price
+                abs(ln_m - self.road) >= LEAST_CHANGE
+                and 0.5 * known * (ln_m - self.road) ** 2 >= PRICE
             ):
-                one = one.loosened(along[:, None], np.array([ESTIMATE_CHOSEN.another_road]))
+                one = one.loosened(along[:, None], np.array([ANOTHER_ROAD]))
                 self.elsewhere += 1
         self.information += one
         seconds = one.seconds

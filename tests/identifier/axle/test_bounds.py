@@ -9,8 +9,7 @@ import pytest
 
 from identifier.axle import AxleIdentifier
 from identifier.axle import learning as bounds
-from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
-from identifier.axle.covariance import narrowed, packed, per_variance, unpacked
+from identifier.axle.covariance import LEAST_VARIANCE, narrowed, packed, per_variance, unpacked
 from identifier.axle.curve import LADDER
 from identifier.run import identify
 from tests.identifier.axle.conftest import HOSTILE, spoilt
@@ -181,7 +180,7 @@ def test_factors_are_those_of_the_covariance(rng):
     first = packed(P)[0]
     assert (first[[0, 7, 13, 18, 22, 25, 27]] > 0.0).all()  # D, by rows
     assert first[27] == pytest.approx(P[0, 6, 6])
-    assert (packed(np.zeros((2, 7, 7)))[:, [0, 27]] == AXLE_CHOSEN.least_variance).all()
+    assert (packed(np.zeros((2, 7, 7)))[:, [0, 27]] == LEAST_VARIANCE).all()
 
 
 def test_a_stored_covariance_that_is_too_wide_is_narrowed(car, drive):

@@ -16,7 +16,7 @@ from identifier.axle.certificate import (
     curve_facts,
     jump_by_learning,
 )
-from identifier.axle.chosen import CHOSEN as AXLE_CHOSEN
+from identifier.axle.covariance import LEAST_VARIANCE
 from identifier.axle.curve import LADDER
 from identifier.run import identify
 
@@ -99,14 +99,14 @@ def test_a_covariance_at_its_floor_is_learnt_with_but_does_not_shrink(design, ca
     n = len(design.ladder)
     places = [0, 7, 13, 18, 22, 25, 27]
     free = identify(recording, car, design).state["UD"][:, :, places]
-    assert AXLE_CHOSEN.least_variance < free.min() < 1e-5
+    assert LEAST_VARIANCE < free.min() < 1e-5
     setup = design.setup(car)
     low = setup.carry["UD"].copy()
-    low[:, places] = AXLE_CHOSEN.least_variance
+    low[:, places] = LEAST_VARIANCE
     state, theta = dict(setup.carry), []
     state["UD"] = low
     for block in setup.run(recording, carry=state):
-        assert block.state["UD"][:, :, places].min() >= AXLE_CHOSEN.least_variance * (1.0 - 1e-12)
+        assert block.state["UD"][:, :, places].min() >= LEAST_VARIANCE * (1.0 - 1e-12)
         theta.append(block.state["W"])
     assert np.ptp(np.concatenate(theta), axis=0).max() < 1e-6 and n == 4
 

@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.doctor.chosen import CHOSEN as DOCTOR_CHOSEN
-from identifier.doctor.samples import _is_late, sample_findings
+from identifier.doctor.samples import CERTAIN, _is_late, sample_findings
 from models.recordings import Recording
 from models.recordings.samples import alike_by_rounding
 
@@ -101,10 +100,7 @@ def test_samples_that_are_lost_are_counted_from_the_first_on(noisy):
     base = replace(noisy, v_x=noisy.v_x)
     found = only(changed(base, "v_x", [500, 501, 900, 901, 902], 0.0))
     assert (found.code, found.channel, found.size) == ("dropout", "v_x", 5.0)
-    assert (
-        "for 5 of 3000 samples, first at 5 s" in found.text
-        and found.confidence == DOCTOR_CHOSEN.certain
-    )
+    assert "for 5 of 3000 samples, first at 5 s" in found.text and found.confidence == CERTAIN
 
 
 def test_one_sample_that_is_zero_is_no_dropout(noisy):
@@ -176,7 +172,7 @@ def test_a_clock_that_jumps_is_told_where_and_by_how_much(smooth, noisy):
         **{name: getattr(noisy, name)[again] for name in names},
     )
     (found,) = [one for one in sample_findings(twice) if one.code == "clock"]
-    assert found.size == pytest.approx(-0.5) and found.confidence == DOCTOR_CHOSEN.certain
+    assert found.size == pytest.approx(-0.5) and found.confidence == CERTAIN
     assert "0.5 s before 15 s are logged twice" in found.text
 
 
@@ -192,7 +188,7 @@ def test_a_v_y_that_is_switched_off_is_told_with_its_share_and_speed(noisy):
 
 def test_a_channel_without_a_sensor_is_told_and_not_asked_further(noisy):
     found = only(replace(noisy, a_y=np.full(T.size, 0.25)))
-    assert (found.code, found.channel, found.confidence) == ("frozen", "a_y", DOCTOR_CHOSEN.certain)
+    assert (found.code, found.channel, found.confidence) == ("frozen", "a_y", CERTAIN)
     assert (
         found.size == pytest.approx(noisy.duration) and "a_y is 0.25 m/s^2 throughout" in found.text
     )

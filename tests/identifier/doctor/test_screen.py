@@ -17,8 +17,7 @@ from benchmarks.faults import (
 from benchmarks.random_cars import CLASSES, good_sensors, random_car, random_drive
 from benchmarks.recorded_cars import CARMAKER, DART
 from identifier.doctor import diagnose
-from identifier.doctor.chosen import CHOSEN as DOCTOR_CHOSEN
-from identifier.doctor.pieces import looked_at
+from identifier.doctor.pieces import PIECE, PIECES, looked_at
 from identifier.doctor.readings import Motion, Reading, unexplained
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import screen, steering_finding
@@ -304,7 +303,7 @@ def test_gaps_are_no_jumps_and_of_a_long_log_some_pieces_are_looked_at(one):
     assert screen(two, car).findings == ()
     long = joined([replace(log, t=log.t + 100.0 * k) for k in range(20)])
     pieces = looked_at(long)
-    assert sum(one.duration for one in pieces) <= DOCTOR_CHOSEN.piece * DOCTOR_CHOSEN.pieces
+    assert sum(one.duration for one in pieces) <= PIECE * PIECES
     assert screen(long, car).findings == ()
 
 

@@ -25,8 +25,7 @@ from models.vehicle import sedan
 from mpc.path.gates import iso_3888_2
 from mpc.realtime import Measurement, Status, Tracker
 from mpc.tires import prediction_tire
-from mpc.tires.chosen import CHOSEN as TIRES_CHOSEN
-from mpc.tires.tire import Car, Point
+from mpc.tires.tire import DOUBT_STEP, Car, Point
 from tireid import exporting
 from tireid.driving.runs import LEARNING, given_tire, make_learner
 from tireid.driving.setup import Setup, SpeedWish
@@ -178,7 +177,7 @@ def test_a_tracker_takes_the_errors_of_the_sensors_off():
         -np.arctan((true - CAR.l_r * r) / v_x),
     )
     np.testing.assert_allclose([float(x) for x in tire.structure.slip(at)], expected)
-    slips = TIRES_CHOSEN.doubt_step * np.arange(26)
+    slips = DOUBT_STEP * np.arange(26)
     np.testing.assert_allclose(tire.doubt.T, model.band.half(slips))
 
 

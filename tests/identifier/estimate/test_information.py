@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.estimate.chosen import CHOSEN as ESTIMATE_CHOSEN
 from identifier.estimate.fit import fit
-from identifier.estimate.information import PLACE, SIZE, Information, coordinates
+from identifier.estimate.information import GRID, PLACE, SIZE, Information, coordinates
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import settled
 from identifier.motion.parameters import INDEX
@@ -69,7 +68,7 @@ def test_logs_added_up_teach_what_they_do_at_once(drives, told):
 def test_errors_of_a_drives_own_are_marginal(told):
     """As a Gaussian of u and the errors, whose inverse of the covariance of u it is."""
     along = np.zeros((SIZE, 2))
-    along[PLACE["v_y_bias"], 0] = along[ESTIMATE_CHOSEN.grid.index(0.04), 1] = 1.0
+    along[PLACE["v_y_bias"], 0] = along[GRID.index(0.04), 1] = 1.0
     sd, one = np.array([0.05, 0.1]), told[0]
     whole = np.block(
         [[one.matrix, one.matrix @ along],

@@ -6,8 +6,7 @@ import pytest
 from identifier.estimate.drive import Drive
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import DELAYS, Problem, car_numbers, simulate
-from identifier.motion.chosen import CHOSEN as MOTION_CHOSEN
-from identifier.motion.model import motion_scan
+from identifier.motion.model import RATE, motion_scan
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, sedan
 from tests.identifier.estimate.conftest import driven
@@ -92,8 +91,8 @@ def of(drive, p, car):
         u = across - v_x[j] * r[j] / GRAVITY + bank[j] / GRAVITY + one["bank"]
         late = -xi if late is None else late
         if j % FINE == 0:
-            force[j // FINE], missed[j // FINE] = across, MOTION_CHOSEN.rate * (late + xi)
-        late = late + dt * (-u - MOTION_CHOSEN.rate * (late + xi))
+            force[j // FINE], missed[j // FINE] = across, RATE * (late + xi)
+        late = late + dt * (-u - RATE * (late + xi))
         sigma = s * slope + 0.001 * L
         x = x + (1.0 - np.exp(-dt * v_x[j] / sigma)) * (slip - x)
         rate = rate + dt * (omega**2 * (GRAVITY * (share @ F) - rho) - 2.0 * zeta * omega * rate)

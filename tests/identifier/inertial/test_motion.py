@@ -7,8 +7,8 @@ import pytest
 from identifier.axle.car import Car, car_numbers
 from identifier.axle.curve import LADDER, doublings, hidden_units, of_units
 from identifier.axle.slip import SHORTEST
-from identifier.inertial.chosen import CHOSEN as INERTIAL_CHOSEN
 from identifier.inertial.motion import (
+    MOVING,
     SENSORS,
     Along,
     Laws,
@@ -32,16 +32,14 @@ V_X, TURN = 20.0, 0.3  # m/s, rad/s of steering
 
 def places():
     """Where in z the first of each kind of number stands."""
-    first = INERTIAL_CHOSEN.moving + 2 * N
+    first = MOVING + 2 * N
     after = ("compliance", "compliance_rear", *SENSORS)
-    return {"W": INERTIAL_CHOSEN.moving, "W_rear": INERTIAL_CHOSEN.moving + N} | {
-        name: first + i for i, name in enumerate(after)
-    }
+    return {"W": MOVING, "W_rear": MOVING + N} | {name: first + i for i, name in enumerate(after)}
 
 
 def state():
     z = np.zeros(_size(N))
-    z[: INERTIAL_CHOSEN.moving] = [-0.4, 0.25, 0.03, 0.025, 0.02, -0.01, 0.03]
+    z[:MOVING] = [-0.4, 0.25, 0.03, 0.025, 0.02, -0.01, 0.03]
     at = places()
     z[at["W"] : at["W"] + N] = [0.1, 0.5, 0.2, 0.1]
     z[at["W_rear"] : at["W_rear"] + N] = [0.2, 0.5, 0.15, 0.1]
@@ -72,9 +70,7 @@ def stepped(z, tilt, t, dt):
     )
     f = ca.Function("f", [symbol, old], [ahead.moving, ca.vertcat(ahead.tilt, ahead.tilt_rate)])
     moving, tilt = f(z, tilt)
-    return np.concatenate([np.array(moving).ravel(), z[INERTIAL_CHOSEN.moving :]]), np.array(
-        tilt
-    ).ravel()
+    return np.concatenate([np.array(moving).ravel(), z[MOVING:]]), np.array(tilt).ravel()
 
 
 def curve(x, w):
@@ -84,7 +80,7 @@ def curve(x, w):
 
 def by_hand(z, tilt, t):
     """Time derivatives of what moves and of the rolling body."""
-    v_y, r, x_f, x_r, e_f, e_r, p = z[: INERTIAL_CHOSEN.moving]
+    v_y, r, x_f, x_r, e_f, e_r, p = z[:MOVING]
     at = places()
     delta = 0.02 + TURN * t
     share = np.array([CAR.l_r, CAR.l_f]) / CAR.wheelbase
@@ -115,9 +111,9 @@ def integrated(z, tilt, duration, dt=1e-4):
     for k in range(round(duration / dt)):
         moving, rolling, *_ = by_hand(z, tilt, k * dt)
         middle, body = z.copy(), tilt + dt / 2 * rolling
-        middle[: INERTIAL_CHOSEN.moving] += dt / 2 * moving
+        middle[:MOVING] += dt / 2 * moving
         moving, rolling, *_ = by_hand(middle, body, (k + 0.5) * dt)
-        z[: INERTIAL_CHOSEN.moving] += dt * moving
+        z[:MOVING] += dt * moving
         tilt = tilt + dt * rolling
     return z, tilt
 

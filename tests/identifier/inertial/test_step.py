@@ -10,8 +10,16 @@ from identifier.axle.car import Car, car_numbers
 from identifier.axle.covariance import unpacked
 from identifier.axle.curve import curve, doublings
 from identifier.inertial import InertialIdentifier
-from identifier.inertial.chosen import CHOSEN as INERTIAL_CHOSEN
-from identifier.inertial.motion import SENSORS, Laws, Sample, _size, predicted, shown, unknowns
+from identifier.inertial.motion import (
+    MOVING,
+    SENSORS,
+    Laws,
+    Sample,
+    _size,
+    predicted,
+    shown,
+    unknowns,
+)
 from identifier.run import identify
 from models.maneuvers import Slalom
 from models.plant import Plant
@@ -45,7 +53,7 @@ def compiled_model():
     old, new = ca.SX.sym("old", 3), ca.SX.sym("new", 3)
     before, now = Sample(old[0], old[1:]), Sample(new[0], new[1:])
     a = predicted(car, laws, DT, unknowns(z, N), (tilt[0], tilt[1]), before, now, scales, steps)
-    moved = ca.vertcat(a.moving, z[INERTIAL_CHOSEN.moving :])
+    moved = ca.vertcat(a.moving, z[MOVING:])
     step = ca.Function(
         "step",
         [z, tilt, old, new],
@@ -75,7 +83,7 @@ def composed(by_way):
     for row in by_way:
         before = row[Q : Q + len(rows)] @ np.array(rows[:on_the_way]).reshape(-1, Q)[: len(rows)]
         rows.append(row[:Q] + before)
-    return np.vstack([rows[on_the_way:], np.eye(Q)[INERTIAL_CHOSEN.moving :]])
+    return np.vstack([rows[on_the_way:], np.eye(Q)[MOVING:]])
 
 
 def by_differences(f, z):
@@ -88,10 +96,10 @@ def learnt(held):
     """Directions of z beside what moves, by columns, and the covariance of steps along them."""
     grip_f, grip_r, stiff_f, stiff_r = METHOD.setup(CAR).constants["curves"]
     _, own = METHOD.prior.means(CAR, METHOD.ladder)
-    nothing, first = np.zeros(N), INERTIAL_CHOSEN.moving + 2 * N + 2
+    nothing, first = np.zeros(N), MOVING + 2 * N + 2
 
     def sensor(name):
-        return np.eye(Q)[first + SENSORS.index(name), INERTIAL_CHOSEN.moving :]
+        return np.eye(Q)[first + SENSORS.index(name), MOVING:]
 
     def tires(front, rear, own):
         return np.concatenate([front, rear, own, np.zeros(len(SENSORS))])
@@ -121,17 +129,17 @@ class ByHand:
     def __init__(self, held=False):
         self.step, self.look, self.gradient = compiled_model()
         W, own = METHOD.prior.means(CAR, METHOD.ladder)
-        self.z = np.concatenate([np.zeros(INERTIAL_CHOSEN.moving), *W, own[:, 0], np.zeros(4)])
+        self.z = np.concatenate([np.zeros(MOVING), *W, own[:, 0], np.zeros(4)])
         self.z[-3] = METHOD.beliefs.roll
         scale = np.sqrt(CAR.wheelbase / 2.7)
         along, P = learnt(held)
-        q = INERTIAL_CHOSEN.moving + len(P)
+        q = MOVING + len(P)
         self.P, self.into = np.zeros((q, q)), np.zeros((Q, q))
-        self.P[INERTIAL_CHOSEN.moving :, INERTIAL_CHOSEN.moving :] = P
+        self.P[MOVING:, MOVING:] = P
         (
-            self.into[: INERTIAL_CHOSEN.moving, : INERTIAL_CHOSEN.moving],
-            self.into[INERTIAL_CHOSEN.moving :, INERTIAL_CHOSEN.moving :],
-        ) = np.eye(INERTIAL_CHOSEN.moving), along
+            self.into[:MOVING, :MOVING],
+            self.into[MOVING:, MOVING:],
+        ) = np.eye(MOVING), along
         self.scale, self.running, self.fast = scale, False, 0.0
         self.noise = np.array([METHOD.trust.r_noise / scale, METHOD.trust.a_y_noise]) ** 2
         self.waiting, self.left, self.turns = np.zeros(2), np.zeros(2), [0, 0]
@@ -139,14 +147,11 @@ class ByHand:
     def begin(self, sample, r, a_y):
         """Start in a steady corner, on a linear tire."""
         t, v_x, delta = METHOD.trust, sample[0], sample[1:]
-        C = (
-            self.z[INERTIAL_CHOSEN.moving + N : INERTIAL_CHOSEN.moving + 2 * N]
-            / np.array(METHOD.ladder)
-        ).sum()
+        C = (self.z[MOVING + N : MOVING + 2 * N] / np.array(METHOD.ladder)).sum()
         lean = np.sign(r) * min(abs(v_x * r) / G, 1) / C
         v_y = v_x * (delta[1] - lean) + CAR.l_r * r
         arm = np.array([CAR.l_f, -CAR.l_r])
-        self.z[: INERTIAL_CHOSEN.moving] = [
+        self.z[:MOVING] = [
             v_y,
             r,
             *(delta - np.arctan((v_y + arm * r) / v_x)),
@@ -155,10 +160,10 @@ class ByHand:
             0,
         ]
         unsure = (t.v_y * np.sqrt(G * CAR.wheelbase)) ** 2 + (0.7 * v_x * lean) ** 2
-        self.P[: INERTIAL_CHOSEN.moving], self.P[:, : INERTIAL_CHOSEN.moving] = 0, 0
+        self.P[:MOVING], self.P[:, :MOVING] = 0, 0
         sd = [t.r / self.scale, *[np.sqrt(unsure) / v_x] * 2, t.error, t.error]
         sd += [t.bank]
-        self.P[range(INERTIAL_CHOSEN.moving), range(INERTIAL_CHOSEN.moving)] = [
+        self.P[range(MOVING), range(MOVING)] = [
             unsure,
             *np.array(sd) ** 2,
         ]
@@ -171,11 +176,11 @@ class ByHand:
         F = composed(self.gradient(z, self.tilt, before, sample))
         exact, F = exact @ self.into, F @ self.into
         moves = np.sqrt(np.diag(self.P))  # what the gradient leaves out is of second order
-        off = np.abs((F - exact)[: INERTIAL_CHOSEN.moving] * moves).max(axis=1)
-        assert (off < 0.03 * np.sqrt(moves[: INERTIAL_CHOSEN.moving] ** 2 + 1e-8)).all()
+        off = np.abs((F - exact)[:MOVING] * moves).max(axis=1)
+        assert (off < 0.03 * np.sqrt(moves[:MOVING] ** 2 + 1e-8)).all()
         ahead, tilt, force, rate = self.step(z, self.tilt, before, sample)
         missed = t.error + t.relative_error * np.abs(force)
-        F = np.vstack([F[: INERTIAL_CHOSEN.moving], np.eye(len(self.P))[INERTIAL_CHOSEN.moving :]])
+        F = np.vstack([F[:MOVING], np.eye(len(self.P))[MOVING:]])
         noise = np.zeros(len(self.P))
         natural = np.sqrt(CAR.wheelbase / G)
         noise[1] = (t.jerk / natural**1.5) ** 2 * DT
@@ -260,10 +265,6 @@ def test_what_is_learnt_is_that_of_the_textbook(runs):
     last = {name: np.asarray(value[-1]).ravel() for name, value in history.state.items()}
     learnt = np.concatenate([last[name] for name in ("motion", "W", "own", "sensors")])
     np.testing.assert_allclose(learnt, hand.z, rtol=1e-4, atol=1e-6)
-    assert (
-        np.abs(hand.z[INERTIAL_CHOSEN.moving :] - ByHand().z[INERTIAL_CHOSEN.moving :]).max() > 0.02
-    )  # something was
-    (P,) = unpacked(last["UD"][None], len(hand.P) - INERTIAL_CHOSEN.moving)
-    np.testing.assert_allclose(
-        P, hand.P[INERTIAL_CHOSEN.moving :, INERTIAL_CHOSEN.moving :], rtol=2e-3, atol=1e-7
-    )
+    assert np.abs(hand.z[MOVING:] - ByHand().z[MOVING:]).max() > 0.02  # something was
+    (P,) = unpacked(last["UD"][None], len(hand.P) - MOVING)
+    np.testing.assert_allclose(P, hand.P[MOVING:, MOVING:], rtol=2e-3, atol=1e-7)

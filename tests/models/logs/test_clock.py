@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from codegen import arrays
-from models.logs.chosen import CHOSEN as LOGS_CHOSEN
 from models.logs.clock import (
     Raw,
     are_one_clock,
@@ -18,6 +17,7 @@ from models.logs.clock import (
     without_empty,
 )
 from models.logs.log import Channel
+from models.recordings.map import LONGEST_GAP
 
 DT = 0.01
 
@@ -85,9 +85,7 @@ def test_noise_above_the_clock_is_not_folded_into_the_drive():
 def test_the_clock_is_that_of_the_channel_nearest_to_it():
     t = 0.003 + DT * np.arange(400)
     slow = np.arange(0.0, 4.0, 0.1)
-    (one,) = on_one_clock(
-        {"r": raw(t, wave(t)), "v_x": raw(slow, slow)}, DT, LOGS_CHOSEN.longest_gap
-    )
+    (one,) = on_one_clock({"r": raw(t, wave(t)), "v_x": raw(slow, slow)}, DT, LONGEST_GAP)
     assert np.array_equal(one.t, t[: one.t.size]) and one.t.size >= 398
     assert np.array_equal(one.signals["r"], wave(t)[: one.t.size])
     assert np.allclose(one.signals["v_x"][100:], one.t[100:])
@@ -98,7 +96,7 @@ def test_a_gap_of_any_channel_ends_a_segment_of_all():
     hole = (t < 3.0) | (t >= 5.0)
     slow = np.arange(0.0, 10.0, 0.1)
     channels = {"r": raw(t, wave(t)), "v_y": raw(t[hole], wave(t[hole])), "v_x": raw(slow, slow)}
-    first, second = on_one_clock(channels, DT, LOGS_CHOSEN.longest_gap)
+    first, second = on_one_clock(channels, DT, LONGEST_GAP)
     assert first.t[0] == 0.0 and first.t[-1] == pytest.approx(2.99, abs=0.011)
     assert second.t[0] == pytest.approx(5.0) and second.t[-1] == pytest.approx(9.99)
     for one in (first, second):
@@ -109,12 +107,8 @@ def test_clocks_of_the_calendar_are_compared_to_the_microsecond():
     t, slow, late = DT * np.arange(1000), 0.003 + 0.1 * np.arange(100), 1.7e9
     hole = (t < 3.0) | (t >= 5.0)
     channels = {"r": (t, wave(t)), "v_y": (t[hole], wave(t[hole])), "v_x": (slow, wave(slow))}
-    near = on_one_clock(
-        {k: raw(t, v) for k, (t, v) in channels.items()}, DT, LOGS_CHOSEN.longest_gap
-    )
-    far = on_one_clock(
-        {k: raw(t + late, v) for k, (t, v) in channels.items()}, DT, LOGS_CHOSEN.longest_gap
-    )
+    near = on_one_clock({k: raw(t, v) for k, (t, v) in channels.items()}, DT, LONGEST_GAP)
+    far = on_one_clock({k: raw(t + late, v) for k, (t, v) in channels.items()}, DT, LONGEST_GAP)
     assert len(near) == len(far) == 2
     for one, other in zip(near, far, strict=True):
         assert np.abs(other.t - late - one.t).max() < 3e-7
@@ -124,14 +118,14 @@ def test_clocks_of_the_calendar_are_compared_to_the_microsecond():
 
 def test_channels_that_never_overlap_have_no_segment():
     t = DT * np.arange(100)
-    assert on_one_clock({"a": raw(t, t), "b": raw(t + 5.0, t)}, DT, LOGS_CHOSEN.longest_gap) == []
+    assert on_one_clock({"a": raw(t, t), "b": raw(t + 5.0, t)}, DT, LONGEST_GAP) == []
 
 
 def test_slow_channels_have_no_gap_between_their_samples():
-    assert gaps(np.arange(0.0, 3.0, 0.1), LOGS_CHOSEN.longest_gap).size == 0
-    assert gaps(np.array([0.0, 0.1, 0.2, 0.5, 0.6, 0.7]), LOGS_CHOSEN.longest_gap).tolist() == [3]
-    assert gaps(np.array([0.0, 0.01, 0.02, 0.12, 0.13]), LOGS_CHOSEN.longest_gap).size == 0
-    assert gaps(np.array([0.0, 0.01, 0.02, 0.13, 0.14]), LOGS_CHOSEN.longest_gap).tolist() == [3]
+    assert gaps(np.arange(0.0, 3.0, 0.1), LONGEST_GAP).size == 0
+    assert gaps(np.array([0.0, 0.1, 0.2, 0.5, 0.6, 0.7]), LONGEST_GAP).tolist() == [3]
+    assert gaps(np.array([0.0, 0.01, 0.02, 0.12, 0.13]), LONGEST_GAP).size == 0
+    assert gaps(np.array([0.0, 0.01, 0.02, 0.13, 0.14]), LONGEST_GAP).tolist() == [3]
 
 
 def test_empty_cells_of_a_slower_channel_are_no_holes_but_single_ones_are():

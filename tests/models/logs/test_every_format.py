@@ -225,5 +225,5 @@ def test_a_log_of_more_samples_than_is_allowed_is_refused(format, tmp_path, driv
     written = write(format, tmp_path, *drive)
     monkeypatch.setenv("TIREID_LIMITS", "samples=250")
     if format.startswith("CAN") and format != "CAN MDF4":
-        monkeypatch.setattr(can, "CHOSEN", can.CHOSEN._replace(frames_at_once=16))
+        monkeypatch.setattr(can, "_FRAMES_AT_ONCE", 16)
     assert "TIREID_LIMITS=samples=NUMBER" in refusal(written.path, written.dbc)

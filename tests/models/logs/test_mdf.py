@@ -144,7 +144,7 @@ def test_samples_that_the_logger_marked_invalid_are_nan(tmp_path):
 def test_many_channels_are_read_in_portions_of_the_memory(tmp_path, monkeypatch):
     signals = [signal(f"s{k}", A + k, T) for k in range(9)]
     path = write(tmp_path / "log.mf4", ("g", signals))
-    monkeypatch.setattr(mdf, "CHOSEN", mdf.CHOSEN._replace(numbers_at_once=1500))
+    monkeypatch.setattr(mdf, "_NUMBERS_AT_ONCE", 1500)
     read = open_log(path).read([f"s{k}" for k in (8, 1, 4, 0)])
     for k, channel in zip((8, 1, 4, 0), read, strict=True):
         assert np.array_equal(channel.values, A + k)

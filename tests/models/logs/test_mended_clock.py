@@ -5,10 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from models.logs.chosen import CHOSEN as LOGS_CHOSEN
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.logs.memory import open_arrays
+from models.logs.stamps import PAUSE
 from tests.models.logs.drive_in_every_format import write
 
 N = 300
@@ -64,7 +64,7 @@ def test_what_follows_where_the_clock_starts_again_is_put_after_a_gap(drive):
     np.testing.assert_array_equal(channel.values, columns["r"][np.concatenate(pieces)])
     ends = np.cumsum([len(piece) for piece in pieces])
     for before, after in pairwise(np.split(channel.t, ends[:-1])):
-        assert after[0] - before[-1] == pytest.approx(LOGS_CHOSEN.pause)
+        assert after[0] - before[-1] == pytest.approx(PAUSE)
         np.testing.assert_allclose(np.diff(after), 0.01)
     assert any("and on 10 s later: 2" in note for note in log.notes)
 

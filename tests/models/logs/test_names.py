@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.logs.chosen import CHOSEN as LOGS_CHOSEN
 from models.logs.log import Channel, Listed
-from models.logs.names import _HAND, _RULES, Guess, _name_confidence, _words_of, propose
+from models.logs.names import _HAND, _RULES, SURE, Guess, _name_confidence, _words_of, propose
 from models.logs.signals import NEEDED
 from models.logs.spelling import unit_in_name, without_ending
 
@@ -69,7 +68,7 @@ NO_SIGNAL = ["Engine RPM", "Wheel Speed FL", "Brake Pressure", "Yaw Rate Target"
 @pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in all_])
 def test_a_name_of_a_logger_is_that_signal_before_any_other(signal, name):
     found = {one: _name_confidence(one, name) for one in _RULES}
-    assert found[signal] >= LOGS_CHOSEN.names_sure
+    assert found[signal] >= SURE
     assert all(value < found[signal] for one, value in found.items() if one != signal)
 
 
@@ -263,7 +262,7 @@ def test_without_a_unit_that_is_proposed_which_the_range_allows_and_none_is_sure
     signal, name, size, unit
 ):
     guess = proposed((name, "", size * WAVE)).guesses[signal]
-    assert guess.unit == unit and guess.confidence < LOGS_CHOSEN.names_sure
+    assert guess.unit == unit and guess.confidence < SURE
     assert "no unit in the file" in guess.why
     if unit and signal != "a_y":
         assert f"goes to {size:.3g}, " in guess.why
@@ -284,19 +283,12 @@ def test_r_and_a_y_without_units_have_those_in_which_a_y_is_v_x_r(rate, lateral)
     speed = ("Speed", "km/h", 72.0 + 0.1 * np.cos(np.arange(2000.0)))
     found = proposed(speed, ("YawRate", "", r), ("Lat_Acc", "", a_y)).guesses
     assert (found["r"].unit, found["a_y"].unit) == (rate, lateral)
-    assert (
-        found["r"].confidence < LOGS_CHOSEN.names_sure
-        and found["a_y"].confidence < LOGS_CHOSEN.names_sure
-    )
+    assert found["r"].confidence < SURE and found["a_y"].confidence < SURE
 
 
 def test_a_steering_that_stays_near_in_rad_is_that_of_road_wheels_if_its_name_allows():
     near = proposed(("log.steer", "", 0.107 * WAVE)).guesses["delta_f"]
-    assert (
-        not near.hand
-        and near.confidence < LOGS_CHOSEN.names_sure
-        and "as road wheels do in rad" in near.why
-    )
+    assert not near.hand and near.confidence < SURE and "as road wheels do in rad" in near.why
     far = proposed(("log.steer", "", 80.0 * WAVE)).guesses["delta_f"]
     assert far.hand and far.unit == "deg"
     named = proposed(("SteeringWheelAngle", "", 0.107 * WAVE)).guesses["delta_f"]
@@ -307,7 +299,7 @@ def test_a_steering_that_stays_near_in_rad_is_that_of_road_wheels_if_its_name_al
 
 def test_a_rate_whose_unit_is_an_angles_is_proposed_per_second():
     guess = proposed(("Yaw Rate", "deg", 20 * WAVE)).guesses["r"]
-    assert guess.unit == "deg/s" and guess.confidence < LOGS_CHOSEN.names_sure
+    assert guess.unit == "deg/s" and guess.confidence < SURE
 
 
 def test_a_filtered_duplicate_stands_back_for_what_was_filtered():
@@ -371,10 +363,7 @@ def test_a_speed_without_a_unit_is_told_by_how_the_car_turns():
 def test_a_word_of_a_name_and_its_unit_are_named_and_not_taken():
     found = proposed(("Yaw", "deg/s", 20 * WAVE), ("SteerXyz", "deg", 90 * WAVE))
     assert found.guesses["r"].channel == ("Yaw",) and not found.is_sure("r")
-    assert (
-        found.guesses["delta_f"].hand
-        and found.guesses["delta_f"].confidence < LOGS_CHOSEN.names_sure
-    )
+    assert found.guesses["delta_f"].hand and found.guesses["delta_f"].confidence < SURE
     assert "r" not in proposed(("Yaw", "deg", 20 * WAVE)).guesses
 
 

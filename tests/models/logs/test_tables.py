@@ -75,8 +75,8 @@ def test_pyarrow_changes_neither_bits_nor_messages_however_a_text_is_spoilt(
     for k in range(12):
         path.write_bytes(spoilt(rng, DIALECTS[dialect]) if k else DIALECTS[dialect])
         size = rng.choice((200, 1500, 1 << 22))
-        monkeypatch.setattr(text, "CHOSEN", text.CHOSEN._replace(block=size))
-        monkeypatch.setattr(text, "CHOSEN", text.CHOSEN._replace(small_block=size))
+        monkeypatch.setattr(text, "_BLOCK", size)
+        monkeypatch.setattr(text, "_SMALL_BLOCK", size)
         assert outcome(path, True) == outcome(path, False)
 
 
@@ -153,8 +153,8 @@ def test_blocks_may_end_anywhere_but_within_quotes(tmp_path, monkeypatch, block)
     path = tmp_path / "log.csv"
     rows = [f'"a ""word"",\nof {k}",{DT * k:.2f},{k}' for k in range(50)]
     path.write_text("\n".join(["note,t,v", *rows]))
-    monkeypatch.setattr(text, "CHOSEN", text.CHOSEN._replace(block=block))
-    monkeypatch.setattr(text, "CHOSEN", text.CHOSEN._replace(small_block=block))
+    monkeypatch.setattr(text, "_BLOCK", block)
+    monkeypatch.setattr(text, "_SMALL_BLOCK", block)
     for arrow in (True, False):
         log = TableLog(table=replace(open_log(path).table, arrow=arrow))
         (channel,) = log.read(["v"])

@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.logs.chosen import CHOSEN as LOGS_CHOSEN
 from models.logs.door import open_log
-from models.logs.names import _RULES, _name_confidence, propose
+from models.logs.names import _RULES, SURE, _name_confidence, propose
 from models.logs.signals import QUANTITIES, WHEELS
 from models.logs.spelling import unit_in_name
 from tests.models.logs.test_names import WAVE, proposed
@@ -32,7 +31,7 @@ NO_WHEEL = ["Engine RPM", "Steering Wheel Speed", "Wheel Slip FL", "Brake Pressu
 @pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in all_])
 def test_a_name_of_a_logger_is_that_wheel_and_nothing_else(signal, name):
     found = {one: _name_confidence(one, name) for one in (*WHEELS, *_RULES)}
-    assert found[signal] >= LOGS_CHOSEN.names_sure
+    assert found[signal] >= SURE
     assert not any(value for one, value in found.items() if one != signal)
 
 

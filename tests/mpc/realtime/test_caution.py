@@ -6,10 +6,8 @@ import pytest
 from mpc.handover.road import at_friction
 from mpc.prediction import build_axles, build_dynamics, build_rk4, state_size
 from mpc.realtime import Measurement, Status, Tracker
-from mpc.realtime.caution import GRIPS
-from mpc.realtime.chosen import CHOSEN as REALTIME_CHOSEN
-from mpc.tires.chosen import CHOSEN as TIRES_CHOSEN
-from mpc.tires.tire import ALL, curves_at
+from mpc.realtime.caution import GRIPS, N_GRIPS, SURPRISE
+from mpc.tires.tire import ALL, DOUBT_STEP, N_DOUBTS, curves_at
 from tests.mpc.realtime.conftest import PROBLEM
 from tests.mpc.test_prediction import TIRES
 
@@ -137,8 +135,8 @@ def watch(s, p, m, axles):
     r = m.r + s["turning"]
     shown = masses * m.v_y + np.array([inertia, -inertia]) * r / (l_f + l_r)
     squares, missed, slips = (
-        np.zeros(REALTIME_CHOSEN.n_grips),
-        np.zeros((REALTIME_CHOSEN.n_grips, 2)),
+        np.zeros(N_GRIPS),
+        np.zeros((N_GRIPS, 2)),
         s["slips"].copy(),
     )
     impulse = s["impulse"].copy()
@@ -151,10 +149,9 @@ def watch(s, p, m, axles):
             continue
         rate = force - masses * v_x * r
         missed[j] = (shown - impulse[j] - PERIOD * rate) / FOLLOWED
-        at = np.abs(s["slips"][j]) / grip / TIRES_CHOSEN.doubt_step
+        at = np.abs(s["slips"][j]) / grip / DOUBT_STEP
         doubt = [
-            np.interp(a, np.arange(TIRES_CHOSEN.n_doubts), row)
-            for a, row in zip(at, p["doubt"], strict=True)
+            np.interp(a, np.arange(N_DOUBTS), row) for a, row in zip(at, p["doubt"], strict=True)
         ]
         expected = p["force_error"] + np.array(doubt) * grip / 1.645
         squares[j] = np.minimum((missed[j] / expected) ** 2, CLIP).sum()
@@ -168,7 +165,7 @@ def watch(s, p, m, axles):
         s["watched"] = 0
     if s["watched"] * PERIOD > SETTLED:
         cost = s["cost"] + PERIOD / ALIKE * 2.0 / (2.0 + squares.min()) * squares
-        s["cost"] = np.minimum(cost - cost.min(), REALTIME_CHOSEN.surprise)
+        s["cost"] = np.minimum(cost - cost.min(), SURPRISE)
         best = int(np.argmin(s["cost"]))
         if abs(front[best]) < 0.3 * GRIPS[best] * p["max_slip"][0]:
             moved = missed[best, 0] / p["stiffness"] * share_of(s["gentle"])
@@ -176,7 +173,7 @@ def watch(s, p, m, axles):
             s["gentle"] += 1
     best = int(np.argmin(s["cost"]))
     left = np.minimum(
-        (REALTIME_CHOSEN.surprise - s["cost"][best + 1 :]) / (REALTIME_CHOSEN.surprise - REFUTED),
+        (SURPRISE - s["cost"][best + 1 :]) / (SURPRISE - REFUTED),
         1.0,
     )
     least = GRIPS[best] + np.cumprod(left) @ np.diff(GRIPS[best:])
@@ -243,7 +240,7 @@ def test_doubt_tightens_slip_along_the_plan(lagging):
             doubt=share
             * curves_at(
                 lagging,
-                TIRES_CHOSEN.doubt_step * np.arange(TIRES_CHOSEN.n_doubts, dtype=np.float64),
+                DOUBT_STEP * np.arange(N_DOUBTS, dtype=np.float64),
             )
         )
         tracker = make(tire, 1.0)

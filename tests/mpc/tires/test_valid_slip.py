@@ -11,8 +11,7 @@ from mpc.prediction import build_dynamics
 from mpc.problem import Limits, Problem
 from mpc.realtime import Tracker
 from mpc.tires import oracle_tire, prediction_tire
-from mpc.tires.chosen import CHOSEN as TIRES_CHOSEN
-from mpc.tires.tire import ALL, Car, Point, believed, valid_slip
+from mpc.tires.tire import ALL, LEAST_RISE, Car, Point, believed, valid_slip
 
 CAR = sedan()
 SLIPS = np.linspace(-0.4, 0.4, 161)
@@ -58,7 +57,7 @@ def test_a_curve_is_the_tires_up_to_there_and_rises_beyond(oracle):
         assert kept[axle, inside] == pytest.approx(free[axle, inside], abs=1e-6)
         beyond = np.abs(SLIPS[1:] - 0.0025) > useful[axle] + 0.01
         rise = np.diff(kept[axle])[beyond] / np.diff(SLIPS)[beyond]
-        assert (rise > 0.99 * TIRES_CHOSEN.least_rise * first[axle]).all()
+        assert (rise > 0.99 * LEAST_RISE * first[axle]).all()
         assert (rise < 0.055 * first[axle]).all()
         assert np.diff(free[axle])[beyond].min() < 0.0 < np.diff(kept[axle]).min()
         np.testing.assert_allclose(kept[axle], -kept[axle][::-1], atol=1e-6)
