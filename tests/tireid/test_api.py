@@ -310,7 +310,7 @@ def test_the_step_integrates_the_equations_of_motion(tires, name):
     assert [f.name() for f in functions] == ["tire_force_curve", "car_dynamics", "car_step"]
     assert functions.step.name_in() == ["x", "delta", "v_x", "dt"]
     x = x0 = np.array([0.2, 0.1, *([0.02, 0.01] if tire.lagged else [])])
-    dt, parts = 0.01, 4000
+    dt, parts = 0.005, 4000
     for _ in range(parts):  # Euler, in steps that are small enough
         x = x + dt / parts * np.array(functions.dynamics(x, 0.04, 20.0)[0]).ravel()
     once = np.array(functions.step(x0, 0.04, 20.0, dt)).ravel()
