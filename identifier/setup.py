@@ -57,7 +57,7 @@ class Setup(NamedTuple):
     """A run, ready to go: the compiled step, the values it carries at the start, its constants.
 
     The step reads x = [v_y, r] (2,), u = [δ_f, δ_r] (2,), v_x and, where it can use it, a_y (NaN
-    where there is none) sample by sample, SI: `shown`. It has an output axle_force (2,) [N].
+    where there is none) sample by sample, SI: `sampled`. It has an output axle_force (2,) [N].
     An observer that starts at the first measurement carries zero until that is known: `observe`
     takes its x and returns the carried values that begin with it, by port.
     Carried ports of `only_with_a_y` change no other one, and no output, where a_y is never there.

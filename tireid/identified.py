@@ -64,7 +64,7 @@ class Results:
     runs : of the method, over the recording that was learnt and over others.
     models, frozen : by freeze time as text [s], models and their replays by recording; the last
         counts.
-    verdict : on the last.   asked : on it over the others, by name.
+    verdict : on the last.   evaluated : on it over the others, by name.
     parts : of the first run, where it is over several logs.
     """
 

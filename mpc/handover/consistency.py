@@ -68,7 +68,7 @@ class Consistency:
     def observe(self, measured: Measured, requested: float | None = None) -> bool:
         """Take a sample; return whether the sensors agree.
 
-        asked : angle asked of the wheels that should have been reached by now [rad]; None where it
+        requested : angle of the wheels that should have been reached by now [rad]; None where it
         is not known.
         """
         self.worst = self._judged(measured, requested)
