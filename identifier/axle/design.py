@@ -232,7 +232,8 @@ class AxleIdentifier(Method):
     def _within_bounds(self, W: Array, beside: Array, P: Array) -> tuple[Array, Array]:
         """Return what is begun with, within bounds: a file or a prior may lie outside.
         W : weights [static axle loads], (2, n).
-        beside : [compliance [m per load], sway share [-], offset ([rad] front, [m/s] rear)], (2, 3).
+        beside : [compliance [m per load], sway share [-], offset], (2, 3); the offset [rad] in
+            front, [m/s] at the rear.
         P : covariance of both, (2, n + 3, n + 3): the least move is in its metric.
         """
         n = len(self.ladder)

@@ -334,15 +334,13 @@ class TableLog:
             head = self.table.first_rows(k)
             filled = sum(cell != "" for cell in head) / max(len(head), 1)
             filled = 1.0 if self._channel_clocks else filled  # of its own times, which end sooner
-            timed_by = self._channel_clocks.get(k, self.clock)
+            clock = self._channel_clocks.get(k, self.clock)
             listed.append(
                 Listed(
                     name=heading.name,
                     unit=heading.unit,
-                    samples=stamps[timed_by.column].size
-                    if timed_by and self._channel_clocks
-                    else size,
-                    rate=(rates[timed_by.column] if timed_by else self._even or math.nan) * filled,
+                    samples=stamps[clock.column].size if clock and self._channel_clocks else size,
+                    rate=(rates[clock.column] if clock else self._even or math.nan) * filled,
                 )
             )
         return tuple(listed)
