@@ -21,7 +21,7 @@ def stations(title):
     ("title", "files"),
     [
         ("How delta_f goes from the CSV to the tires", 9),
-        ("How a fit reaches the tracker and C", 9),
+        ("How a fit reaches the tracker and C", 10),
     ],
 )
 def test_a_way_is_as_long_as_it_says_and_its_names_are_in_its_files(title, files):

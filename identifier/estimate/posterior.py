@@ -55,8 +55,8 @@ class Reach(NamedTuple):
     slip : largest of each axle [rad], (2,).
     speeds, a_x : least and largest [m/s], [m/s²], (2,).
     alike, pairs : sum of products of what the model misses, over its size, at two times
-        0.15 s apart (of a sedan), (2,), and how many there are: white noise of the sensors has no part
-        in it.
+        0.15 s apart (of a sedan), (2,), and how many there are: white noise of the sensors has no
+        part in it.
     segments : on another road.
     parted : of drives without v_y, side slip by which soft and stiff tires that explain them alike
         part, rms [rad].

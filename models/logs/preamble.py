@@ -130,7 +130,7 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
     filled = [line for line in lines if line.strip() and not line.lstrip().startswith(COMMENT)]
     way = _way(filled[-_TAIL:])
     if way is None:
-        raise RecordingError(f"{path}: there is a header but no row of data with numbers")
+        return _no_data(path, lines, encoding)
     few(path, way.width, "columns", "columns")
     table = [_Line(k, line, way.delimiter) for k, line in enumerate(lines, start=1)]
     return _table(path, table, way, encoding)
