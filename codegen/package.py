@@ -158,14 +158,12 @@ def _array_functions(prefix: str, called: Collection[str]) -> str:
     called : their names, of `REPLACED`.
     """
     texts = []
-    for function in sorted(called):
+    for one in sorted(called):
         x = ca.SX.sym("x")
-        graph = recognized(
-            graph_of(ca.Function(function, [x], [REPLACED[function](x)])), whole=False
-        )
+        graph = recognized(graph_of(ca.Function(one, [x], [REPLACED[one](x)])), whole=False)
         statements = Statements(graph, prefix=prefix, read=_entry, write=_entry)
         texts.append(
-            f"static void {prefix}_{function}({prefix}_real *x, uint32_t n)\n{{\n    uint32_t i;\n"
+            f"static void {prefix}_{one}({prefix}_real *x, uint32_t n)\n{{\n    uint32_t i;\n"
             f"    for (i = 0U; i < n; i++) {{\n{statements.block(indent=8)}    }}\n}}\n\n"
         )
     return "".join(texts)

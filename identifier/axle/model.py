@@ -127,11 +127,9 @@ class AxleModel(TireModel):
                 f"W must be static axle loads below {_LARGEST_WEIGHT:g}, it reaches "
                 f"{np.abs(self.W).max():g}"
             )
-        model_error = self.model_error
-        if model_error is not None and not (
-            model_error.shape == (2,) and (model_error >= 0.0).all()
-        ):
-            raise ValueError(f"force_missed must be two shares of at least 0, it is {model_error}")
+        error = self.model_error
+        if error is not None and not (error.shape == (2,) and (error >= 0.0).all()):
+            raise ValueError(f"force_missed must be two shares of at least 0, it is {error}")
         self._require_plausible()
 
     def _require_plausible(self) -> None:

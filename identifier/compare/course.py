@@ -87,10 +87,8 @@ class Course:
             vehicle, windows = self.vehicle, self._windows(recording)
             loads = np.array(vehicle.axle_loads)
             with np.errstate(over="ignore", invalid="ignore"):  # of a law that diverged
-                residual = measured_force(recording, vehicle, windows) - windows.mean(force / loads)
-                front, rear = loads * clean_rms(
-                    residual, noise_variance(recording, vehicle, windows)
-                )
+                error = measured_force(recording, vehicle, windows) - windows.mean(force / loads)
+                front, rear = loads * clean_rms(error, noise_variance(recording, vehicle, windows))
             return (
                 AxleRmse(front=front, rear=rear) if np.isfinite([front, rear]).all() else INFINITE
             )

@@ -303,9 +303,8 @@ def predicted(
     force = way.by((at.force + slope * (slip - z.slip) / 2) * cos_delta + z.error)
     arm, turn = car.arm, turning(car)
     push = GRAVITY * car.share
-    pull = way.constant(
-        slope * cos_delta * (1 - mean) * (dt / (2 * v_x))
-    )  # force per change of v_y
+    # Force per change of v_y.
+    pull = way.constant(slope * cos_delta * (1 - mean) * (dt / (2 * v_x)))
     a = ca.dot(push, force) - v_x * z.r + GRAVITY * z.bank
     b = ca.dot(turn, force)
     m11, m12 = 1 + ca.dot(push, pull), ca.dot(push * arm, pull) + dt * v_x / 2

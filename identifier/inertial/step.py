@@ -49,7 +49,7 @@ _SAME = 0.01  # of the square of a change, up to which the next one is none: a n
 _MOST_WAITING = 4  # numbers of a channel that wait for its turn
 _MOST_SLIDING = 0.7  # |v_y|/v_x from which the filter begins anew
 _MOST_NOISE = 9.0  # of the noise that is held for true, what one sample may show
-_LARGEST_ERROR = 25.0  # one outlier alone is no alarm
+_LARGEST_SQUARE = 25.0  # one outlier alone is no alarm
 _STIFFNESS = 2.0  # static loads/rad, the least that a corner is begun with
 _DOUBTED = 0.7  # of the slip that a corner is begun with
 _LAG_OF_A_X = 0.2  # s, of the washout that shows a_x
@@ -233,11 +233,10 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     noise = _noise(s, gated, goes_on)
     step, factors, left = _corrected(s, ahead, ahead_z, into, factors, noise, now, steps, load)
     corrected = ca.vertsplit(ahead_z + into @ step)
-    force_error = smaller(
-        (ca.vertcat(*corrected[4:6]) / _force_deviation(trust, ahead)) ** 2, _LARGEST_ERROR
-    )
+    shares = ca.vertcat(*corrected[4:6]) / _force_deviation(trust, ahead)
+    squares = smaller(shares**2, _LARGEST_SQUARE)
     fast = s.running.force_error
-    fast = fast + trust.alarm_gain * ((force_error[0] + force_error[1]) / 2 - fast)
+    fast = fast + trust.alarm_gain * ((squares[0] + squares[1]) / 2 - fast)
     alarm = goes_on * gated.learns * within(fast * trust.per_alarm - 1, 0, 1)
     factors = _loosened(factors, learnt, alarm * trust.inflation)
     corrected = _bounded(s, corrected, learnt)

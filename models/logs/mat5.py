@@ -80,11 +80,8 @@ def read_tree(path: Path) -> dict[str, Tree]:
             raise _DamagedError("its header has no byte order")
         size = path.stat().st_size
         result: dict[str, Tree] = {}
-        place, in_memory, packed = (
-            _HEADER,
-            0,
-            0,
-        )  # bytes that stay in memory, and of the file for them
+        # Bytes that stay in memory, and of the file for them.
+        place, in_memory, packed = _HEADER, 0, 0
         while place < size:
             file.seek(place)
             tag = file.read(8)
