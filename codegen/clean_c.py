@@ -29,8 +29,8 @@ from codegen.graph import (
 # tanh, exp, atan and sin are one call each. Those of C libraries become calls of our own: they
 # would differ from machine to machine.
 
-OWN: Mapping[str, Callable[[Any], Any]] = {"tanh": tanh, "exp": exp, "atan": atan, "sin": sin}
-EXPANDED = {**BUILDERS, **OWN}
+REPLACED: Mapping[str, Callable[[Any], Any]] = {"tanh": tanh, "exp": exp, "atan": atan, "sin": sin}
+EXPANDED = {**BUILDERS, **REPLACED}
 
 
 def recognized(graph: Graph, *, whole: bool = True) -> Graph:
@@ -39,7 +39,7 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
     """
     result = rebuilt(graph, lambda new, _, node, __: _with_choice(new, node))
 
-    def own(new: Graph, place: int, node: Node, place_of: Mapping[int, int]) -> int:
+    def replaced(new: Graph, place: int, node: Node, place_of: Mapping[int, int]) -> int:
         made = _by_sines(new, node)
         for name, template, leaf in _templates().get(result.nodes[place].op, ()):
             argument = _argument(result, place, template, leaf)
@@ -47,7 +47,7 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
                 made = new.add(Node(name, (place_of[argument],)))
         return made
 
-    return rebuilt(result, own) if whole else result
+    return rebuilt(result, replaced) if whole else result
 
 
 def _with_choice(graph: Graph, node: Node) -> int:
@@ -105,9 +105,9 @@ def _templates() -> Mapping[str, list[tuple[str, Graph, int]]]:
     found = dict[str, list[tuple[str, Graph, int]]]()
     for on in (True, False):
         with simplifying(on):
-            for name, own in OWN.items():
+            for name, function_of in REPLACED.items():
                 x = ca.SX.sym("x")
-                function = ca.Function(name, [x], [own(x)])
+                function = ca.Function(name, [x], [function_of(x)])
                 graph = recognized(graph_of(function), whole=False)
                 leaf = next(i for i, node in enumerate(graph.nodes) if node.op == "input")
                 last = graph.nodes[graph.outputs[0][0]].op
@@ -360,7 +360,7 @@ def _groups(graph: Graph) -> list[list[int]]:
     for place in graph.reached():
         node = graph.nodes[place]
         level[place] = max((level[a] for a in node.args), default=0)
-        if node.op in OWN:
+        if node.op in REPLACED:
             level[place] += 1
             found.setdefault((node.op, level[place]), []).append(place)
     return list(found.values())

@@ -168,14 +168,14 @@ def _at_level(flags: tuple[str, ...], source: str) -> tuple[str, ...]:
     Two levels, as in 1,0, are one for short sources and one for long ones. The bits are the same at
     each; tests, which run little of much that is compiled, take low ones.
     """
-    asked = os.environ.get("TIREID_OPTIMIZE", "")
-    if not asked:
+    requested = os.environ.get("TIREID_OPTIMIZE", "")
+    if not requested:
         return flags
-    levels = asked.split(",")
+    levels = requested.split(",")
     if len(levels) > 2 or not set(levels) <= set(_LEVELS):
         raise CompilationError(
             f"TIREID_OPTIMIZE must be one of {', '.join(_LEVELS)}, or two of them, for short and "
-            f"for long sources, it is {asked!r}"
+            f"for long sources, it is {requested!r}"
         )
     level = levels[-1] if len(source) > LONG else levels[0]
     return tuple(f"-O{level}" if flag in ("-O1", "-O2", "-O3") else flag for flag in flags)

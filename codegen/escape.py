@@ -11,7 +11,7 @@ import unicodedata
 from typing import Any
 
 MARKDOWN = frozenset("\\`*_{}[]<>#|~!&$@")  # what means something inside a paragraph or a table
-SHOWN = 60  # characters of a value in a message
+LONGEST_DISPLAYED = 60  # characters of a value in a message
 
 
 def visible(text: str, *, keep: str = "") -> str:
@@ -24,14 +24,14 @@ def visible(text: str, *, keep: str = "") -> str:
     )
 
 
-def shown(value: Any) -> str:
+def displayed(value: Any) -> str:
     """Return a value as a message shows it: short, on one line, without controls."""
     if isinstance(value, int) and value.bit_length() > 128:
         return f"a whole number of {value.bit_length()} bits"
     if isinstance(value, dict | list | tuple):
         return f"a {'table' if isinstance(value, dict) else 'list'} of {len(value)}"
-    text = repr(value[: SHOWN + 1] if isinstance(value, str | bytes) else value)
-    return visible(text if len(text) <= SHOWN else f"{text[:SHOWN]}...")
+    text = repr(value[: LONGEST_DISPLAYED + 1] if isinstance(value, str | bytes) else value)
+    return visible(text if len(text) <= LONGEST_DISPLAYED else f"{text[:LONGEST_DISPLAYED]}...")
 
 
 def c_comment(text: str) -> str:

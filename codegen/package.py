@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
-from codegen.clean_c import OWN, Statements, recognized
+from codegen.clean_c import REPLACED, Statements, recognized
 from codegen.errors import TireidError
 from codegen.escape import c_comment, c_string
 from codegen.graph import graph_of
@@ -153,17 +153,17 @@ FUNCTIONS: Mapping[str, tuple[str, str]] = {  # in float and in double
 }
 
 
-def _own_functions(prefix: str, called: Collection[str]) -> str:
+def _array_functions(prefix: str, called: Collection[str]) -> str:
     """Return those of our own functions that are called, each over an array, from one expression.
-    called : their names, of `OWN`.
+    called : their names, of `REPLACED`.
     """
     texts = []
-    for own in sorted(called):
+    for one in sorted(called):
         x = ca.SX.sym("x")
-        graph = recognized(graph_of(ca.Function(own, [x], [OWN[own](x)])), whole=False)
+        graph = recognized(graph_of(ca.Function(one, [x], [REPLACED[one](x)])), whole=False)
         statements = Statements(graph, prefix=prefix, read=_entry, write=_entry)
         texts.append(
-            f"static void {prefix}_{own}({prefix}_real *x, uint32_t n)\n{{\n    uint32_t i;\n"
+            f"static void {prefix}_{one}({prefix}_real *x, uint32_t n)\n{{\n    uint32_t i;\n"
             f"    for (i = 0U; i < n; i++) {{\n{statements.block(indent=8)}    }}\n}}\n\n"
         )
     return "".join(texts)
@@ -189,8 +189,8 @@ def used_macros(prefix: str, text: str) -> str:
 
 def equations_file(prefix: str, about: str, functions: Mapping[str, Statements]) -> str:
     """Return a generated C file of functions, which `<prefix>_equations.h` declares."""
-    called = {own for statements in functions.values() for own in statements.called}
-    text = _own_functions(prefix, called) + "\n".join(
+    called = {one for statements in functions.values() for one in statements.called}
+    text = _array_functions(prefix, called) + "\n".join(
         f"{signature}\n{{\n{_unread(signature, statements.block())}{statements.block()}}}\n"
         for signature, statements in functions.items()
     )

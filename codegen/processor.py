@@ -141,10 +141,10 @@ def _build(folder: Path, program: Program, words: Sequence[str], *, single: bool
     if program.samples is not None:
         write_file(folder / "samples.bin", program.samples)
         sources.append("samples.S")
-    own = [f"-D{program.name.upper()}_SINGLE={int(single)}", *program.macros]
-    own += ["-Iinclude", "-Isrc", "-Itests", "-I."]
+    options = [f"-D{program.name.upper()}_SINGLE={int(single)}", *program.macros]
+    options += ["-Iinclude", "-Isrc", "-Itests", "-I."]
     compiler, *others = words
-    _compile_in(folder, [compiler, *own, *sources, *others, "-o", "replay"])
+    _compile_in(folder, [compiler, *options, *sources, *others, "-o", "replay"])
 
 
 def _write(folder: Path, files: Mapping[str, str]) -> list[str]:

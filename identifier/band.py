@@ -122,13 +122,13 @@ class Band(ABC):
         """
 
     @abstractmethod
-    def calibrated_by(self, calibration: Any, force_missed: Array | None = None) -> Any:
+    def calibrated_by(self, calibration: Any, model_error: Array | None = None) -> Any:
         """Return the model, its band calibrated.
 
         Parameters
         ----------
         calibration : None assumes the declared errors.
-        force_missed : share of the force that the model misses of the identification drive, (2,);
+        model_error : share of the force that the model misses of the identification drive, (2,);
             None where not computed.
         """
 

@@ -114,10 +114,10 @@ def run_trial(recording: Recording, maneuver: str, design: PaperIdentifier) -> _
         return _Trial(history=history, replays={}, errors={})
     since = ONSETS[maneuver]
     replays = {t: reproduce(history, t, since=since) for t in FREEZES[maneuver]}
-    missed = {ONLINE: online_error(history, since=since)}
+    measures = {ONLINE: online_error(history, since=since)}
     for t, result in replays.items():
-        missed |= {frozen_column(m, t): error for m, error in _measures(result).items()}
-    errors = {name: error.both / 1000.0 for name, error in missed.items() if error is not None}
+        measures |= {frozen_column(m, t): error for m, error in _measures(result).items()}
+    errors = {name: error.both / 1000.0 for name, error in measures.items() if error is not None}
     return _Trial(history=history, replays=replays, errors=errors)
 
 

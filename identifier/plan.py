@@ -269,11 +269,11 @@ def _step() -> ca.Function:
     rest = [ca.SX.sym(name, *nodes.size_in(name)) for name in names]
     z, z_next = ca.SX.sym("z", 4), ca.SX.sym("z_next", 4)
     still = ca.SX.zeros(4)  # what curves miss, and the bank
-    missed = nodes(
+    residual = nodes(
         z=ca.vertcat(z, still), z_next=ca.vertcat(z_next, still),
         **dict(zip(names, rest, strict=True)), times=1,
     )["moves"][:4]  # fmt: skip
-    equations = ca.Function("missed", [z_next, z, *rest], [missed])
+    equations = ca.Function("residual", [z_next, z, *rest], [residual])
     newton = ca.rootfinder("newton", "newton", equations, {"abstol": 1e-9})
     given = [ca.MX.sym(f"given_{k}", one.numel()) for k, one in enumerate((z, *rest))]
     return ca.Function("step", given, [newton(given[0], *given)])

@@ -58,7 +58,7 @@ class SampleLimits(NamedTuple):
         """Return whether a sample holds numbers within them; NaN is not.
         v_x : longitudinal speed [m/s].   v_y : lateral velocity [m/s].   r : yaw rate [rad/s].
         delta_f : steering in front [rad].   delta_r : steering at the rear [rad].
-        needs_v_y : False accepts any v_y, of which `possible` is what is left.
+        needs_v_y : False accepts any v_y, of which `plausible` is what is left.
         """
         return (
             abs(v_x) <= self.speed

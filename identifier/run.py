@@ -313,7 +313,7 @@ class Counts:
 
     samples: int = 0
     refused: int = 0
-    missed: int = 0
+    refused_in_row: int = 0
 
 
 class OnlineIdentifier:
@@ -339,7 +339,7 @@ class OnlineIdentifier:
         self.vehicle, self.method, self.counts = vehicle, method, Counts()
         self.limits = SampleLimits.of(vehicle)
         self.stale_time = stale_time
-        self._most_missed = stale_samples(stale_time, method.dt)
+        self._most_refused = stale_samples(stale_time, method.dt)
         self._start = start
         self._force = np.zeros(2)
         self._stepper: Stepper | None = None
@@ -363,11 +363,11 @@ class OnlineIdentifier:
         v_y = self.limits.plausible(v_y)
         if self._stepper is None:
             self._begun(np.array([v_y, r]))
-        elif self.counts.missed and not self._judges:
+        elif self.counts.refused_in_row and not self._judges:
             self._take((v_y, r), (delta_f, delta_r), 0.0)  # a rest, so that the step begins anew
         self._take((v_y, r), (delta_f, delta_r), v_x, felt)
         self.counts.samples += 1
-        self.counts.missed = 0
+        self.counts.refused_in_row = 0
         return self._force.copy()
 
     def _take(
@@ -386,7 +386,7 @@ class OnlineIdentifier:
     def _refused(self) -> Array:
         """Let time go on without a sample; return the forces."""
         self.counts.refused += 1
-        self.counts.missed += 1
+        self.counts.refused_in_row += 1
         if self._stepper is not None and self._judges:
             v_y = 0.0 if "v_y" in self.method.needs else math.nan
             self._take((v_y, 0.0), (0.0, 0.0), NOWHERE)
@@ -397,7 +397,7 @@ class OnlineIdentifier:
     @property
     def stale(self) -> bool:
         """Whether samples have been refused for so long that forces read zero."""
-        return self.counts.missed >= self._most_missed
+        return self.counts.refused_in_row >= self._most_refused
 
     def _begun(self, x: Array) -> None:
         """Set the step up where `identify` would: at the first sample."""

@@ -57,7 +57,7 @@ class Setup(NamedTuple):
     """A run, ready to go: the compiled step, the values it carries at the start, its constants.
 
     The step reads x = [v_y, r] (2,), u = [δ_f, δ_r] (2,), v_x and, where it can use it, a_y (NaN
-    where there is none) sample by sample, SI: `shown`. It has an output axle_force (2,) [N].
+    where there is none) sample by sample, SI: `sampled`. It has an output axle_force (2,) [N].
     An observer that starts at the first measurement carries zero until that is known: `observe`
     takes its x and returns the carried values that begin with it, by port.
     Carried ports of `only_with_a_y` change no other one, and no output, where a_y is never there.
@@ -108,19 +108,19 @@ class Setup(NamedTuple):
         """
         following = self.begun(recording) if carry is None else dict(carry)
         for part in blocks(len(recording)) if parts is None else parts:
-            shown = self.shown(recording, part)
-            values = {**following, **shown.signals, **self.constants}
-            record = self.scan(shown.samples, values, ports=ports)
+            sampled = self.sampled(recording, part)
+            values = {**following, **sampled.signals, **self.constants}
+            record = self.scan(sampled.samples, values, ports=ports)
             following = {port: record[f"{port}_final"] for port in self.scan.carry}
             yield Block(
                 part=part,
                 state={
-                    port: shown.of_recording(record[f"{port}_all"])
+                    port: sampled.of_recording(record[f"{port}_all"])
                     for port in self.scan.carry
                     if port in record
                 },
                 outputs={
-                    port: shown.of_recording(record[port])
+                    port: sampled.of_recording(record[port])
                     for port in self.scan.outputs
                     if port in record
                 },
@@ -150,7 +150,7 @@ class Setup(NamedTuple):
         v_y = math.nan if recording.v_y is None else recording.v_y[0]
         return dict(self.begin(np.array([v_y, recording.r[0]])).carry)
 
-    def shown(self, recording: Recording, part: slice = ALL) -> "_Shown":
+    def sampled(self, recording: Recording, part: slice = ALL) -> "_Sampled":
         """Return a recording as the step is shown it: before each segment but the first it rests.
 
         A rest is a sample that no gate believes, or one at standstill for a step without a gate, so
@@ -171,12 +171,12 @@ class Setup(NamedTuple):
         }
         breaks = [k - first for k in recording.breaks if first <= k < last]
         if not breaks:
-            return _Shown({port: signals[port] for port in self.scan.over}, n, None)
+            return _Sampled({port: signals[port] for port in self.scan.over}, n, None)
         rows, resting, at = with_rests(n, breaks, self.rest)
         padded = {port: np.array(signal[rows]) for port, signal in signals.items()}
         padded["v_x"][resting] = NOWHERE if judges_samples(self.carry) else 0.0
         padded["a_y"][resting] = np.nan
-        return _Shown({port: padded[port] for port in self.scan.over}, rows.size, at)
+        return _Sampled({port: padded[port] for port in self.scan.over}, rows.size, at)
 
 
 class Block(NamedTuple):
@@ -221,7 +221,7 @@ class OnDemand(Mapping[str, Array]):
         return port in self._ports
 
 
-class _Shown(NamedTuple):
+class _Sampled(NamedTuple):
     """What a step is shown of a part of a recording: samples, and rests between its segments.
     signals : by port of `over`, (N, ...).   samples : N, rests included.
     at : which of these each sample of the part is (n,); None where there is no rest.

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from codegen.arrays import Array
-from codegen.escape import shown
+from codegen.escape import displayed
 from identifier.band import AXLES as AXLES
 from identifier.band import Axle as Axle
 from identifier.band import Band, of_axle
@@ -84,7 +84,7 @@ class Estimate(NamedTuple):
         value = printed_value(self.value, self.sd, self.unit)
         return value if self.identified else f"{value} ({NOT_IDENTIFIABLE})"
 
-    def with_missed(self, share: float) -> "Estimate":
+    def with_model_error(self, share: float) -> "Estimate":
         """Return the number with the share that is missed of a force in its standard deviation.
 
         The recursion knows of noise only; what its curves cannot say is in what they miss.
@@ -326,7 +326,7 @@ class TireModel(ABC):
         return Drives()
 
     @property
-    def force_missed(self) -> Array | None:
+    def model_error(self) -> Array | None:
         """Error of the model over the force in the motion of the identification drive [-], rms,
         white noise subtracted, (2,); None where not computed: `calibrated` does.
         """
@@ -357,16 +357,16 @@ class TireModel(ABC):
         It begins with the share of the force that the model misses where that is known: of a
         model of `calibrated`, also stored and read again. Without, ± knows of noise only.
         """
-        missed = self.force_missed
+        error = self.model_error
         rows = [["", *AXLES]]
-        if missed is not None:
-            fact = Fact("model error on the identification drive", 100.0 * missed, "%")
+        if error is not None:
+            fact = Fact("model error on the identification drive", 100.0 * error, "%")
             rows.append([f"{fact.title} [{fact.unit}]", *fact.words])
         by_title: dict[str, dict[str, str]] = {}
         for one in self.estimates():
-            share = 0.0 if missed is None else float(missed[AXLES.index(one.axle)])
+            share = 0.0 if error is None else float(error[AXLES.index(one.axle)])
             title = f"{one.title} [{printed_unit(one.unit)}]"
-            by_title.setdefault(title, {})[one.axle] = one.with_missed(share).words
+            by_title.setdefault(title, {})[one.axle] = one.with_model_error(share).words
         rows += [[title, *(cells.get(axle, "") for axle in AXLES)]
                  for title, cells in by_title.items()]  # fmt: skip
         rows += [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in self.facts()]
@@ -513,7 +513,7 @@ def load_model(path: str | PathLike[str]) -> TireModel:
     if kind == "onnx":
         table.refuse("kind", "is an ONNX network: make it a method, as examples/own_network.py")
     if kind not in MODELS:
-        table.refuse("kind", f"must be one of {list(MODELS)}, it is {shown(kind)}")
+        table.refuse("kind", f"must be one of {list(MODELS)}, it is {displayed(kind)}")
     module, name = MODELS[kind]
     model: TireModel = getattr(importlib.import_module(module), name).from_dict(
         dict(table.data), str(path)
@@ -547,5 +547,5 @@ def _stored(path: Path) -> Table:
 def _verdict_of(table: Table) -> bool | None:
     valid = table.value("valid") if "valid" in table else None
     if valid is not None and not isinstance(valid, bool):
-        table.refuse("valid", f"must be true or false, it is {shown(valid)}")
+        table.refuse("valid", f"must be true or false, it is {displayed(valid)}")
     return valid

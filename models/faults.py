@@ -67,7 +67,7 @@ class SensorFault:
         """Return whether the channel is broken at a time.   t : time [s], a number or (n,)."""
         return (t >= self.start) & (t < self.start + self.duration)
 
-    def shown(self, t: Any, value: Any, stuck_at: float, noise: Any) -> Any:
+    def measured(self, t: Any, value: Any, stuck_at: float, noise: Any) -> Any:
         """Return what the broken channel shows.   t : time [s], a number or (n,)."""
         since = t - self.start
         match self.kind:
@@ -97,6 +97,6 @@ class SensorFault:
             raise FaultError("a recording holds numbers only: no channel of it can be lost")
         good, broken = channel_of(recording, self.channel), self.active(recording.t)
         noise = np.random.default_rng(self.seed).standard_normal(good.size)
-        shown = self.shown(recording.t, good, float(good[np.argmax(broken)]), noise)
-        changed: dict[str, Any] = {self.channel: np.where(broken, shown, good)}
+        measured = self.measured(recording.t, good, float(good[np.argmax(broken)]), noise)
+        changed: dict[str, Any] = {self.channel: np.where(broken, measured, good)}
         return replace(recording, **changed)

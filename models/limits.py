@@ -43,20 +43,20 @@ class InputLimits:
 def limits() -> InputLimits:
     """Return the limits, as the environment raises or lowers them."""
     known = [field.name for field in fields(InputLimits)]
-    asked: dict[str, float] = {}
+    given: dict[str, float] = {}
     for word in os.environ.get(VARIABLE, "").replace(",", " ").split():
         name, _, number = word.partition("=")
         try:
-            asked[name] = float(number)
+            given[name] = float(number)
         except ValueError:
-            asked[name] = math.nan
-        if name not in known or not asked[name] > 0.0:
-            from codegen.escape import shown  # with all of that package: help does not need it
+            given[name] = math.nan
+        if name not in known or not given[name] > 0.0:
+            from codegen.escape import displayed  # with all of that package: help does not need it
 
             raise LimitError(
-                f"{VARIABLE} must hold NAME=NUMBER of {', '.join(known)}, not {shown(word)}"
+                f"{VARIABLE} must hold NAME=NUMBER of {', '.join(known)}, not {displayed(word)}"
             )
-    return InputLimits(**asked)
+    return InputLimits(**given)
 
 
 def limits_text() -> str:

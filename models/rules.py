@@ -4,7 +4,7 @@ import math
 from dataclasses import fields
 from typing import Any
 
-from codegen.escape import shown
+from codegen.escape import displayed
 
 LARGEST_FORCE = 1e7  # of an axle [N]: ten times that of the heaviest dump truck
 
@@ -16,7 +16,7 @@ def require_number(refusal: type[ValueError], name: str, value: Any) -> None:
             return
     except (TypeError, ValueError):
         pass
-    raise refusal(f"{name} must be a number, it is {shown(value)}")
+    raise refusal(f"{name} must be a number, it is {displayed(value)}")
 
 
 def require_positive(refusal: type[ValueError], /, **values: float) -> None:
@@ -44,4 +44,4 @@ def require_kind(kind: type, remedy: str, /, **values: Any) -> None:
     """Refuse every argument of another kind, at the doors that users call."""
     for name, value in values.items():
         if not isinstance(value, kind):
-            raise TypeError(f"{name} must be a {kind.__name__}, {remedy}; it is {shown(value)}")
+            raise TypeError(f"{name} must be a {kind.__name__}, {remedy}; it is {displayed(value)}")

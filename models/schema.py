@@ -23,7 +23,7 @@ from typing import Any, NoReturn, Union, get_args, get_origin, get_type_hints
 import numpy as np
 
 from codegen.arrays import Array
-from codegen.escape import SHOWN, shown, visible
+from codegen.escape import LONGEST_DISPLAYED, displayed, visible
 from models.limits import VARIABLE
 from models.limits import InputLimits as InputLimits
 from models.limits import LimitError as LimitError
@@ -137,7 +137,7 @@ def read_json(path: Path, refusal: type[ValueError]) -> Any:
         if len(found) < len(pairs):
             keys = [key for key, _ in pairs]
             twice = next(key for key in found if keys.count(key) > 1)
-            raise json.JSONDecodeError(f"{shown(twice)} is given twice in one table", "", 0)
+            raise json.JSONDecodeError(f"{displayed(twice)} is given twice in one table", "", 0)
         return found
 
     try:
@@ -196,7 +196,7 @@ class Table:
     def __init__(self, data: Any, where: str, refusal: type[ValueError], prefix: str = "") -> None:
         if not isinstance(data, Mapping):
             name = prefix.rstrip(".") or "the document"
-            raise refusal(f"{where}{name} must be a table, it is {shown(data)}")
+            raise refusal(f"{where}{name} must be a table, it is {displayed(data)}")
         self.data, self._where, self._refusal, self._prefix = data, where, refusal, prefix
 
     def __contains__(self, key: str) -> bool:
@@ -215,7 +215,9 @@ class Table:
         """Refuse every other key."""
         for key in self.data:
             if key not in known:
-                self.refuse(visible(key[:SHOWN]), f"is unknown, known are {', '.join(known)}")
+                self.refuse(
+                    visible(key[:LONGEST_DISPLAYED]), f"is unknown, known are {', '.join(known)}"
+                )
 
     def number(self, key: str) -> float:
         """Return a number as float; it may be infinite, which the record that it is for refuses."""
@@ -240,7 +242,7 @@ class Table:
     def tables(self, key: str) -> list["Table"]:
         found = self.value(key)
         if not isinstance(found, list):
-            self.refuse(key, f"must be a list, it is {shown(found)}")
+            self.refuse(key, f"must be a list, it is {displayed(found)}")
         prefix = f"{self._prefix}{key}."
         return [Table(one, self._where, self._refusal, prefix) for one in found]
 
@@ -255,7 +257,7 @@ class Table:
             level = [one for row in level for one in row]
         for one in level:
             if not math.isfinite(self._as(float, key, one)):
-                self.refuse(key, f"holds a number that is not finite: {shown(one)}")
+                self.refuse(key, f"holds a number that is not finite: {displayed(one)}")
         return np.array(level, dtype=np.float64).reshape(shape)
 
     def only_fields(self, cls: type, *, skip: tuple[str, ...] = ()) -> dict[str, Any]:
@@ -289,7 +291,7 @@ class Table:
                 values[key] = self.typed(cls, key, value)
             except self._refusal:
                 if key in rules:
-                    self.refuse(key, f"{rules[key]}, it is {shown(self.data[key])}")
+                    self.refuse(key, f"{rules[key]}, it is {displayed(self.data[key])}")
                 raise
         return values
 
@@ -314,23 +316,23 @@ class Table:
             return value
         if kind in (str, Path):
             if not isinstance(value, str):
-                self.refuse(key, f"must be a text, it is {shown(value)}")
+                self.refuse(key, f"must be a text, it is {displayed(value)}")
             return value
         if isinstance(value, bool) or not isinstance(value, int | float):
             expected = "a whole number" if kind is int else "a number"
-            self.refuse(key, f"must be {expected}, it is {shown(value)}")
+            self.refuse(key, f"must be {expected}, it is {displayed(value)}")
         if kind is int and not (isinstance(value, int) and abs(value) < 2**63):
-            self.refuse(key, f"must be a whole number of 64 bits, it is {shown(value)}")
+            self.refuse(key, f"must be a whole number of 64 bits, it is {displayed(value)}")
         try:
             return value if kind is int else float(value)
         except OverflowError:
-            self.refuse(key, f"must be a number, it is {shown(value)}")
+            self.refuse(key, f"must be a number, it is {displayed(value)}")
 
     def _tuple(self, kinds: tuple[Any, ...], key: str, value: Any) -> tuple[Any, ...]:
         if not isinstance(value, list):
-            self.refuse(key, f"must be a list, it is {shown(value)}")
+            self.refuse(key, f"must be a list, it is {displayed(value)}")
         if kinds[-1] is not Ellipsis and len(value) != len(kinds):
-            self.refuse(key, f"must be a list of {len(kinds)}, it is {shown(value)}")
+            self.refuse(key, f"must be a list of {len(kinds)}, it is {displayed(value)}")
         return tuple(self._as(kinds[0], key, one) for one in value)
 
 
@@ -366,7 +368,7 @@ def require_name(refusal: type[ValueError], key: str, name: Any) -> None:
     """Refuse what cannot be the name of a car in files, figures and reports."""
     if not isinstance(name, str) or len(name) > LONGEST_NAME:
         raise refusal(
-            f"{key} must be a text of at most {LONGEST_NAME} characters, not {shown(name)}"
+            f"{key} must be a text of at most {LONGEST_NAME} characters, not {displayed(name)}"
         )
     if any("\ud800" <= one <= "\udfff" for one in name):
-        raise refusal(f"{key} must be Unicode, it has half a surrogate pair: {shown(name)}")
+        raise refusal(f"{key} must be Unicode, it has half a surrogate pair: {displayed(name)}")

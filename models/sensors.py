@@ -13,7 +13,7 @@ from codegen.errors import TireidError
 from models.recordings import Recording
 
 # What a sensor can show at all: beyond it, and NaN, is no number of a sensor.
-LARGEST_SHOWN: Mapping[str, float] = {
+LARGEST_MEASURED: Mapping[str, float] = {
     "X": 1e7,  # m: maps count up to the distance from the equator to a pole
     "Y": 1e7,
     "psi": 1e4,  # rad, turns counted
@@ -90,8 +90,8 @@ class Sensors:
         )
 
 
-def is_shown(channel: str, value: float) -> bool:
+def is_measured(channel: str, value: float) -> bool:
     """Return whether a channel shows a number.
-    channel : one of `LARGEST_SHOWN`.   value : in its SI unit.
+    channel : one of `LARGEST_MEASURED`.   value : in its SI unit.
     """
-    return abs(value) <= LARGEST_SHOWN[channel]
+    return abs(value) <= LARGEST_MEASURED[channel]

@@ -16,7 +16,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.bicycle import BicycleParameters
 from models.files import write_atomically
 from models.rules import require_number, require_positive, require_within
@@ -232,7 +232,9 @@ class Vehicle:
         require_name(VehicleError, "name", self.name)
         for name in self.estimated:
             if name not in _RULES:
-                raise VehicleError(f"estimated must be of {', '.join(_RULES)}, not {shown(name)}")
+                raise VehicleError(
+                    f"estimated must be of {', '.join(_RULES)}, not {displayed(name)}"
+                )
         require_positive(VehicleError, **{name: getattr(self, name) for name in BICYCLE})
         self._require_plausible()
         if self.chassis is not None:

@@ -10,7 +10,7 @@ What is not used is not imported: each name is fetched where it is asked for.
 
 from typing import TYPE_CHECKING
 
-from tireid.home import find_own_packages
+from tireid.home import find_packages
 
 if TYPE_CHECKING:
     from codegen.errors import TireidError as TireidError
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     paths, plot = _path, _plot
     __version__: str
 
-find_own_packages()
+find_packages()
 
 from codegen.face import face  # noqa: E402 - the package that was just found
 

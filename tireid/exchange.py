@@ -53,13 +53,13 @@ def claim(path: Path) -> Iterator[None]:
     Unix, or on a disk that cannot), the file itself is the claim, and outlives a process that is
     killed.
     """
-    held = _locked(path)
+    descriptor = _locked(path)
     try:
         yield
     finally:
         with suppress(OSError):
             path.unlink()
-        os.close(held)
+        os.close(descriptor)
 
 
 def _locked(path: Path) -> int:
@@ -67,30 +67,30 @@ def _locked(path: Path) -> int:
     flags = os.O_RDWR | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NOFOLLOW", 0)
     while True:
         try:
-            held, ours = os.open(path, flags | os.O_CREAT | os.O_EXCL, 0o600), True
+            descriptor, ours = os.open(path, flags | os.O_CREAT | os.O_EXCL, 0o600), True
         except FileExistsError:
             try:
-                held, ours = os.open(path, flags), False
+                descriptor, ours = os.open(path, flags), False
             except FileNotFoundError:  # removed since
                 continue
         try:
-            _lock(held, ours=ours)
-            if os.path.samestat(os.fstat(held), path.stat()):
-                return held
+            _lock(descriptor, ours=ours)
+            if os.path.samestat(os.fstat(descriptor), path.stat()):
+                return descriptor
         except FileNotFoundError:  # its holder removed it before it let go
             pass
         except BlockingIOError as error:
-            os.close(held)
+            os.close(descriptor)
             raise ClaimedError(str(path)) from error
-        os.close(held)
+        os.close(descriptor)
 
 
-def _lock(held: int, *, ours: bool) -> None:
+def _lock(descriptor: int, *, ours: bool) -> None:
     """Lock a file; where that cannot be, who made the file has it, and others are refused."""
     try:
         if fcntl is None:
             raise OSError(errno.ENOLCK, "no locks")
-        fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         raise
     except OSError as error:

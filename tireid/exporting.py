@@ -219,8 +219,8 @@ def self_test(folder: Path, name: str, *, single: bool) -> Verdict | None:
     sources = [str(p.relative_to(folder)) for p in sorted((folder / "src").glob("*.c"))]
     with tempfile.TemporaryDirectory(prefix="tireid-") as scratch:
         program = Path(scratch) / "self_test"
-        own = [f"-D{name.upper()}_SINGLE={int(single)}", *sources, f"tests/test_{name}.c"]
-        build = [*compiler, *_FLAGS, *own, "-o", str(program), "-lm"]
+        options = [f"-D{name.upper()}_SINGLE={int(single)}", *sources, f"tests/test_{name}.c"]
+        build = [*compiler, *_FLAGS, *options, "-o", str(program), "-lm"]
         for command in (build, [str(program)]):
             answer = subprocess.run(
                 command, cwd=folder, capture_output=True, text=True, check=False

@@ -14,7 +14,7 @@ _HOME = __file__.rsplit(os.sep, 2)[0]
 _PACKAGES = ("codegen", "models", "identifier", "mpc")
 
 
-class _OwnPackages:
+class _PackagesBeside:
     """What Python asks where a module lies; it answers for the packages of tireid alone."""
 
     @staticmethod
@@ -22,7 +22,7 @@ class _OwnPackages:
         return PathFinder.find_spec(name, [_HOME]) if name in _PACKAGES else None
 
 
-def find_own_packages() -> None:
+def find_packages() -> None:
     """Look for the packages in the folder that holds tireid, before all other folders."""
     for name in _PACKAGES:
         place = _place(sys.modules.get(name))
@@ -30,8 +30,8 @@ def find_own_packages() -> None:
             raise ImportError(
                 f"{place} hides the package {name!r} of tireid, as it was imported first: rename it"
             )
-    if _OwnPackages not in sys.meta_path:
-        sys.meta_path.insert(0, _OwnPackages)
+    if _PackagesBeside not in sys.meta_path:
+        sys.meta_path.insert(0, _PackagesBeside)
 
 
 def _place(module: ModuleType | None) -> str:

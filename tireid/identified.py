@@ -64,7 +64,7 @@ class Results:
     runs : of the method, over the recording that was learnt and over others.
     models, frozen : by freeze time as text [s], models and their replays by recording; the last
         counts.
-    verdict : on the last.   asked : on it over the others, by name.
+    verdict : on the last.   evaluated : on it over the others, by name.
     parts : of the first run, where it is over several logs.
     """
 
@@ -73,7 +73,7 @@ class Results:
     models: Mapping[str, TireModel]
     frozen: Mapping[str, Mapping[str, Replay]]
     verdict: Verdict
-    asked: Mapping[str, Verdict]
+    evaluated: Mapping[str, Verdict]
     parts: Sequence[History] = ()
 
     @classmethod
@@ -93,7 +93,7 @@ class Results:
         """
         learnt, last = runs[0], times[-1]
         verdict, model = noted(judge(learnt, last)), learnt.freeze(last)
-        asked = {one.name: judge_prediction(model, with_v_y(one, model)) for one in others}
+        evaluated = {one.name: judge_prediction(model, with_v_y(one, model)) for one in others}
         models = {freeze_key(t): learnt.freeze(t) for t in times[:-1]}
         models[freeze_key(last)] = calibrated(learnt, last, verdict)
         frozen: dict[str, dict[str, Replay]] = {}
@@ -106,7 +106,7 @@ class Results:
             models=models,
             frozen=frozen,
             verdict=verdict,
-            asked=asked,
+            evaluated=evaluated,
             parts=parts,
         )
 
@@ -160,7 +160,7 @@ class Results:
         split = of_frozen("reproduction")
         return {
             "verdict": self.verdict.to_dict(),
-            "replay_verdicts": {name: one.to_dict() for name, one in self.asked.items()},
+            "replay_verdicts": {name: one.to_dict() for name, one in self.evaluated.items()},
             "rms_force_N": {h.recording.name: force_rms(h) for h in runs},
             "rmse_N": {
                 "online": {h.recording.name: online_error(h) for h in runs},
@@ -235,20 +235,20 @@ class Results:
     def _figures(self) -> dict[str, Figure]:
         learnt, model = self.runs[0], self.model
         recording, name = learnt.recording, learnt.recording.name
-        own = {float(key): replays[name] for key, replays in self.frozen.items()}
+        replayed = {float(key): replays[name] for key, replays in self.frozen.items()}
         figures = {
             "inputs": inputs_figure(recording),
             "slip": slip_figure(model, recording, learnt if learnt.online else None),
-            "forces": force_figure(learnt, own),
+            "forces": force_figure(learnt, replayed),
         }
         slip = side_slip(learnt, learnt.method.min_speed, recording.logged_v_y)
         if _OBSERVED in learnt.outputs:
-            figures["error"] = error_figure(learnt, freeze_times=list(own))
-            figures["weights"] = weights_figure(learnt, list(own))
+            figures["error"] = error_figure(learnt, freeze_times=list(replayed))
+            figures["weights"] = weights_figure(learnt, list(replayed))
         if slip is not None:
             figures["side_slip"] = side_slip_figure([recording], {"estimate": {name: slip}})
         if learnt.tracks_over(next(learnt.blocks())):
-            figures["learnt"] = learnt_axles_figure(learnt, list(own))
+            figures["learnt"] = learnt_axles_figure(learnt, list(replayed))
         for run in self.runs[1:]:
             beside = run if run.online else None
             drawn = prediction_figure(self.replays[run.recording.name], beside)

@@ -9,7 +9,7 @@ from codegen.escape import visible
 from identifier.measured import NOT_IDENTIFIABLE, printed_unit, with_doubt
 from identifier.tire_model import AXLES, Axle, TireModel, stored_verdict
 from identifier.verdict import Number, Verdict
-from identifier.verdict.verdict import MOST_MISSED, PERCENT
+from identifier.verdict.verdict import LARGEST_MODEL_ERROR, PERCENT
 from tireid.output import text_table
 from tireid.progress import complain
 from tireid.report import Block, Cell, Headline, Marked, Paragraph, Section, Table, Tone, printed
@@ -63,7 +63,7 @@ def verdicts_text(verdicts: Mapping[str, Verdict], what: str) -> str:
     """
     lines = []
     for name, verdict in verdicts.items():
-        given = "; ".join(line for line in (verdict.headline, verdict.missed_line) if line)
+        given = "; ".join(line for line in (verdict.headline, verdict.model_error_line) if line)
         lines.append(f"{what} {visible(name)}: {given}")
         lines += [f"  {finding.line}" for finding in verdict.findings]
     return "\n".join(lines)
@@ -89,19 +89,18 @@ def of_answer(verdict: Verdict, numbers: Sequence[Headline]) -> list[Headline]:
     return [one if one.tone == "bad" else one._replace(tone="refused") for one in numbers]
 
 
-def missed_headline(verdict: Verdict) -> list[Headline]:
+def model_error_headline(verdict: Verdict) -> list[Headline]:
     """Return the share of the force that the motion shows and the model misses, as a number.
 
     There is none where too little is driven.
     """
-    missed = verdict.force_missed
-    if missed is None:
+    errors = verdict.model_error
+    if errors is None:
         return []
-    front, rear = (f"{PERCENT * share:.1f}" for share in missed)
-    meaning = (
-        f"error over the force in the motion, front / rear (limit {PERCENT * MOST_MISSED:.0f} %)"
-    )
-    tone: Tone = "" if all(share <= MOST_MISSED for share in missed) else "bad"
+    front, rear = (f"{PERCENT * share:.1f}" for share in errors)
+    limit = f"limit {PERCENT * LARGEST_MODEL_ERROR:.0f} %"
+    meaning = f"error over the force in the motion, front / rear ({limit})"
+    tone: Tone = "" if all(share <= LARGEST_MODEL_ERROR for share in errors) else "bad"
     return [Headline(f"{front} / {rear} %", meaning, tone)]
 
 
@@ -161,7 +160,7 @@ def verdict_section(verdict: Verdict) -> Section:
         [title, *(_marked_number(verdict, by_axle.get(axle)) for axle in AXLES)]
         for title, by_axle in _numbers_by_title(verdict).items()
     ]
-    lines = (verdict.headline, verdict.missed_line, *verdict.unobservable)
+    lines = (verdict.headline, verdict.model_error_line, *verdict.unobservable)
     blocks: list[Block] = [
         Paragraph(
             text="The frozen model is replayed over the drive and must reproduce the force in "

@@ -152,8 +152,8 @@ def colored(P: Array, prior: Array, color: float, factor: float = 1.0) -> Array:
     share = np.maximum(share, 0.0)
     known = np.maximum(1.0 - share, 0.0)
     share = np.where(known > 0.0, share * color / (share * color + known), share)
-    held = np.minimum(share / UNKNOWN**2, 1.0)
-    share = share * (factor**2 * (1.0 - held) + max(factor, 1.0) ** 2 * held)
+    unknown = np.minimum(share / UNKNOWN**2, 1.0)
+    share = share * (factor**2 * (1.0 - unknown) + max(factor, 1.0) ** 2 * unknown)
     half = half @ along * np.sqrt(share)
     wider: Array = half @ half.T
     return wider

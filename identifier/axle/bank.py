@@ -121,8 +121,8 @@ def slope_step(
     change = within(gap - state.gap, -numbers.step, numbers.step)
     mean_gap = state.gap + on * numbers.gain * change
     mean_motion = state.motion + on * numbers.gain * (motion - state.motion)
-    fast, missed = motion - mean_motion, gap - mean_gap
-    explained = numbers.share * fast**2 - missed**2
+    fast, residual = motion - mean_motion, gap - mean_gap
+    explained = numbers.share * fast**2 - residual**2
     counts = numbers.memory * ca.if_else(there, learns, 0)
     mean_explained = state.explained + counts * (explained - state.explained)
     return ca.vertcat(filter_state, mean_gap, mean_motion, mean_explained)

@@ -156,12 +156,12 @@ class AxleIdentifier(Method):
             Where stored weights are those of another structure.
         """
         n = len(self.ladder)
-        W, own = self.prior.means(vehicle, self.ladder)
+        W, beside = self.prior.means(vehicle, self.ladder)
         P = prior_P = self.prior.covariance(vehicle, self.ladder)
         excitation, sensors = np.zeros((2, 1 + len(EDGES))), Sensors()
         if start is not None:
             stored = resumed_units(start, self.ladder)
-            W, own, P, excitation = (
+            W, beside, P, excitation = (
                 stored.W,
                 stored.beside_curve,
                 stored.covariance,
@@ -171,14 +171,14 @@ class AxleIdentifier(Method):
             if stored is not start:  # of another form: units can be what no curve of it could
                 P = _within_prior(P, prior_P, n)
         widest = per_variance(prior_P, n, self.regression.widest)
-        W, own = self._within_bounds(W, own, P)
+        W, beside = self._within_bounds(W, beside, P)
         scan = self._scan(vehicle)
         return Setup(
             scan=scan,
             carry={
                 **scan.zeros(),
                 "W": W,
-                "own": own,
+                "own": beside,
                 "UD": packed(narrowed(P, widest)),
                 "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),  # slope 1: never divided by zero
                 "errors": np.tile([0.0, 1.0, 1.0, 0.0], (2, 1)),
@@ -229,17 +229,18 @@ class AxleIdentifier(Method):
             },
         )
 
-    def _within_bounds(self, W: Array, own: Array, P: Array) -> tuple[Array, Array]:
+    def _within_bounds(self, W: Array, beside: Array, P: Array) -> tuple[Array, Array]:
         """Return what is begun with, within bounds: a file or a prior may lie outside.
         W : weights [static axle loads], (2, n).
-        own : [compliance [m per load], sway share [-], offset ([rad] front, [m/s] rear)], (2, 3).
+        beside : [compliance [m per load], sway share [-], offset], (2, 3); the offset [rad] in
+            front, [m/s] at the rear.
         P : covariance of both, (2, n + 3, n + 3): the least move is in its metric.
         """
         n = len(self.ladder)
         numbers, row = self.bounds.of_ladder(self.ladder), rising_shares(self.ladder)
         project = _projection(n)
         rows = [
-            project(np.append(W[i], own[i]), P[i, :n, :n], np.array(numbers), offset, row)
+            project(np.append(W[i], beside[i]), P[i, :n, :n], np.array(numbers), offset, row)
             for i, offset in enumerate((numbers.steering, numbers.v_y))
         ]
         kept = np.array(ca.vertcat(*rows))
@@ -256,19 +257,19 @@ class AxleIdentifier(Method):
 
     def _at_bounds(self, state: Mapping[str, Array]) -> tuple[Reached, ...]:
         """Return stiffness, grip, lag and offsets that rest at their bounds, to a hundredth."""
-        b, W, own = self.bounds, state["W"], state["own"]
+        b, W, beside = self.bounds, state["W"], state["own"]
         grip, slope = W.sum(axis=1), (W / np.array(self.ladder)).sum(axis=1)
         elsewhere = "a sensor has a larger offset, or another place than declared"
         late = "a sensor is late, or the tires are very soft"
         unexcited = "the drive has no such curve, or mass, signs or units are wrong"
-        zero, bias = float(own[0, 2]), float(own[1, 2])
+        zero, bias = float(beside[0, 2]), float(beside[1, 2])
         listed = [
             (abs(zero) > NEAR * b.steering,
              Reached("front", "zero of the steering", zero, "rad", elsewhere, True)),
             (abs(bias) > NEAR * b.v_y,
              Reached("rear", "bias of v_y", bias, "m/s", elsewhere, True)),
         ]  # fmt: skip
-        for axle, soft, level, steep in zip(AXLES, own[:, 0], grip, slope, strict=True):
+        for axle, soft, level, steep in zip(AXLES, beside[:, 0], grip, slope, strict=True):
             listed += [
                 (soft > NEAR * b.compliance,  # none at all is a stiff tire
                  Reached(axle, "compliance", float(soft), "m per load", late, False)),

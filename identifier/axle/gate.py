@@ -132,7 +132,7 @@ def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gat
     u : [δ_f, δ_r] (2,).   v_x : longitudinal speed [m/s].
     """
     v_y, r, delta_f, delta_r = x[0], x[1], u[0], u[1]
-    possible = _all(
+    plausible = _all(
         ca.fabs(v_x) < limits.max_speed,
         ca.fabs(v_y) < limits.max_sideslip * larger(ca.fabs(v_x), limits.slow),  # NaN is not
         ca.fabs(r) < limits.max_yaw_rate,
@@ -149,7 +149,7 @@ def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gat
         ca.fabs(delta_f - last.delta_f) < turn,
         ca.fabs(delta_r - last.delta_r) < turn,
     )
-    good = ca.logic_and(possible, ca.logic_or(near, ca.logic_not(last.on)))
+    good = ca.logic_and(plausible, ca.logic_or(near, ca.logic_not(last.on)))
     bad = ca.if_else(good, 0, last.bad + 1)
     same = ca.logic_and(v_y == last.v_y, r == last.r)
     stuck = ca.if_else(same, last.stuck + 1, 0)

@@ -9,7 +9,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array, blocks
-from codegen.escape import shown
+from codegen.escape import displayed
 from identifier.axle.band import (
     RELATIVE,
     BandCalibration,
@@ -80,7 +80,7 @@ class AxleModel(TireModel):
     sensors : errors that were known before it learnt, and stay.
     calibration : of the band, by segments that did not teach it; None where nobody calibrated.
     tells_v_y : whether the inertial identifier learnt it, which needs no v_y and tells it.
-    force_missed : share of the measured force that it misses of the drive that taught, rms, (2,);
+    model_error : share of the measured force that it misses of the drive that taught, rms, (2,);
         None where nobody looked.
     """
 
@@ -101,7 +101,7 @@ class AxleModel(TireModel):
     sensors: Sensors = EXACT
     calibration: BandCalibration | None = None
     tells_v_y: bool = False
-    force_missed: Array | None = None
+    model_error: Array | None = None
 
     def __post_init__(self) -> None:
         doublings(self.ladder)
@@ -127,12 +127,12 @@ class AxleModel(TireModel):
                 f"W must be static axle loads below {_LARGEST_WEIGHT:g}, it reaches "
                 f"{np.abs(self.W).max():g}"
             )
-        missed = self.force_missed
-        if missed is not None and not (missed.shape == (2,) and (missed >= 0.0).all()):
-            raise ValueError(f"force_missed must be two shares of at least 0, it is {missed}")
-        self._require_possible()
+        error = self.model_error
+        if error is not None and not (error.shape == (2,) and (error >= 0.0).all()):
+            raise ValueError(f"force_missed must be two shares of at least 0, it is {error}")
+        self._require_plausible()
 
-    def _require_possible(self) -> None:
+    def _require_plausible(self) -> None:
         """Refuse a lag, a share or an offset that no car has."""
         car, at_most = self.vehicle, self.plausibility
         for name, value, low, high in (
@@ -243,7 +243,7 @@ class AxleModel(TireModel):
 
     def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
         # It was measured on this car alone.
-        return replace(self, vehicle=vehicle, force_missed=None)
+        return replace(self, vehicle=vehicle, model_error=None)
 
     def at_friction(self, ratio: float) -> "AxleModel":
         require_positive(ValueError, ratio=ratio)
@@ -258,7 +258,7 @@ class AxleModel(TireModel):
             covariance=self.covariance * np.outer(unit, unit),
             prior_covariance=self.prior_covariance * np.outer(unit, unit),
             excitation=excitation,
-            force_missed=None,  # of the road that taught
+            model_error=None,  # of the road that taught
         )
 
     @property
@@ -339,16 +339,16 @@ class AxleModel(TireModel):
             **({} if self.calibration is None else {"band": self.calibration.to_dict()}),
             **({"sensors": self.sensors._asdict()} if any(self.sensors) else {}),
             **({"tells_v_y": True} if self.tells_v_y else {}),
-            **({} if self.force_missed is None else {"force_missed": self.force_missed.tolist()}),
+            **({} if self.model_error is None else {"force_missed": self.model_error.tolist()}),
         }
 
     @classmethod
     def _read(cls, table: Table) -> Self:
         if "own" in table:  # files of earlier versions: the three in one
-            own = table.array("own")
-            if own.shape != (2, 3):
-                table.refuse("own", f"must have shape (2, 3), it has {own.shape}")
-            three = dict(zip(BESIDE, own.T.tolist(), strict=True))
+            beside = table.array("own")
+            if beside.shape != (2, 3):
+                table.refuse("own", f"must have shape (2, 3), it has {beside.shape}")
+            three = dict(zip(BESIDE, beside.T.tolist(), strict=True))
             table = Table({**three, **table.data}, "", FrozenModelError)
         numbers: dict[str, Any] = {name: table.array(name) for name in ("ladder", "edges", *ARRAYS)}
         for name, values in numbers.items():
@@ -364,9 +364,9 @@ class AxleModel(TireModel):
             numbers["calibration"] = BandCalibration.from_dict(table.value("band"))
         tells = table.data.get("tells_v_y", False)
         if not isinstance(tells, bool):
-            table.refuse("tells_v_y", f"must be true or false, it is {shown(tells)}")
+            table.refuse("tells_v_y", f"must be true or false, it is {displayed(tells)}")
         if "force_missed" in table:
-            numbers["force_missed"] = table.array("force_missed")
+            numbers["model_error"] = table.array("force_missed")
         return cls(
             vehicle=vehicle_from(table.value("vehicle")),
             ladder=ladder,
@@ -462,9 +462,9 @@ class _AxleBand(Band):
         return passed
 
     def calibrated_by(
-        self, calibration: BandCalibration | None, force_missed: Array | None = None
+        self, calibration: BandCalibration | None, model_error: Array | None = None
     ) -> AxleModel:
-        return replace(self.model, calibration=calibration, force_missed=force_missed)
+        return replace(self.model, calibration=calibration, model_error=model_error)
 
     def _opened(self, sd_friction: float) -> AxleModel:
         model, n = self.model, len(self.model.ladder)
@@ -506,7 +506,7 @@ class _AxleBand(Band):
         high = np.column_stack([np.full(2, model.vehicle.wheelbase), np.ones(2), zeros])
         compliance, share, offset = np.clip(model.beside_curve + away[:, n:], low, high).T
         changed = replace(model, W=W, compliance=compliance, sway_share=share, offset=offset)
-        return replace(changed, force_missed=None)
+        return replace(changed, model_error=None)
 
 
 def _is_covariance(P: Array) -> bool:

@@ -74,8 +74,8 @@ class Prior:
                 + self.sd_shape**2 * np.eye(n)
             )
             offset = (self.sd_steering, self.sd_v_y)[i]
-            own = np.array([self.sd_compliance, self.sd_sway_share, offset]) ** 2
-            P[i, n:, n:] = np.diag(own)
+            variances = np.array([self.sd_compliance, self.sd_sway_share, offset]) ** 2
+            P[i, n:, n:] = np.diag(variances)
         return P
 
 

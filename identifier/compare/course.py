@@ -87,8 +87,8 @@ class Course:
             vehicle, windows = self.vehicle, self._windows(recording)
             loads = np.array(vehicle.axle_loads)
             with np.errstate(over="ignore", invalid="ignore"):  # of a law that diverged
-                missed = measured_force(recording, vehicle, windows) - windows.mean(force / loads)
-                front, rear = loads * clean_rms(missed, noise_variance(recording, vehicle, windows))
+                error = measured_force(recording, vehicle, windows) - windows.mean(force / loads)
+                front, rear = loads * clean_rms(error, noise_variance(recording, vehicle, windows))
             return (
                 AxleRmse(front=front, rear=rear) if np.isfinite([front, rear]).all() else INFINITE
             )
@@ -207,10 +207,10 @@ def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSl
     if truth is None:
         return SideSlip(v_y=v_y, v_y_sd=sd, rms=None, within=None)
     counts = counted_samples(recording, min_speed)
-    v_x, missed = recording.v_x[counts], (v_y - truth)[counts]
+    v_x, error = recording.v_x[counts], (v_y - truth)[counts]
     slip = np.degrees(np.arctan2(v_y[counts], v_x) - np.arctan2(truth[counts], v_x))
     rms = float(np.sqrt(np.mean(slip**2)))
-    within = None if sd is None else 100.0 * np.mean(np.abs(missed) <= SIGMAS * sd[counts])
+    within = None if sd is None else 100.0 * np.mean(np.abs(error) <= SIGMAS * sd[counts])
     return SideSlip(
         v_y=v_y,
         v_y_sd=sd,
@@ -276,7 +276,7 @@ def step_times(
         if method.whole:
             continue
         setup = method.setup(vehicle).begin(recording.x[0])
-        sampled = {port: _long(signal) for port, signal in setup.shown(recording).signals.items()}
+        sampled = {port: _long(signal) for port, signal in setup.sampled(recording).signals.items()}
         n = len(sampled["v_x"])
         runs[name] = setup.scan, {**setup.carry, **sampled, **setup.constants}, n
         setup.scan(n, runs[name][1])  # compiled and warm

@@ -115,12 +115,12 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     found, fine = list(gross.findings), Examination()
     if not blind:
         try:
-            found, fine = _asked_finely(gross, recording, vehicle)
+            found, fine = _examined_finely(gross, recording, vehicle)
             if gross.without is not None and ELSEWHERE not in fine.taken:
                 gross, fine = gross.without, Examination()
                 found, blind = list(gross.findings), gross.blind
                 if not blind:
-                    found, fine = _asked_finely(gross, recording, vehicle)
+                    found, fine = _examined_finely(gross, recording, vehicle)
             sure = combined(one for one in doubted(fine.findings, found) if one.sure)
             mended = before_sizes(found).merged(sure)
             found += _contradictions(*mended.apply(recording, vehicle))
@@ -138,7 +138,7 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     )
 
 
-def _asked_finely(
+def _examined_finely(
     gross: Screened, recording: Recording, vehicle: Vehicle
 ) -> tuple[list[Finding], Examination]:
     """Return the gross findings, the ratio of a steering wheel exactly, and sizes beside them."""

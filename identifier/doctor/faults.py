@@ -465,7 +465,7 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
         return Examination(unobservable=(SLOW,))
     post = search.run()
     taken = frozenset((one.first.suspect.code, one.first.suspect.channel) for one in search.found)
-    worst = search.problem.share_missed(post.p)
+    worst = search.problem.model_error(post.p)
     if worst.max() > RULES.unexplained:
         channel, text = UNEXPLAINED[int(np.argmax(worst))]
         share = f"{100.0 * worst.max():.0f} % model error (typical: below 12 %)"

@@ -75,8 +75,8 @@ class FittedBand(Band):
     @property
     def error_share(self) -> Array:
         """Standard deviation of the model's own error, the part that goes with the force, (2,)."""
-        own = _ELSEWHERE * ERROR_SIZE[1] * self.model.reach.unexplained
-        return np.hypot(self.load_doubt, own)
+        error = _ELSEWHERE * ERROR_SIZE[1] * self.model.reach.unexplained
+        return np.hypot(self.load_doubt, error)
 
     @property
     def error_floor(self) -> Array:
@@ -98,8 +98,8 @@ class FittedBand(Band):
             h = np.hstack([J[i], slope[:, i, None] * zeros])
             P = self.model.covariance[np.ix_(index, index)]
             variance[:, i] = np.einsum("ki,ij,kj->k", h, P, h)
-        own = self.error_floor**2 + (self.error_share * phi) ** 2
-        total = (np.maximum(variance, 0.0) + own) * pressed**2
+        model_variance = self.error_floor**2 + (self.error_share * phi) ** 2
+        total = (np.maximum(variance, 0.0) + model_variance) * pressed**2
         return BandSpread(total, np.zeros_like(total))
 
     def of_phi(self, slip: Array) -> tuple[Array, Array]:
@@ -122,10 +122,10 @@ class FittedBand(Band):
         sd, prior = self.of_phi(np.column_stack([alpha, alpha]))
         return sd / np.maximum(prior, 1e-12)
 
-    def calibrated_by(self, calibration: Any, force_missed: Array | None = None) -> Any:
+    def calibrated_by(self, calibration: Any, model_error: Array | None = None) -> Any:
         """Return the model with what it misses of the drives that taught."""
         del calibration
-        return replace(self.model, force_missed=force_missed)
+        return replace(self.model, model_error=model_error)
 
     def _opened(self, sd_friction: float) -> Any:
         covariance, k = self.model.covariance.copy(), INDEX["ln_road"]

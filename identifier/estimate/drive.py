@@ -187,8 +187,8 @@ def slope_on(
     if fast.size < 2.0 / dt or power <= 0.0 or not np.any(fast_felt):
         return None
     slope = float(fast @ fast_felt) / power
-    missed = 1.0 - float(np.corrcoef(fast, fast_felt)[0, 1]) ** 2
-    return slope if within[0] < slope < within[1] and missed < _EXPLAINED else None
+    unexplained = 1.0 - float(np.corrcoef(fast, fast_felt)[0, 1]) ** 2
+    return slope if within[0] < slope < within[1] and unexplained < _EXPLAINED else None
 
 
 def _bank(a_y: Array, v_x: Array, v_y: Array, r: Array, on: NDArray[np.bool_], dt: float) -> Array:

@@ -171,7 +171,7 @@ def _reach(
             one = one.on(np.concatenate([[0.0], roads.ln_m])[roads.labels[i]])
         driven = simulate(one, posterior.p, vehicle)
         force = np.abs(one.signals[:, 0] * one.signals[:, 2]) / GRAVITY
-        e = np.nan_to_num(driven["missed"] / error_size(force)[:, None])
+        e = np.nan_to_num(driven["residual"] / error_size(force)[:, None])
         n = max(round(max(later, STRIDE) / one.dt), 1)
         together = on[n:] & on[:-n]
         slip, (speeds, a_x) = np.abs(driven["slip"][on]), _most(one.signals[on][:, [0, 5]])

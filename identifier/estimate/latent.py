@@ -34,7 +34,7 @@ _GYRO = 0.002  # sd of the bias of r of a sedan [rad/s]
 _INERTIA = 0.007  # sd of ln I_z
 _BLOCK = 600.0  # [s] that are smoothed at once
 _BESIDE = 5.0  # [s] beside them that are smoothed, too
-_ASKED = 60.0  # [s] that are asked for a late a_y
+_LATE_SPAN = 60.0  # [s] of hardest cornering that tell the delay of a_y
 _ANY_DELAY = 0.1  # [s] of a sedan, sd of a delay that is looked for
 _MOST_LATE = 0.3  # [s] of a sedan, the largest delay
 _SMALL_DELAY = 0.003  # [s] of a sedan, a delay that does not matter
@@ -133,7 +133,7 @@ class _Smoothed:
     p: Array
     cost: float
     R: Array
-    own: Array
+    covariance: Array
     P: Array
     slopes: Array
 
@@ -389,8 +389,8 @@ class _Latent:
         at, shows = self.around(z, p, self.weights(z, p, R))
         _, X = self._eliminated(at, 0.0)
         believed = around_beliefs(self.priors, p)[1][np.ix_(self.index, self.index)]
-        shown = at.C - believed - at.B.reshape(len(X), -1).T @ X
-        S = believed + shown / self.trust.lasting
+        measured = at.C - believed - at.B.reshape(len(X), -1).T @ X
+        S = believed + measured / self.trust.lasting
         slopes, free = -X.reshape(len(z), N, -1)[:, 0], self.free
         fixed = np.setdiff1d(np.arange(len(self.index)), free)
         inverse: Array = np.asarray(np.linalg.inv(S[np.ix_(free, free)]), np.float64)
@@ -401,23 +401,23 @@ class _Latent:
         for k in range(n - 1):
             M[k + 1] -= at.O[k] @ np.linalg.solve(M[k], at.O[k].T)
         inv = np.linalg.inv(M)
-        own = np.empty_like(inv)
-        own[-1] = V = inv[-1]
+        covariance = np.empty_like(inv)
+        covariance[-1] = V = inv[-1]
         for k in range(n - 2, -1, -1):
             K = inv[k] @ at.O[k].T
-            own[k] = V = inv[k] + K @ V @ K.T
-        return own, inverse, slopes, shows
+            covariance[k] = V = inv[k] + K @ V @ K.T
+        return covariance, inverse, slopes, shows
 
-    def noise(self, z: Array, p: Array, own: Array, shows: Array, R: Array) -> Array:
+    def noise(self, z: Array, p: Array, covariance: Array, shows: Array, R: Array) -> Array:
         """Return R (2,) by what is left of each sensor: its density at low frequency."""
-        missed = self.nodes.measured - self._run(self._plain, z, p, {})["shows"]
-        doubt = np.einsum("nij,njk,nik->ni", shows, own, shows)
+        residual = self.nodes.measured - self._run(self._plain, z, p, {})["shows"]
+        doubt = np.einsum("nij,njk,nik->ni", shows, covariance, shows)
         found, on = R.copy(), self.nodes.counts
         lags = max(2, int(_LOOKED * self.scale / self.nodes.dt))
         if np.count_nonzero(on) < _SHORTEST:
             return found
         for i in range(len(MEASURED)):
-            e = missed[on, i]
+            e = residual[on, i]
             most = 4.0 * float(np.median(np.abs(e))) / 0.6745
             e = np.clip(e, -most, most)
             power = max(float(np.mean(e**2)), 1e-18)
@@ -439,13 +439,13 @@ class _Latent:
         R = self.R if R is None else R
         for _ in range(rounds):
             z, p, _ = self.descend(z, p, R, _FEW)
-            own, _, _, shows = self.spread(z, p, R)
-            R = self.noise(z, p, own, shows, R)
+            covariance, _, _, shows = self.spread(z, p, R)
+            R = self.noise(z, p, covariance, shows, R)
         z, p, cost = self.descend(z, p, R)
-        own, P, slopes, _ = self.spread(z, p, R)
+        covariance, P, slopes, _ = self.spread(z, p, R)
         left = 2.0 * self.misfit(z, p, self.weights(z, p, R)) / max(self.nodes.counts.sum(), 1)
         wider = max(1.0, left / self.trust.usual)
-        return _Smoothed(z, p, cost, R, wider * own, wider * P, slopes)
+        return _Smoothed(z, p, cost, R, wider * covariance, wider * P, slopes)
 
 
 class Learnt(NamedTuple):
@@ -511,7 +511,7 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     too little.
     priors : as of `_Latent`.
     """
-    part = hardest(recording, _ASKED)
+    part = hardest(recording, _LATE_SPAN)
     scale, dt = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt
     # Interpolation averages noise: what is smooth is not changed by it.
     smooth = low_passed(recording.needed("a_y"), JERKS / scale, dt)
@@ -574,7 +574,7 @@ def estimate_v_y(
         tires, free = found.slopes[:, known], found.slopes[:, problem.free]
         index = columns[known]
         doubt = covariance[np.ix_(index, index)]
-        variance = found.own[:, 0, 0] + np.einsum("ni,ij,nj->n", tires, doubt, tires)
+        variance = found.covariance[:, 0, 0] + np.einsum("ni,ij,nj->n", tires, doubt, tires)
         variance += np.einsum("ni,ij,nj->n", free, found.P, free)
         bias, roll = (found.p[LATENT_NAMES.index(name)] for name in ("a_y_bias", "roll"))
         beside = bias + roll / GRAVITY * nodes.given[:, 5]

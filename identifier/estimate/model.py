@@ -45,7 +45,7 @@ class FittedModel(TireModel):
     p : parameters, as `motion.parameters` lists them (p,).
     covariance : of them (p, p); zero of what was not estimated.
     reach : what the identification drives reached.
-    force_missed : share of the measured force that it misses of them, (2,); None where not
+    model_error : share of the measured force that it misses of them, (2,); None where not
         computed.
     """
 
@@ -56,7 +56,7 @@ class FittedModel(TireModel):
     p: Array
     covariance: Array
     reach: Reach
-    force_missed: Array | None = None
+    model_error: Array | None = None
 
     def __post_init__(self) -> None:
         numbers = (self.p, self.covariance, *self.reach[:5])
@@ -250,7 +250,7 @@ class FittedModel(TireModel):
 
     def mounted_on(self, vehicle: Vehicle) -> "FittedModel":
         return replace(
-            self, vehicle=vehicle, reach=self.reach._replace(segments=()), force_missed=None
+            self, vehicle=vehicle, reach=self.reach._replace(segments=()), model_error=None
         )
 
     def at_friction(self, ratio: float) -> "FittedModel":
@@ -258,7 +258,7 @@ class FittedModel(TireModel):
         p = self.p.copy()
         p[INDEX["ln_road"]] += math.log(ratio)
         reach = self.reach._replace(slip=ratio * self.reach.slip, segments=())
-        return replace(self, p=p, reach=reach, force_missed=None)
+        return replace(self, p=p, reach=reach, model_error=None)
 
     def setup(self, dt: float) -> Setup:
         limits = Plausibility.for_vehicle(self.vehicle)

@@ -25,7 +25,7 @@ _NOISY = 0.015  # [m/s] of a sedan, white noise that is too much in the mean tha
 _FEWEST_VALUES = 20  # new values
 _FINE = 0.005  # [s] of a sedan, to which a delay is found
 _SURE = 20.0  # nats that a delay must gain
-_ASKED = 60.0  # [s] of hardest cornering that tell delay and noise
+_HARDEST = 60.0  # [s] of hardest cornering that tell delay and noise
 _MOST = 12000  # samples of hardest cornering that tell them
 _ROLL = 0.05  # ρ, mean of its prior: by which a_y is larger in a car whose body rolls
 _ROLL_SD = 0.04  # of ρ, standard deviation of its prior
@@ -73,7 +73,7 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
     if recording.a_y is None:
         sensor = sensor._replace(push=float(PUSHES[-1]))
     else:
-        part = hardest(recording, min(_ASKED, _MOST * recording.dt))
+        part = hardest(recording, min(_HARDEST, _MOST * recording.dt))
         inside = new[(new >= part.start) & (new < part.stop)] - part.start
         problem = _Kinematics(recording.taken(part), inside)
         white = white_noise(problem.values) if problem.values.size > _FEWEST_VALUES else 0.0
@@ -84,8 +84,8 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
             return recording  # a_y does not show this motion
     weights, whole = np.ones(len(new)), _Kinematics(recording, new)
     for _ in range(_AGAIN):
-        found, missed, _ = whole.solved(sensor, weights)
-        weights = np.minimum(1.0, _CLIP * sensor.noise / np.maximum(np.abs(missed), 1e-12))
+        found, residual, _ = whole.solved(sensor, weights)
+        weights = np.minimum(1.0, _CLIP * sensor.noise / np.maximum(np.abs(residual), 1e-12))
     found.setflags(write=False)
     by = "straight lines" if recording.a_y is None else "ay, vx and r"
     note = (
@@ -193,14 +193,14 @@ class _Kinematics:
         roll = (np.sum(push * self.felt * self.moved) + _ROLL / _ROLL_SD**2 - g[:, 1] @ x) / S
         x = x - roll * X
         v, b = x[::2], x[1::2]
-        missed = (1.0 - share) * v[i] + share * v[i + 1] - self.values
+        residual = (1.0 - share) * v[i] + share * v[i + 1] - self.values
         moves = np.diff(v) + 0.5 * dt * (b[1:] + b[:-1]) - self.moved + roll * self.felt
-        squares = w @ missed**2 + push @ moves**2 + wander @ np.diff(b) ** 2
+        squares = w @ residual**2 + push @ moves**2 + wander @ np.diff(b) ** 2
         squares += ((roll - _ROLL) / _ROLL_SD) ** 2 + np.sum(b[self.first] ** 2) / _OFF**2
         count, steps = np.count_nonzero(there), np.count_nonzero(self.goes)
         logs = 2.0 * np.sum(np.log(factor[0])) + np.log(S) + count * np.log(s.noise**2)
         logs += steps * np.log(s.push * s.wanders)
-        return v, np.where(there, missed, 0.0), 0.5 * float(squares + logs)
+        return v, np.where(there, residual, 0.0), 0.5 * float(squares + logs)
 
 
 def _likeliest(problem: _Kinematics, best: _Sensor, scale: float) -> _Sensor:

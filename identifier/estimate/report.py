@@ -135,7 +135,7 @@ def at_bounds(vehicle: Vehicle, p: Array) -> tuple[Reached, ...]:
 
 def to_dict(model: Any) -> dict[str, Any]:
     """Return a `FittedModel` as plain numbers and words, ready for JSON."""
-    reach, missed, variances = model.reach, model.force_missed, np.diag(model.covariance)
+    reach, error, variances = model.reach, model.model_error, np.diag(model.covariance)
     return {
         "format": FORMAT,
         "kind": model.kind,
@@ -149,7 +149,7 @@ def to_dict(model: Any) -> dict[str, Any]:
         "speeds_m_s": reach.speeds.tolist(),
         "a_x_m_s2": reach.a_x.tolist(),
         "unexplained": reach.unexplained.tolist(),
-        **({} if missed is None else {"force_missed": missed.tolist()}),
+        **({} if error is None else {"force_missed": error.tolist()}),
         "segments": [one._asdict() for one in reach.segments],
         **({"parted_rad": reach.parted} if reach.parted else {}),
         **({"a_y_late_s": reach.a_y_late} if reach.a_y_late else {}),
@@ -191,5 +191,5 @@ def read(table: Table) -> dict[str, Any]:
             parted=parted,
             a_y_late=late,
         ),
-        "force_missed": array("force_missed") if "force_missed" in table else None,
+        "model_error": array("force_missed") if "force_missed" in table else None,
     }

@@ -77,7 +77,7 @@ def _segments(
     S2, T = np.minimum(at.scale, _MOST_SCALE) ** 2, np.minimum(at.memory, _MOST_MEMORY)
     loss = np.empty((len(GRID), len(weight)))
     for k, ln_m in enumerate(GRID):
-        e = problem.missed(at.p, float(ln_m))
+        e = problem.residual_on(at.p, float(ln_m))
         loss[k] = (weight / T * (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))).sum(axis=1)
     count = loss.shape[1]
     bins = np.arange(0, count, _BIN)

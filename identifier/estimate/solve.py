@@ -107,7 +107,7 @@ class Problem:
         first = (so_far <= 0.5 * so_far[-1]).astype(float)
         return first, 1.0 - first
 
-    def share_missed(self, p: Array) -> Array:
+    def model_error(self, p: Array) -> Array:
         """Return the share of the force that the balance misses at each axle, (2,)."""
         e = self.residuals(p).e * self.size[:, None]
         return np.sqrt(self.weight @ e**2 / (self.weight @ self.force**2))
@@ -117,10 +117,10 @@ class Problem:
         found: NDArray[np.intp] = self._kept[k] * self._strides[k]
         return found
 
-    def missed(self, p: Array, road: float) -> Array:
+    def residual_on(self, p: Array, road: float) -> Array:
         """Return what the balance misses over its size where the friction is another, (m, 2)."""
         e = [
-            _simulated(one.on(road), p, self._car, motion_scan(), ("missed",), stride)[0][kept]
+            _simulated(one.on(road), p, self._car, motion_scan(), ("residual",), stride)[0][kept]
             for one, stride, kept in zip(self.drives, self._strides, self._kept, strict=True)
         ]
         return np.nan_to_num(np.concatenate(e) / self.size[:, None], nan=1e3, posinf=1e3)
@@ -131,13 +131,13 @@ class Problem:
         """
         many, slopes = [], []
         ln_m = np.concatenate([[0.0], p[len(NAMES) :]])
-        ports = ("missed", "missed_slopes")
+        ports = ("residual", "residual_slopes")
         for k, one in enumerate(self.drives):
             stride, kept = self._strides[k], self._kept[k]
             roads = None if self.labels is None else self.labels[k]
             driven = one if roads is None else one.on(ln_m[roads])
-            missed, J = _simulated(driven, p[: len(NAMES)], self._car, self._scan, ports, stride)
-            many.append(missed[kept])
+            residual, J = _simulated(driven, p[: len(NAMES)], self._car, self._scan, ports, stride)
+            many.append(residual[kept])
             of_road, J = J[kept][:, :, -1:], J[kept][:, :, self._columns]
             if self.roads and roads is not None:
                 on = roads[::stride][kept][:, None] == np.arange(1, self.roads + 1)
@@ -248,7 +248,7 @@ def _simulated(
 
 def simulate(one: Drive, p: Array, vehicle: Vehicle) -> dict[str, Array]:
     """Return force [static loads], what is missed and slip of a drive, (n, 2) each, by port."""
-    ports = ("force", "missed", "slip")
+    ports = ("force", "residual", "slip")
     found = _simulated(one, p, car_numbers(vehicle), motion_scan(), ports)
     return dict(zip(ports, found, strict=True))
 

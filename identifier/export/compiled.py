@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from codegen import load_library
 from codegen.arrays import Array
 from codegen.errors import TireidError
-from codegen.escape import shown
+from codegen.escape import displayed
 from codegen.package import NAME, c_files, one_file
 from identifier.export.c_source import ORDER, PREFIX, C
 from identifier.export.package import FORMAT, Package
@@ -64,7 +64,7 @@ class CompiledPackage:
         table = Table(manifest, "", PackageFileError)
         self.name = table.text("name")
         if not NAME.fullmatch(self.name):
-            raise PackageFileError(f"the name of a package is no name in C: {shown(self.name)}")
+            raise PackageFileError(f"the name of a package is no name in C: {displayed(self.name)}")
         self.single = table.text("precision") == "float" if single is None else single
         self.dt = table.number("sample_time_s")
         self.inputs = tuple(one.text("name") for one in table.tables("inputs"))

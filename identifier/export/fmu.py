@@ -160,11 +160,11 @@ def _variables(step: SpecializedStep) -> tuple[_Variable, ...]:
     ]  # fmt: skip
     ports = {port.name: port for port in step.outputs}
     for name in step.side_slip:
-        (reference, shown), port = _SIDE_SLIP[name], ports[name]
+        (reference, displayed), port = _SIDE_SLIP[name], ports[name]
         if name == "side_slip_observable":
-            found.append(_Variable(reference, shown, port.description, kind="boolean"))
+            found.append(_Variable(reference, displayed, port.description, kind="boolean"))
         else:
-            found.append(_Variable(reference, shown, port.description, port.unit))
+            found.append(_Variable(reference, displayed, port.description, port.unit))
     for reference, axle, letter in ((17, "front", "f"), (18, "rear", "r")):
         if step.tells_band:
             words = f"half the width of the 90 % band around F_y{letter} of the {axle} axle"
@@ -274,8 +274,8 @@ def _units(table: Sequence[_Variable]) -> Element:
     for name in filter(used.__contains__, _UNITS):
         children = [_element("BaseUnit", dict(_UNITS[name]))]
         if name in angle:
-            shown, factor = angle[name]
-            children.append(_element("DisplayUnit", {"name": shown, "factor": factor}))
+            displayed, factor = angle[name]
+            children.append(_element("DisplayUnit", {"name": displayed, "factor": factor}))
         units.append(_element("Unit", {"name": name}, *children))
     return _element("UnitDefinitions", {}, *units)
 

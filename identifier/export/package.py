@@ -110,7 +110,7 @@ def _certificate_text(method: Method, proven: Mapping[str, Any]) -> str:
             f"`{method.judged_by}` on its\n"
             "design file gives the certificate. None is part of this package."
         )
-    verdict, held = proven["verdict"], proven["limits"]
+    verdict, limits = proven["verdict"], proven["limits"]
     proven_of = proven["properties"].values()
     if proven_of:
         lines = [f"Certificate of this method, for the interval it was built for: **{verdict}**.\n"]
@@ -123,10 +123,10 @@ def _certificate_text(method: Method, proven: Mapping[str, Any]) -> str:
         lines.append("")
     else:
         lines = [f"This method is **{verdict}**: no margin and no bound of its error is proven."]
-    if held:
+    if limits:
         lines.append("Limits by construction after every sample, for any measurement, in both")
         lines.append("precisions, of what it learns:\n")
-        lines += ["| bound | |", "|---|---|", *(f"| {key} | {held[key]} |" for key in held)]
+        lines += ["| bound | |", "|---|---|", *(f"| {key} | {limits[key]} |" for key in limits)]
     return "\n".join(lines)
 
 
@@ -182,7 +182,7 @@ def run_in_virtual_machine(
     """
     limits, method = specialized.limits, specialized.method
     state = [np.asarray(value) for value in specialized.carry.values()]
-    now, missed, started = np.zeros(sum(port.size for port in specialized.outputs)), 0, False
+    now, refused, started = np.zeros(sum(port.size for port in specialized.outputs)), 0, False
     table = []
 
     def step(sample: Array) -> Array:
@@ -197,17 +197,17 @@ def run_in_virtual_machine(
     nowhere[:2] = NOWHERE, np.nan if specialized.tells_v_y else 0.0
     for sample in samples:
         if limits.accept(*sample[:5], needs_v_y="v_y" in method.needs):
-            anew = specialized.believed is None and missed > 0
+            anew = specialized.believed is None and refused > 0
             if anew if started else specialized.rests_first:
                 rest = np.where(absent, np.nan, sample)
                 step(np.array([0.0, *rest[1:]]))
             now = step(sample)
-            missed, started = 0, True
+            refused, started = 0, True
         else:
-            missed += 1
+            refused += 1
             if specialized.believed is not None and started:
                 now = step(nowhere)
-            if missed >= stale_samples(STALE_TIME, specialized.dt):
+            if refused >= stale_samples(STALE_TIME, specialized.dt):
                 now = np.zeros_like(now)
         table.append(now)
     return np.array(table), dict(zip(specialized.carry, state, strict=True))

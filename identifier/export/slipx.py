@@ -97,7 +97,7 @@ def _tire(model: TireModel, axle: Axle, drawn: Sequence[TireModel], origin: str)
     return f"""{HEAD}\
 compound: rubber
 surface: as-driven-{axle}
-# Differs from the curve of tireid by at most {100.0 * found.missed:.2g} % of its largest force.
+# Differs from the curve of tireid by at most {100.0 * found.misfit:.2g} % of its largest force.
 nominal_load: {load:.9f}
 linear: {{c_alpha: {stiff:.9f}}}
 friction: {{mu_y0: {mu:.9f}, mu_x0: {mu:.9f}, k_mu: 0.0}}

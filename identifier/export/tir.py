@@ -23,7 +23,7 @@ _REACH = 0.1  # rad, slip that is followed where nothing is said of what is know
 _LOW = (0.0, -4.0, 1.0001, -5.0)  # of ln K, ln μ, C, E, at least
 _HIGH = (6.0, 2.0, 2.4, 0.95)  # of ln K, ln μ, C, E, at most
 _WORST = 5.0  # power of the errors whose squares are summed at last: near to the largest one
-_MOST_MISSED = 0.1  # of the peak: past that a curve is no Magic Formula
+_LARGEST_MISFIT = 0.1  # of the peak: past that a curve is no Magic Formula
 _PROPORTIONAL = 100.0  # PKY2: stiffness goes with load, within 0.1 % up to twice the nominal one
 
 
@@ -37,11 +37,11 @@ class _MagicCurve(NamedTuple):
     numbers: Array
     sd: Array
     reach: float
-    missed: float
+    misfit: float
 
 
 def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -> _MagicCurve:
-    """Return the Magic Formula nearest to an axle's curve, within `_MOST_MISSED`."""
+    """Return the Magic Formula nearest to an axle's curve, within `_LARGEST_MISFIT`."""
     i, known = AXLES.index(axle), model.known_slip
     reach = _REACH if known is None else max(_LEAST_REACH, float(known[i]))
     beyond = np.linspace(reach, max(_WIDEST, 1.5 * reach), 60)
@@ -61,18 +61,18 @@ def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -
     squares = [_solved(errors, (stiff, most, 1.35, E)) for E in (0.0, -1.5)]
     best = min(squares, key=lambda z: float(np.sum(errors(z) ** 2)))
     z = _solved(errors, best, _WORST, max(float(np.abs(errors(best)).max()), 1e-9))
-    missed = float(np.abs(errors(z))[inside].max())
-    if not missed <= _MOST_MISSED:
+    misfit = float(np.abs(errors(z))[inside].max())
+    if not misfit <= _LARGEST_MISFIT:
         raise ValueError(
             f"the curve of the {axle} axle is no Magic Formula: the nearest one is off by "
-            f"{100.0 * missed:.2g} % of its peak ({100.0 * _MOST_MISSED:g} % are allowed)"
+            f"{100.0 * misfit:.2g} % of its peak ({100.0 * _LARGEST_MISFIT:g} % are allowed)"
         )
     moved = [formula(slip, z + h) - formula(slip, z - h) for h in 1e-5 * np.eye(4)]
     step = np.linalg.pinv(weight[:, None] * np.column_stack(moved) / 2e-5, rcond=1e-6) * weight
     steps = [step @ (one.force(slip)[:, i] / load - phi) for one in drawn]
     scale = np.array([*np.exp(z[:2]), 1.0, 1.0])
     sd = scale * np.std(steps, axis=0) if steps else np.zeros(4)
-    return _MagicCurve(np.array([*scale[:2], *z[2:]]), sd, reach, missed)
+    return _MagicCurve(np.array([*scale[:2], *z[2:]]), sd, reach, misfit)
 
 
 def formula(slip: Array, z: Array) -> Array:
@@ -114,7 +114,7 @@ $ Is not: a measured tire. Longitudinal and combined slip, camber, aligning mome
 $ are not in it; the longitudinal coefficients repeat the lateral ones, since readers ask for them.
 $ Load: force is proportional to it, as in the model.
 $ Identified up to a slip of {math.degrees(found.reach):.3g} deg, beyond that extrapolated; differs
-$ from the model by at most {100.0 * found.missed:.2g} % of its largest force there.
+$ from the model by at most {100.0 * found.misfit:.2g} % of its largest force there.
 $ Band of 90 % at the nominal load: {band}.
 [MDI_HEADER]
 FILE_TYPE = 'tir'

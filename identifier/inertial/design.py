@@ -287,10 +287,10 @@ class InertialIdentifier(Method):
         """Return what steps of what is learnt move of each axle's numbers, (2, n + 3, k)."""
         n = len(self.ladder)
         moved = self._learnt.into(n, ca.DM(curves), ca.DM(compliance))[MOVING:, MOVING:]
-        *weights, own, sensors = np.split(np.array(ca.evalf(moved)), [n, 2 * n, 2 * n + 2])
+        *weights, lags, sensors = np.split(np.array(ca.evalf(moved)), [n, 2 * n, 2 * n + 2])
         steering, nothing = sensors[SENSORS.index("steering")], np.zeros(sensors.shape[1])
-        front = np.vstack([weights[0], own[0], nothing, steering])
-        return np.array([front, np.vstack([weights[1], own[1], nothing, nothing])])
+        front = np.vstack([weights[0], lags[0], nothing, steering])
+        return np.array([front, np.vstack([weights[1], lags[1], nothing, nothing])])
 
     def _known(self, vehicle: Vehicle, P: Array, curves: Array, compliance: Array) -> Array:
         """Return the covariance of what is learnt of covariances of both axles' numbers, (k, k).

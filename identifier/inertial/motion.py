@@ -185,7 +185,7 @@ class Laws(NamedTuple):
 class Way:
     """How a step leads to what moves: by numbers on the way, of each its expression.
 
-    Numbers that are `held` have no gradient: what a step moves them by is of second order.
+    Numbers that are `constant` have no gradient: what a step moves them by is of second order.
     """
 
     def __init__(self) -> None:
@@ -193,16 +193,16 @@ class Way:
         self._values: list[Any] = []
         self._on_the_way: list[tuple[Any, Any]] = []
 
-    def held(self, value: Any) -> Any:
+    def constant(self, value: Any) -> Any:
         """Return a number of which the gradient is left out, as a symbol."""
-        symbol = ca.SX.sym("held", *value.shape)
+        symbol = ca.SX.sym("constant", *value.shape)
         self._symbols.append(symbol)
         self._values.append(value)
         return symbol
 
     def by(self, value: Any) -> Any:
         """Return a number that others go on from, as a symbol."""
-        symbol = self.held(value)
+        symbol = self.constant(value)
         self._on_the_way.append((symbol, value))
         return symbol
 
@@ -210,7 +210,7 @@ class Way:
         """Return a number with a gradient that is known, and not that of how it is computed.
         value, slope : f(x) and f'(x), of any shape.
         """
-        return self.held(value) + self.held(slope) * (x - self.held(x))
+        return self.constant(value) + self.constant(slope) * (x - self.constant(x))
 
     def valued(self, expressions: list[Any]) -> list[Any]:
         """Return expressions with the numbers on the way put in."""
@@ -287,8 +287,8 @@ def predicted(
     v_x = (before.v_x + now.v_x) / 2
     at = curve_by(way, z, scales, steps).under(load(v_x))
     wheelbase = car.arm[0] - car.arm[1]
-    steep = way.held(at.carcass_slope <= at.slope)
-    carcass = steep * at.slope + (1 - steep) * way.held(at.carcass_slope)
+    steep = way.constant(at.carcass_slope <= at.slope)
+    carcass = steep * at.slope + (1 - steep) * way.constant(at.carcass_slope)
     sigma = way.by(z.compliance * carcass + SHORTEST * wheelbase)
     length = v_x * dt * (1 / sigma)
     e = ca.exp(-length)
@@ -299,11 +299,12 @@ def predicted(
     stays = slip_angle(now, sideways, z.steering) + sway  # where v_y and r stay as they are
     slip = e * z.slip + (mean - e) * was + (1 - mean) * stays
     cos_delta = cosine(now.delta)
-    slope = way.held(at.slope)
+    slope = way.constant(at.slope)
     force = way.by((at.force + slope * (slip - z.slip) / 2) * cos_delta + z.error)
     arm, turn = car.arm, turning(car)
     push = GRAVITY * car.share
-    pull = way.held(slope * cos_delta * (1 - mean) * (dt / (2 * v_x)))  # force per change of v_y
+    # Force per change of v_y.
+    pull = way.constant(slope * cos_delta * (1 - mean) * (dt / (2 * v_x)))
     a = ca.dot(push, force) - v_x * z.r + GRAVITY * z.bank
     b = ca.dot(turn, force)
     m11, m12 = 1 + ca.dot(push, pull), ca.dot(push * arm, pull) + dt * v_x / 2
@@ -336,7 +337,7 @@ def curve_by(way: Way, z: _Unknowns, scales: Any, steps: tuple[int, ...]) -> Cur
     return of_units(way.linear(T, (1 - T * T) * inverse, slip), z.W, scales)
 
 
-class _Shown(NamedTuple):
+class _Expected(NamedTuple):
     """What gyro and accelerometer should show [rad/s], [m/s²]; forces (2,) [static axle loads]."""
 
     r: Any
@@ -344,11 +345,13 @@ class _Shown(NamedTuple):
     force: Any
 
 
-def shown(car: Car, laws: Laws, z: _Unknowns, tilt: Any, now: Sample, at: Curve) -> _Shown:
+def expected_signals(
+    car: Car, laws: Laws, z: _Unknowns, tilt: Any, now: Sample, at: Curve
+) -> _Expected:
     """Return what the sensors should show of a state.
     tilt : ä of the rolling body [m/s²].   at : curves at the lagged slip.
     """
     force = at.force * cosine(now.delta) + z.error
     a_y = GRAVITY * (ca.dot(car.share, force) + z.bias) + z.roll * tilt
     a_y += laws.ahead * ca.dot(turning(car), force) - laws.aside * z.r**2
-    return _Shown(z.r + z.gyro, a_y, force)
+    return _Expected(z.r + z.gyro, a_y, force)

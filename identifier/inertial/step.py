@@ -35,8 +35,8 @@ from identifier.inertial.motion import (
     Way,
     cosine,
     curve_by,
+    expected_signals,
     predicted,
-    shown,
     slip_angle,
     static_load,
     turning,
@@ -49,7 +49,7 @@ _SAME = 0.01  # of the square of a change, up to which the next one is none: a n
 _MOST_WAITING = 4  # numbers of a channel that wait for its turn
 _MOST_SLIDING = 0.7  # |v_y|/v_x from which the filter begins anew
 _MOST_NOISE = 9.0  # of the noise that is held for true, what one sample may show
-_MOST_MISSED = 25.0  # one outlier alone is no alarm
+_LARGEST_SQUARE = 25.0  # one outlier alone is no alarm
 _STIFFNESS = 2.0  # static loads/rad, the least that a corner is begun with
 _DOUBTED = 0.7  # of the slip that a corner is begun with
 _LAG_OF_A_X = 0.2  # s, of the washout that shows a_x
@@ -140,7 +140,7 @@ class _RunningState(NamedTuple):
     """
 
     on: Any
-    missed: Any
+    force_error: Any
     v_x: Any
 
 
@@ -233,9 +233,10 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     noise = _noise(s, gated, goes_on)
     step, factors, left = _corrected(s, ahead, ahead_z, into, factors, noise, now, steps, load)
     corrected = ca.vertsplit(ahead_z + into @ step)
-    missed = smaller((ca.vertcat(*corrected[4:6]) / _missed(trust, ahead)) ** 2, _MOST_MISSED)
-    fast = s.running.missed
-    fast = fast + trust.alarm_gain * ((missed[0] + missed[1]) / 2 - fast)
+    shares = ca.vertcat(*corrected[4:6]) / _force_deviation(trust, ahead)
+    squares = smaller(shares**2, _LARGEST_SQUARE)
+    fast = s.running.force_error
+    fast = fast + trust.alarm_gain * ((squares[0] + squares[1]) / 2 - fast)
     alarm = goes_on * gated.learns * within(fast * trust.per_alarm - 1, 0, 1)
     factors = _loosened(factors, learnt, alarm * trust.inflation)
     corrected = _bounded(s, corrected, learnt)
@@ -336,14 +337,14 @@ def _noise(s: SimpleNamespace, gated: Gate, goes_on: Any) -> _Noise:
     return _Noise(first, counts, turns, share, fresh, following)
 
 
-def _missed(trust: TrustNumbers, ahead: Predicted) -> Any:
+def _force_deviation(trust: TrustNumbers, ahead: Predicted) -> Any:
     """Return the standard deviation of what curves miss of a force (2,) [static axle loads]."""
     return trust.error + trust.relative_error * ca.fabs(ahead.curve.force)
 
 
 def _process_noise(trust: TrustNumbers, ahead: Predicted) -> list[Any]:
     """Return what a step adds to the variances of what moves, None where nothing."""
-    e_f, e_r = ca.vertsplit(_missed(trust, ahead) ** 2 * trust.renewed)
+    e_f, e_r = ca.vertsplit(_force_deviation(trust, ahead) ** 2 * trust.renewed)
     return [None, trust.r_walk, None, None, e_f, e_r, trust.bank_walk]
 
 
@@ -369,7 +370,7 @@ def _corrected(
     tilt = ca.SX.sym("tilt")
     named, way = unknowns(symbol, n), Way()
     at = curve_by(way, named, s.scales, steps).under(load(now.v_x))
-    expected = shown(car, laws, named, tilt, now, at)
+    expected = expected_signals(car, laws, named, tilt, now, at)
     y = ca.vertcat(expected.r, expected.a_y)
     numbers = way.valued([y, ca.jacobian(y, symbol), ca.dot(turning(car), at.force)])
     y, H, turn = ca.substitute(numbers, [symbol, tilt], [z, ahead.tilt])
@@ -440,6 +441,6 @@ def _afresh(
     alpha = slip_angle(now, v_y + car.arm * r, zero)
     unsure = trust.v_y + (_DOUBTED * gated.v_x * lean) ** 2
     slip = unsure / now.v_x**2
-    missed = trust.error**2
-    D = [unsure, trust.r, slip, slip, missed, missed, trust.bank]
+    variance = trust.error**2
+    D = [unsure, trust.r, slip, slip, variance, variance, trust.bank]
     return [v_y, r, *ca.vertsplit(alpha), *[ca.SX(0)] * 3], D

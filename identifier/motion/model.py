@@ -100,8 +100,8 @@ def motion_scan(columns: Columns = ()) -> Scan:
 
     Its ports: `state` (16,) and `tangent` are carried, `signals` (9,) and `rates` (3,) have a row
     a sample, `parameters` (p,), `car` (7,) and `dt` are constant; `force` (2,) [static loads],
-    `missed` e (2,) [static loads], `slip` (2,) [rad] and, where slopes are asked for,
-    `missed_slopes` (2, n) come out.
+    `residual` e (2,) [static loads], `slip` (2,) [rad] and, where slopes are asked for,
+    `residual_slopes` (2, n) come out.
     columns : names of the parameters over which slopes are asked for, (n,).
     """
     n = len(columns)
@@ -138,7 +138,7 @@ def motion_scan(columns: Columns = ()) -> Scan:
         "was_on_next": on,
         **{
             port: on * ca.vertcat(*(axis.value for axis in out[name]))
-            for port, name in (("force", "F"), ("missed", "e"), ("slip", "x"))
+            for port, name in (("force", "F"), ("residual", "e"), ("slip", "x"))
         },
     }
     carry: tuple[str, ...] = ("state", "was_on")
@@ -148,7 +148,7 @@ def motion_scan(columns: Columns = ()) -> Scan:
         outputs["tangent_next"] = ca.vertcat(
             *(on * ca.vec(ca.project(after[name].slopes, pattern[name]).nz[:]) for name in CARRIED)
         )
-        outputs["missed_slopes"] = on * ca.vertcat(*(ca.densify(one.slopes) for one in out["e"]))
+        outputs["residual_slopes"] = on * ca.vertcat(*(ca.densify(one.slopes) for one in out["e"]))
         exchanged = ca.substitute(list(outputs.values()), [kept], [ports["tangent"]])
         outputs = dict(zip(outputs, exchanged, strict=True))
         carry = (*carry, "tangent")
@@ -197,7 +197,7 @@ def _step(at: _At) -> tuple[dict[str, _Dual], dict[str, tuple[_Dual, _Dual]]]:
         after |= slips
         forces, force = _force(axle, at, v_x, x)
         after |= forces
-        balance, across, e = _missed(axle, at, v_x, v_y, r, angle, force)
+        balance, across, e = _residual(axle, at, v_x, v_y, r, angle, force)
         after |= balance
         for name, one in zip(found, (across, e, x), strict=True):
             found[name].append(one)
@@ -362,7 +362,7 @@ def _force(axle: str, at: _At, v_x: _Dual, x: _Dual) -> tuple[dict[str, _Dual], 
     return {f"slope_{axle}": slope, f"force_{axle}": force}, force
 
 
-def _missed(
+def _residual(
     axle: str, at: _At, v_x: _Dual, v_y: _Dual, r: _Dual, delta: _Dual, force: _Dual
 ) -> tuple[dict[str, _Dual], _Dual, _Dual]:
     """Return the states of the balance of an axle after the sample, F, and e."""

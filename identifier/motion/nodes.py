@@ -81,20 +81,20 @@ def node_scan(columns: Columns = ()) -> Scan:
         weighed = {"of_moves": moves, "of_shows": shows, "of_begins": begins}
         weights = {name: ca.SX.sym(name, one.numel()) for name, one in weighed.items()}
         measured = ca.SX.sym("measured", len(MEASURED))
-        missed = ca.vertcat(moves, shows - measured, begins)
+        residual = ca.vertcat(moves, shows - measured, begins)
         w = ca.vertcat(*weights.values())
         over = (*over, "measured", *weights)
         carry = ("sums", "slopes")
         ports |= {"measured": measured, **weights, "sums": sums, "slopes": slopes}
         of = ca.vertcat(*(by_name[name] for name in columns))
-        J, K, P = (ca.jacobian(missed, one) for one in (z, s.z_next, of))
+        J, K, P = (ca.jacobian(residual, one) for one in (z, s.z_next, of))
         wJ, wK, wP = (ca.diag(w) @ one for one in (J, K, P))
         out = {
             **{"now": J.T @ wJ, "next": K.T @ wK, "both": K.T @ wJ},
             **{"border": J.T @ wP, "border_next": K.T @ wP},
-            **{"slope": wJ.T @ missed, "slope_next": wK.T @ missed},
+            **{"slope": wJ.T @ residual, "slope_next": wK.T @ residual},
             "shows_z": ca.jacobian(shows, z),
-            **{"sums_next": sums + P.T @ wP, "slopes_next": slopes + wP.T @ missed},
+            **{"sums_next": sums + P.T @ wP, "slopes_next": slopes + wP.T @ residual},
         }  # fmt: skip
     dense = {name: ca.densify(one) for name, one in out.items()}
     step = step_function(f"nodes_{len(columns)}", ports, {}, dense)
@@ -173,7 +173,7 @@ def _moves(now: _Instant, then: _Instant, p: dict[str, Any], times: Any, dt: Any
         a, turns = one.accelerations
         bank = one.z[6] + p["bank"]
         rates.append((a - one.given["v_x"] * one.r + GRAVITY * bank, turns))
-    missed = [
+    residual = [
         then.z[i] - now.z[i] - dt * (before + after) / 2
         for i, (before, after) in enumerate(zip(*rates, strict=True))
     ]
@@ -183,10 +183,10 @@ def _moves(now: _Instant, then: _Instant, p: dict[str, Any], times: Any, dt: Any
         sigma = p[f"compliance_{axle}"] * slope + SHORTEST * now.L
         h = (now.given["v_x"] + then.given["v_x"]) / 2 * dt / sigma
         e = ca.exp(-h)
-        missed.append(x1 - e * x0 - (1 - e) * a0 - (1 - (1 - e) / h) * (a1 - a0))
+        residual.append(x1 - e * x0 - (1 - e) * a0 - (1 - (1 - e) / h) * (a1 - a0))
     T_e, T_p = times[0], times[1]
-    missed += [then.z[i] - ca.exp(-dt / T_e) * now.z[i] for i in (4, 5)]
+    residual += [then.z[i] - ca.exp(-dt / T_e) * now.z[i] for i in (4, 5)]
     p0, v0, p1, v1 = now.z[6], now.z[7], then.z[6], then.z[7]
-    missed.append(p1 - p0 - dt * (v0 + v1) / 2)
-    missed.append(v1 - v0 + dt * ((v0 + v1) / T_p + (p0 + p1) / (2 * T_p**2)))
-    return missed
+    residual.append(p1 - p0 - dt * (v0 + v1) / 2)
+    residual.append(v1 - v0 + dt * ((v0 + v1) / T_p + (p0 + p1) / (2 * T_p**2)))
+    return residual

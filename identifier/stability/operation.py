@@ -230,7 +230,7 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
     slip_rate = np.array(largest_steering_rate(vehicle, driving))
     slip_rate = slip_rate + (grip + fast * r + lever * spin) / slow + sway * grip / slow**2
     turn_rate = K_inv[:, 0] * (fast * spin + grip * r)
-    held = dt / 2.0 * float(np.linalg.norm(C * slip_rate + turn_rate))
+    between = dt / 2.0 * float(np.linalg.norm(C * slip_rate + turn_rate))
 
     # what the sensors add to A_ξ ξ + B_ξ u, and to ξ itself
     n_x = np.array([driving.noise_v_y, driving.noise_r])
@@ -241,7 +241,7 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
     misread = float(np.linalg.norm(C * wrong_slip + K_inv[:, 0] * wrong_turn))
 
     return Disturbance(
-        residual=(_residual_bound(vehicle, slip=driving.slip) + held + misread) / unit,
+        residual=(_residual_bound(vehicle, slip=driving.slip) + between + misread) / unit,
         noise=float(np.linalg.norm(K_inv @ n_x)) / unit,
     )
 

@@ -94,7 +94,7 @@ def calibrated(
     if (band := model.band) is None:
         return model
     if history.method.whole:
-        share = (verdict or judge(history, t)).force_missed
+        share = (verdict or judge(history, t)).model_error
         told: TireModel = band.calibrated_by(None, None if share is None else np.array(share))
         return told
     whole, start = history.recording, history.start

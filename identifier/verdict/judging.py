@@ -25,7 +25,7 @@ from identifier.verdict.motion import (
     motion_error,
 )
 from identifier.verdict.verdict import (
-    MOST_MISSED,
+    LARGEST_MODEL_ERROR,
     PERCENT,
     WITHOUT_V_Y,
     Number,
@@ -56,7 +56,7 @@ class _Rules:
     rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
     """
 
-    model_error: float = MOST_MISSED
+    model_error: float = LARGEST_MODEL_ERROR
     force: float = 0.1
     doubt: float = 0.5
     stiffness: tuple[float, float] = (2.0, 100.0)
@@ -345,7 +345,7 @@ def _verdict(evaluated: _Evaluated, listed: list[Objection], whole: Recording) -
     errors = dict(zip(AXLES, found.model_error, strict=True))
     numbers = tuple(
         Number(
-            *one.with_missed(float(errors[one.axle])),
+            *one.with_model_error(float(errors[one.axle])),
             valid=one.identified and not refused & {None, one.axle},
         )
         for one in model.estimates()

@@ -23,7 +23,7 @@ WINDOW = 0.3  # T [s]: shorter ones show the noise of the sensors, longer ones n
 BRISK = 0.6  # speed in sqrt(g L) from which a window counts; slower, slip angles mean little
 FEWEST = 8  # windows, below which nothing can be said
 _SEGMENT = 0.3  # share of the windows that may be missed in one piece
-_REST_MISSED = 0.08  # of the force elsewhere, where a piece is missed
+_REST_ERROR = 0.08  # of the force elsewhere, where a piece is missed
 _CONFINED = 0.6  # of what is missed with that piece, what the rest may miss
 _MOMENT = 0.2  # s, over which both are meant
 
@@ -128,7 +128,7 @@ class Evidence:
         One segment may be missed, as before a sensor has settled, where all the rest is explained:
         it is left out. None is where all is explained, or more than one segment is missed.
         """
-        if (self.model_error <= _REST_MISSED).all():
+        if (self.model_error <= _REST_ERROR).all():
             return self, None
         n = max(1, int(_SEGMENT * len(self.windows)))
         size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
@@ -138,7 +138,7 @@ class Evidence:
         last = first + n
         place = np.arange(len(self.windows))
         rest = self.where((place < first) | (place >= last))
-        most = min(_REST_MISSED, _CONFINED * float(self.model_error.max()))
+        most = min(_REST_ERROR, _CONFINED * float(self.model_error.max()))
         confined = (rest.model_error <= most).all()
         if len(rest.windows) >= FEWEST and confined:
             return rest, (first, last)

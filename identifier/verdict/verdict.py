@@ -9,7 +9,7 @@ from identifier.measured import NOT_IDENTIFIABLE, printed_value
 from identifier.tire_model import Axle
 from identifier.verdict.friction import RoadFriction
 
-MOST_MISSED = 0.12  # share of the force, rms, that the frozen model may miss at an axle
+LARGEST_MODEL_ERROR = 0.12  # share of the force, rms, that the frozen model may miss at an axle
 PERCENT = 100.0
 
 UNOBSERVABLE = (
@@ -126,7 +126,7 @@ class Verdict:
         return f"verdict: NOT VALID, {self.against}"
 
     @property
-    def force_missed(self) -> tuple[float, ...] | None:
+    def model_error(self) -> tuple[float, ...] | None:
         """Error of the model over the force in the motion [-], front and rear.
 
         None where too little is driven.
@@ -135,14 +135,14 @@ class Verdict:
         return found if isinstance(found, tuple) else None
 
     @property
-    def missed_line(self) -> str:
+    def model_error_line(self) -> str:
         """The same in one line; empty where too little is driven."""
-        if self.force_missed is None:
+        if self.model_error is None:
             return ""
-        front, rear = (f"{PERCENT * share:.1f}" for share in self.force_missed)
+        front, rear = (f"{PERCENT * share:.1f}" for share in self.model_error)
         return (
             f"model error over the force in the motion: {front} / {rear} % (front / rear, limit "
-            f"{PERCENT * MOST_MISSED:.0f} %)"
+            f"{PERCENT * LARGEST_MODEL_ERROR:.0f} %)"
         )
 
     @property
@@ -153,8 +153,8 @@ class Verdict:
     @property
     def lines(self) -> tuple[str, ...]:
         """Headline, model error, a line for each finding, and what is not observable."""
-        missed = (self.missed_line,) if self.missed_line else ()
-        return (self.headline, *missed, *(one.line for one in self.findings), *self.unobservable)
+        error = (self.model_error_line,) if self.model_error_line else ()
+        return (self.headline, *error, *(one.line for one in self.findings), *self.unobservable)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as plain numbers and words, ready for JSON."""

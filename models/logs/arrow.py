@@ -54,11 +54,11 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
     }
     # In memory of pyarrow's own, whose threads may drop it last, while Python ends: of what is
     # Python's that aborts the program.
-    held = pyarrow.allocate_buffer(len(block))
-    np.frombuffer(held, dtype=np.uint8)[:] = np.frombuffer(block, dtype=np.uint8)
+    buffer = pyarrow.allocate_buffer(len(block))
+    np.frombuffer(buffer, dtype=np.uint8)[:] = np.frombuffer(block, dtype=np.uint8)
     try:
         table = pyarrow.csv.read_csv(
-            pyarrow.BufferReader(held),
+            pyarrow.BufferReader(buffer),
             pyarrow.csv.ReadOptions(
                 column_names=[str(k) for k in range(len(layout.columns.names))],
                 block_size=len(block) + 1,

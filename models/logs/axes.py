@@ -152,14 +152,14 @@ def along_axes(
     """
     there = {name for name, one in seen.items() if np.isfinite(one.values).sum() > 1}
     usable = [one for one in found if there.issuperset(one.names.values())]
-    asked = [name for one in usable for name in one.names.values()]
+    in_triads = [name for one in usable for name in one.names.values()]
     named = [one for one in (speed, yaw_rate, lateral, steering) if one]
-    grid = _Grid(seen, [*asked, *named])
+    grid = _Grid(seen, [*in_triads, *named])
     if grid.t.size < 50:
         return _Found(frozenset(), ())
     misled, oblique = set[str](), set[str]()
     axes, across = list[_Axis](), list[str]()
-    v = np.abs(grid[speed]) if speed and speed not in asked else None
+    v = np.abs(grid[speed]) if speed and speed not in in_triads else None
     for one in usable:
         if one.quantity == SPEED and (forward := _forward(grid, one, v)):
             misled |= set(one.names.values())
@@ -174,8 +174,8 @@ def along_axes(
         if one.quantity == ACCELERATION:
             rates = [other for other in usable if other.quantity == RATE]
             up = _up({letter: float(np.nanmean(grid[name])) for letter, name in one.names.items()})
-            own = [other for other in rates if set(other.words) & set(one.words) - {"?"}]
-            gyro = next(iter(own + rates), None)
+            same_box = [other for other in rates if set(other.words) & set(one.words) - {"?"}]
+            gyro = next(iter(same_box + rates), None)
             channels = {*one.names.values(), *(gyro.names.values() if gyro else ())}
             if up[0] == "?":
                 oblique |= channels
@@ -210,8 +210,8 @@ def _sideways(grid: _Grid, names: Sequence[str], v: Array, r: Array, a_y: Array)
     slope = float(np.nanmean(turning * lateral) / max(float(np.nanmean(turning**2)), 1e-12))
     if not size or not slope:
         return []
-    missed = lateral / slope - turning  # in the units of v r, which may be no SI: signs are asked
-    alike = {name: _alike(np.gradient(grid[name], _STEP), missed) for name in names}
+    residual = lateral / slope - turning  # in the units of v r, which may be no SI: signs are asked
+    alike = {name: _alike(np.gradient(grid[name], _STEP), residual) for name in names}
     best = max(alike, key=lambda name: abs(alike[name]))
     if abs(alike[best]) < _SURE:
         return []

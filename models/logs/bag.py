@@ -120,12 +120,12 @@ def open_(path: Path) -> GroupedLog[_Place]:
 
 
 def _samples(
-    path: Path, definitions: Definitions, zero: int, asked: Sequence[tuple[Listed, _Place]]
+    path: Path, definitions: Definitions, zero: int, requested: Sequence[tuple[Listed, _Place]]
 ) -> list[Samples]:
     """Read fields of messages, topic by topic; times of frames count from `zero` [ns]."""
     fields: dict[_Topic, dict[str, Field]] = {}
     frames: dict[str, tuple[_Moving, dict[str, Array]]] = {}
-    for listed, place in asked:
+    for listed, place in requested:
         if isinstance(place[0], _Moving):
             moving, k = place[0], place[1]
             frames.setdefault(moving.name, (moving, {}))[1][listed.name] = moving.values[:, k]

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks, filled
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.limits import limits
 from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples
@@ -255,7 +255,7 @@ def _of_table(path: Path) -> Iterator[_Frame]:
             except (ValueError, IndexError):
                 raise RecordingError(
                     f"{path}: line {number} must hold a frame: time, identifier and bytes in "
-                    f"hexadecimal, not {shown(','.join(row))}"
+                    f"hexadecimal, not {displayed(','.join(row))}"
                 ) from None
             yield _Frame(time, identifier & _IDENTIFIER, data, bus, extended)
 
@@ -400,9 +400,9 @@ class _Group:
 _Place = tuple[_Group, Any, str]
 
 
-def _samples(asked: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
+def _samples(requested: Sequence[tuple[Listed, _Place]]) -> list[Samples]:
     groups: dict[_Group, dict[str, Any]] = {}
-    for listed, (group, signal, fault) in asked:
+    for listed, (group, signal, fault) in requested:
         if fault:
             raise RecordingError(fault)
         groups.setdefault(group, {})[listed.name] = signal

@@ -24,7 +24,7 @@ from models.logs.log import Channel, RecordingError
 from models.logs.stamps import not_rising, since
 
 _GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
-_OWN_CLOCK = 0.4  # share of empty cells from which a channel is taken to be slower than its rows
+_SLOWER = 0.4  # share of empty cells from which a channel is taken to be slower than its rows
 _ON_STEP = 0.01  # share of a step within which an instant is that of a sample
 
 
@@ -53,7 +53,7 @@ def holes(channel: Channel) -> NDArray[np.intp]:
     Where 40 % are empty, or all, there are none: it is a slower channel in a table, or nothing.
     """
     empty = np.flatnonzero(np.isnan(channel.values))
-    return empty if empty.size < _OWN_CLOCK * channel.values.size else empty[:0]
+    return empty if empty.size < _SLOWER * channel.values.size else empty[:0]
 
 
 def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
@@ -118,9 +118,9 @@ def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Seg
         if not inside.size:
             continue
         grid = inside[0] + dt * np.arange(int((end - inside[0]) / dt + 1e-6) + 1)
-        own = inside[: grid.size]
-        if own.size == grid.size and np.abs(own - grid).max() <= 1e-6 * dt:
-            grid = own  # its very numbers, where they are the clock
+        times_inside = inside[: grid.size]
+        if times_inside.size == grid.size and np.abs(times_inside - grid).max() <= 1e-6 * dt:
+            grid = times_inside  # its very numbers, where they are the clock
         found.append(Segment(grid, {name: sampled(raw, grid, dt) for name, raw in raws.items()}))
     return found
 
@@ -145,13 +145,13 @@ def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]
         cuts = gaps(t, longest)
         first = t[np.concatenate([[0], cuts])]
         last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - _ON_STEP) * _interval(t)
-        own = list(zip(first.tolist(), last.tolist(), strict=True))
+        intervals = list(zip(first.tolist(), last.tolist(), strict=True))
         found, i, j = [], 0, 0
-        while i < len(spans) and j < len(own):
-            begin, end = max(spans[i][0], own[j][0]), min(spans[i][1], own[j][1])
+        while i < len(spans) and j < len(intervals):
+            begin, end = max(spans[i][0], intervals[j][0]), min(spans[i][1], intervals[j][1])
             if begin < end:
                 found.append((begin, end))
-            if spans[i][1] < own[j][1]:
+            if spans[i][1] < intervals[j][1]:
                 i += 1
             else:
                 j += 1

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.extras import needs
 from models.logs.log import RecordingError
 
@@ -80,7 +80,7 @@ def _reason(error: Exception) -> str:
     if not text:
         return type(error).__name__
     return (
-        shown(text[:_LONGEST_REASON]).strip("'\"")
+        displayed(text[:_LONGEST_REASON]).strip("'\"")
         if not text.isprintable()
         else (text if len(text) <= _LONGEST_REASON else f"{text[:_LONGEST_REASON]}...")
     )

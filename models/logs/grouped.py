@@ -129,10 +129,10 @@ class GroupedLog(Generic[_P]):
         one_run(self.path, self.runs(), run)
         if self.clock_name:
             return self._timed(names)
-        asked = chosen(self.path, names, {one[0].name: one for one in self.channels})
+        requested = chosen(self.path, names, {one[0].name: one for one in self.channels})
         found: dict[str, tuple[Array, Array, Any]] = {}
         with one_line(self.path, self.what):
-            for clock, t, values in self.samples(asked):
+            for clock, t, values in self.samples(requested):
                 rows, what = np.arange(1, t.size + 1), Clock(0, f"the clock of {clock}", "s", "")
                 stamps = seconds(
                     str(self.path), what, t, rows, self.place, mend=self.mend, restarts=False
@@ -143,7 +143,7 @@ class GroupedLog(Generic[_P]):
         place = self.place
         return tuple(
             Channel(name=one.name, unit=one.unit, t=t, values=values_of, place=place, rows=rows)
-            for one, _ in asked
+            for one, _ in requested
             for t, values_of, rows in [found[one.name]]
         )
 

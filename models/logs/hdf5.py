@@ -20,7 +20,7 @@ from models.schema import swells
 _LONGEST_TEXT = 1_000_000  # bytes of all texts of a dataset
 _MOST_TEXTS = 10_000  # of a dataset
 
-_OWN = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
+_INTERNAL = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
 
 
 def read_tree(path: Path) -> dict[str, Tree]:
@@ -28,7 +28,9 @@ def read_tree(path: Path) -> dict[str, Tree]:
     h5py = need(path, "h5py", "MATLAB 7.3 or HDF5", "mat")
     with h5py.File(path, "r") as file:
         reader = _Reader(path, h5py, file)
-        return {name: reader.tree(one, 0) for name, one in reader.members(file) if name not in _OWN}
+        return {
+            name: reader.tree(one, 0) for name, one in reader.members(file) if name not in _INTERNAL
+        }
 
 
 class _Reader:

@@ -45,9 +45,9 @@ def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> 
     )
 
 
-def _of_files(asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:
+def _of_files(requested: Sequence[tuple[Listed, Any]]) -> list[Samples]:
     files: dict[int, list[tuple[str, Any]]] = {}
-    for listed, place in asked:
+    for listed, place in requested:
         files.setdefault(id(place[0]), []).append((listed.name, place))
     found = []
     for some_ in files.values():
@@ -97,8 +97,8 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
     said = (f"a row for each value: {names[name]} names it; time is {clock.words}",)
     values = cells.columns[value]
 
-    def read(asked: Sequence[tuple[Listed, Any]]) -> list[Samples]:
-        return [Samples(one.name, t[rows], {one.name: values[rows]}) for one, rows in asked]
+    def read(requested: Sequence[tuple[Listed, Any]]) -> list[Samples]:
+        return [Samples(one.name, t[rows], {one.name: values[rows]}) for one, rows in requested]
 
     return GroupedLog.of(
         table.path, f"{table.format} of values", "a table", "row", found, said, read, missing="name"

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
-from codegen.escape import shown, visible
+from codegen.escape import displayed, visible
 from models.schema import require_dense, require_few
 
 _SOME = 12  # names in a message
@@ -134,9 +134,9 @@ def chosen(path: Path, names: Sequence[str], known: Mapping[str, _T]) -> list[_T
     for name in names:
         if name not in known:
             similar = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
-            there = f"; did you mean {shown(similar[0])}?" if similar else ""
+            there = f"; did you mean {displayed(similar[0])}?" if similar else ""
             there = there or f", there are '{some(list(known))}'"
-            raise RecordingError(f"{path}: there is no channel {shown(name)}{there}")
+            raise RecordingError(f"{path}: there is no channel {displayed(name)}{there}")
     return [known[name] for name in names]
 
 
@@ -145,13 +145,15 @@ def one_run(path: Path, runs: Sequence[str], run: str | None) -> str | None:
     if not runs:
         if run is not None:
             raise RecordingError(
-                f"{path}: holds one run without a name, so no run {shown(run)}; leave it out"
+                f"{path}: holds one run without a name, so no run {displayed(run)}; leave it out"
             )
         return None
     if run is None and len(runs) > 1:
         raise RecordingError(f"{path}: name one of its runs: {some(runs)}")
     if run is not None and run not in runs:
-        raise RecordingError(f"{path}: there is no run {shown(run)}, the runs are: {some(runs)}")
+        raise RecordingError(
+            f"{path}: there is no run {displayed(run)}, the runs are: {some(runs)}"
+        )
     return runs[0] if run is None else run
 
 

@@ -61,7 +61,7 @@ class _Beginning(NamedTuple):
     rest: memoryview
 
     @property
-    def is_own(self) -> bool:
+    def is_internal(self) -> bool:
         """Whether MATLAB keeps it for itself."""
         return not self.name or self.name.startswith("__")
 
@@ -80,7 +80,8 @@ def read_tree(path: Path) -> dict[str, Tree]:
             raise _DamagedError("its header has no byte order")
         size = path.stat().st_size
         result: dict[str, Tree] = {}
-        place, held, packed = _HEADER, 0, 0  # bytes that stay in memory, and of the file for them
+        # Bytes that stay in memory, and of the file for them.
+        place, in_memory, packed = _HEADER, 0, 0
         while place < size:
             file.seek(place)
             tag = file.read(8)
@@ -99,13 +100,13 @@ def read_tree(path: Path) -> dict[str, Tree]:
                     tree = Leaf(shape=begin.shape, load=variable.load)
                     if swells(8 * count, length):
                         tree = Unread(f"{count} numbers in {length} bytes")
-                elif begin.kind in (_CELL, _STRUCT, _CHAR) and not begin.is_own:
+                elif begin.kind in (_CELL, _STRUCT, _CHAR) and not begin.is_internal:
                     data = variable.data()
                     tree = _tree(path, data, order, 0)
-                    held, packed = held + len(data), packed + length
-                if not begin.is_own:
+                    in_memory, packed = in_memory + len(data), packed + length
+                if not begin.is_internal:
                     result[begin.name] = tree
-                dense(path, held, packed, "structs and cells")
+                dense(path, in_memory, packed, "structs and cells")
                 few(path, len(result), "columns", "variables")
             place += length + (0 if kind == _COMPRESSED else -length % 8)
     return result

@@ -69,14 +69,14 @@ def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
 
 
 def _samples(
-    per_second: Mapping[Clock, float], asked: Sequence[tuple[Listed, Signal]]
+    per_second: Mapping[Clock, float], requested: Sequence[tuple[Listed, Signal]]
 ) -> list[Samples]:
     """Read signals; those of one matrix together, and the matrix is not kept.
 
     Clocks of the calendar keep their seconds since 1970.
     """
     together: dict[int, list[tuple[Listed, Signal]]] = {}
-    for one in asked:
+    for one in requested:
         together.setdefault(id(one[1].leaf), []).append(one)
     found: dict[Clock, dict[str, Array]] = {}
     for some in together.values():

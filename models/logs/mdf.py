@@ -54,12 +54,12 @@ class _Place(NamedTuple):
     channel: int
 
 
-_Asked = tuple[Listed, _Place]
+_Requested = tuple[Listed, _Place]
 
 
-def _samples(path: Path, asked: Sequence[_Asked]) -> list[Samples]:
-    groups: dict[int, list[_Asked]] = {}
-    for one in asked:
+def _samples(path: Path, requested: Sequence[_Requested]) -> list[Samples]:
+    groups: dict[int, list[_Requested]] = {}
+    for one in requested:
         groups.setdefault(one[1].group, []).append(one)
     found = []
     with opened(path, "MDF") as file:
@@ -72,7 +72,7 @@ def _samples(path: Path, asked: Sequence[_Asked]) -> list[Samples]:
     return found
 
 
-def _read(path: Path, file: Any, some: Sequence[_Asked], values: dict[str, Array]) -> Array:
+def _read(path: Path, file: Any, some: Sequence[_Requested], values: dict[str, Array]) -> Array:
     """Add the values of channels of one group to others, and return their times."""
     samples = some[0][0].samples
     require_room(path, samples, 8)

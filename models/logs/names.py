@@ -281,13 +281,13 @@ def propose(
     headings = log.headings() if headings is None else headings
     candidates = {name: _candidates(name, headings) for name in QUANTITIES if name not in POSE}
     posed = _pose(headings)
-    asked = {name for found in candidates.values() for guess in found for name in guess.channel}
+    requested = {name for found in candidates.values() for guess in found for name in guess.channel}
     given = {one.name: _with_given_unit(one).unit for one in headings}
     names = {name: _words_of(without_ending(name, unit)) for name, unit in given.items()}
     bad = _REFERENCE | _CORNERS
     boxes = triads({name: one for name, one in names.items() if not bad & set(one)}, given)
-    asked |= {name for box in boxes for name in box.names.values()}
-    seen = _seen(log, [one.name for one in headings if one.name in asked], run)
+    requested |= {name for box in boxes for name in box.names.values()}
+    seen = _seen(log, [one.name for one in headings if one.name in requested], run)
     candidates = {
         name: [_looked(name, guess, seen) for guess in found] for name, found in candidates.items()
     }
@@ -321,11 +321,11 @@ def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     groups: dict[str, dict[str, Heading]] = {}
     for one in map(_with_given_unit, headings):
         words = "_".join(_words_of(without_ending(one.name, one.unit)))
-        possible = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
+        plausible = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
         for form, wanted, mark in ((_PLACE, LENGTH, ""), (_ANGLE, ANGLE, "h"), (_TURN, ANGLE, "q")):
             found = form.fullmatch(words)
             of = set((found["of"] or "").split("_")) if found else set()
-            if found and wanted in possible and not of & _NO_POSE:
+            if found and wanted in plausible and not of & _NO_POSE:
                 key = mark if mark == "h" else mark + found["axis"]
                 groups.setdefault(found["of"] or "", {}).setdefault(key, one)
                 break
@@ -495,10 +495,10 @@ def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
             return guess
         loss = guess.confidence - _NO_UNIT_LOSS
         return replace(guess, confidence=loss, why="no unit in the file")
-    possible, unit = quantities(one.unit), one.unit.strip()
-    if quantity in possible:
+    plausible, unit = quantities(one.unit), one.unit.strip()
+    if quantity in plausible:
         return replace(guess, unit=unit)
-    near = quantity == RATE and ANGLE in possible  # as some databases have it
+    near = quantity == RATE and ANGLE in plausible  # as some databases have it
     return replace(
         guess,
         unit=f"{unit}/s" if near else "",

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.logs.arrow import doubles, whole_numbers, words
 from models.logs.foreign import need, one_line
 from models.logs.log import RecordingError, dense, few
@@ -35,7 +35,7 @@ def open_parquet(path: Path) -> TableLog:
         few(path, size / 1e6, "megabytes", "megabytes")
         for one in (group.column(k) for group in groups for k in range(group.num_columns)):
             unpacked, packed = one.total_uncompressed_size, one.total_compressed_size
-            what = f"the cells of {shown(one.path_in_schema)}"
+            what = f"the cells of {displayed(one.path_in_schema)}"
             dense(path, unpacked, packed, what)
         table = _ParquetTable(path=path, schema=file.schema_arrow, rows=about.num_rows)
         return TableLog(table=table)
@@ -139,7 +139,7 @@ class _ParquetTable:
             k = instants.index(None)  # the first: words stand in the order of the rows
             raise RecordingError(
                 f"{self.path}: {self.columns.names[column]} must be a time, row "
-                f"{rows[np.argmax(codes == k)]} has {shown(names[k][:LONGEST_NAME])}"
+                f"{rows[np.argmax(codes == k)]} has {displayed(names[k][:LONGEST_NAME])}"
             )
         return np.array(instants, dtype=np.int64)[codes]
 

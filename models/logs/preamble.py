@@ -18,7 +18,7 @@ from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.logs.log import RecordingError, few
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
 from models.logs.stamps import nanoseconds
@@ -310,7 +310,7 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
         f"cells apart by {_DELIMITERS[way.delimiter]} ({sure})",
         "decimal comma" if way.decimal == "," else "decimal point",
     ]
-    words += [f"thousands apart by {shown(way.thousands)}"] * bool(way.thousands)
+    words += [f"thousands apart by {displayed(way.thousands)}"] * bool(way.thousands)
     words += [f"{made_by} export"] * bool(made_by)
     words += [f"names in line {names_line.number}"]
     words += [f"units in line {units_line.number}"] if units_line is not None else []
@@ -504,12 +504,12 @@ def _with_channel_units(
     """
     end = min((k for k in at.values() if k > at["channel units"]), default=len(lines))
     listed = [one.strip() for one in lines[at["channel units"] + 1 : end] if one.strip()]
-    own = len(names) - len(listed)
-    if own < 0 or any(name.lower() in _OF_THE_BOX for name in names[own:]):
+    extra = len(names) - len(listed)
+    if extra < 0 or any(name.lower() in _OF_THE_BOX for name in names[extra:]):
         return list(units)
     given = [unit if is_unit(unit) else "" for unit in listed]
-    for name, title, unit in zip(names[own:], units[own:], given, strict=True):
+    for name, title, unit in zip(names[extra:], units[extra:], given, strict=True):
         said = title or unit_in_name(name)
         if said and unit and quantities(said) != quantities(unit):
             return list(units)
-    return [*units[:own], *(a or b for a, b in zip(units[own:], given, strict=True))]
+    return [*units[:extra], *(a or b for a, b in zip(units[extra:], given, strict=True))]

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from codegen.arrays import Array, filled
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.logs.log import RecordingError
 from models.logs.units import FORCE, RATE, TURNS, quantities
 
@@ -105,11 +105,11 @@ class Signal:
             if len(self.table) < 2 or not (rises.all() and np.isfinite(self.table).all()):
                 raise RecordingError(
                     "table must hold at least two pairs [hand wheel, road wheel] in rad that rise, "
-                    f"not {shown(str(self.table))}"
+                    f"not {displayed(str(self.table))}"
                 )
 
     @property
-    def asked(self) -> tuple[str, ...]:
+    def requested(self) -> tuple[str, ...]:
         """The channels that are read, that of the sign last."""
         return (*self.channel, self.sign) if self.sign else self.channel
 

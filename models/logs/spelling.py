@@ -47,9 +47,9 @@ def unit_in_name(name: str) -> str:
 def _split(name: str) -> tuple[str, str]:
     if len(name) > LONGEST_NAME:
         return name, ""
-    held = _BRACKETS.fullmatch(name)
-    if held and not held[1].isdigit() and (is_unit(held[1]) or "[" in name):
-        return without_unit(name), held[1]
+    match = _BRACKETS.fullmatch(name)
+    if match and not match[1].isdigit() and (is_unit(match[1]) or "[" in name):
+        return without_unit(name), match[1]
     for mark in (":", " / ", ", ", " in "):
         bare, there, unit = name.rpartition(mark)
         if there and is_unit(unit) and unit.strip() not in _EMPTY:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, blocks, filled
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.logs.growing import LONGEST_IN_MEMORY
 from models.logs.log import Clock, RecordingError
 from models.logs.spelling import unit_in_name
@@ -136,8 +136,8 @@ def no_clock(names: Sequence[str], units: Sequence[str], head: _Head) -> str:
         one for k, one in enumerate(names) if units[k] in ("", "-") and _counts(one, head(k))
     ]
     if way and not counted:
-        return f"no column is a time: {shown(way[0])} is a distance; export the log over time"
-    counts = f", {shown(counted[0])} counts samples" if counted else ""
+        return f"no column is a time: {displayed(way[0])} is a distance; export the log over time"
+    counts = f", {displayed(counted[0])} counts samples" if counted else ""
     advice = "--rate HZ gives the samples per second, or --columns t=COLUMN the time"
     return f"no column is a time that rises{counts}; {advice}"
 
@@ -176,7 +176,7 @@ def _counts(name: str, cells: Sequence[str]) -> bool:
     return one > 0.0 and one.is_integer() and bool((steps == one).all()) and (one == 1.0 or called)
 
 
-def own_clocks(
+def clocks_of_channels(
     names: Sequence[str], units: Sequence[str], head: _Head, first: Clock
 ) -> dict[int, Clock]:
     """Return by column the clock of those that stand behind a time of their own; else nothing.
@@ -196,12 +196,12 @@ def own_clocks(
         k: clock if _is_beside(clock, head(k), first, head(0)) else first
         for k, clock in found.items()
     }
-    own, current = {}, first
+    clock_of, current = {}, first
     for k in range(len(names)):
         current = times.get(k, current)
         if current is not first:
-            own[k] = current
-    return own
+            clock_of[k] = current
+    return clock_of
 
 
 def _is_beside(

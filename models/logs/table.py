@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.logs.growing import Growing
 from models.logs.log import (
     Channel,
@@ -28,10 +28,10 @@ from models.logs.spelling import unit_in_name, without_unit
 from models.logs.stamps import (
     MISSING,
     Stamps,
+    clocks_of_channels,
     find_clock,
     given_clock,
     no_clock,
-    own_clocks,
     seconds,
     started,
     typical_rate,
@@ -172,7 +172,7 @@ class Gathered:
                 row = rows[np.flatnonzero(words.codes == k)[0]]
                 raise RecordingError(
                     f"{self._path}: {self._names[column]} must be at most {LONGEST_NAME} "
-                    f"characters, {self._place} {row} has {shown(word.strip())}"
+                    f"characters, {self._place} {row} has {displayed(word.strip())}"
                 )
         new = [codes.setdefault(word.strip(), len(codes)) for word in words.names]
         if len(codes) > _MOST_WORDS:
@@ -259,7 +259,7 @@ class TableLog:
         if given is None:
             raise RecordingError(
                 f"{self.path}: {name} must be a time, its first cells are "
-                f"{shown(', '.join(table.first_rows(column)[:3]))}"
+                f"{displayed(', '.join(table.first_rows(column)[:3]))}"
             )
         return given
 
@@ -283,10 +283,12 @@ class TableLog:
         return self.rate or (self._columns.rate if self.clock is None else 0.0)
 
     @cached_property
-    def _own_clocks(self) -> dict[int, Clock]:
+    def _channel_clocks(self) -> dict[int, Clock]:
         if self.clock_name or self.clock is None or self._run_column is not None:
             return {}
-        return own_clocks(self.names, self._columns.units, self.table.first_rows, self.clock)
+        return clocks_of_channels(
+            self.names, self._columns.units, self.table.first_rows, self.clock
+        )
 
     @cached_property
     def _run_column(self) -> int | None:
@@ -296,7 +298,7 @@ class TableLog:
     def _channels(self) -> tuple[int, ...]:
         """Which columns are channels: the numeric ones, but for the clock and the runs."""
         other = {None if self.clock is None else self.clock.column, self._run_column}
-        other |= {clock.column for clock in self._own_clocks.values()}
+        other |= {clock.column for clock in self._channel_clocks.values()}
         return tuple(
             k for k, is_one in enumerate(self._columns.numeric) if is_one and k not in other
         )
@@ -318,7 +320,7 @@ class TableLog:
     @cached_property
     def _listed(self) -> tuple[Listed, ...]:
         kinds = {} if self._run_column is None else {self._run_column: Kind.WORD}
-        clocks = {one.column: one for one in (self.clock, *self._own_clocks.values()) if one}
+        clocks = {one.column: one for one in (self.clock, *self._channel_clocks.values()) if one}
         cells = self.table.cells(kinds | {k: kind_of(one) for k, one in clocks.items()})
         size = cells.rows.size
         for words in cells.words.values():  # each run has a clock of its own
@@ -331,14 +333,14 @@ class TableLog:
         for k, heading in zip(self._channels, self.headings(), strict=True):
             head = self.table.first_rows(k)
             filled = sum(cell != "" for cell in head) / max(len(head), 1)
-            filled = 1.0 if self._own_clocks else filled  # of its own times, which end sooner
-            own = self._own_clocks.get(k, self.clock)
+            filled = 1.0 if self._channel_clocks else filled  # of its own times, which end sooner
+            clock = self._channel_clocks.get(k, self.clock)
             listed.append(
                 Listed(
                     name=heading.name,
                     unit=heading.unit,
-                    samples=stamps[own.column].size if own and self._own_clocks else size,
-                    rate=(rates[own.column] if own else self._even or math.nan) * filled,
+                    samples=stamps[clock.column].size if clock and self._channel_clocks else size,
+                    rate=(rates[clock.column] if clock else self._even or math.nan) * filled,
                 )
             )
         return tuple(listed)
@@ -348,13 +350,13 @@ class TableLog:
         if clock is None:
             return Stamps(np.arange(cells.rows.size) / self._even, ())
         column, rows, place = cells.columns[clock.column], cells.rows, self.table.place
-        if not self._own_clocks:
+        if not self._channel_clocks:
             return seconds(label, clock, column, rows, place, mend=self.mend)
         there = np.flatnonzero(column != MISSING if column.dtype.kind == "i" else ~np.isnan(column))
-        own = seconds(
+        stamps = seconds(
             label, clock, column[there], rows[there], place, mend=self.mend, restarts=False
         )
-        return own._replace(order=own.of(there))
+        return stamps._replace(order=stamps.of(there))
 
     def runs(self) -> tuple[str, ...]:
         """Return the words of the column "run" in their order; empty where there is none."""
@@ -374,7 +376,7 @@ class TableLog:
         if clock is None and not self._even:
             why = no_clock(self.names, self._columns.units, self.table.first_rows)
             raise RecordingError(f"{self.path}: {why}; columns found: '{some(self.names)}'")
-        clocks = {k: self._own_clocks.get(k, clock) for k in places}
+        clocks = {k: self._channel_clocks.get(k, clock) for k in places}
         kinds = {one.column: kind_of(one) for one in clocks.values() if one}
         column = None if clock is None else clock.column
         timed = clock is None or kind_of(clock) is Kind.NUMBER  # asked for as it stands
@@ -385,20 +387,22 @@ class TableLog:
         label = str(self.path) if run is None else f"{self.path}:{run}"
         found = {one: self._stamps(label, one, cells) for one in dict.fromkeys(clocks.values())}
         self._noted.extend(note for stamps in found.values() for note in stamps.notes)
-        if self._own_clocks and clock is not None:
-            own = dict.fromkeys(shown(one.name) for one in (clock, *self._own_clocks.values()))
+        if self._channel_clocks and clock is not None:
+            titles = dict.fromkeys(
+                displayed(one.name) for one in (clock, *self._channel_clocks.values())
+            )
             said = "channels have times of their own, each the one before it: "
-            self._noted.append(said + ", ".join(own))
+            self._noted.append(said + ", ".join(titles))
         channels = []
         for name, k in zip(names, places, strict=True):
             stamps = found[clocks[k]]
-            asked = k == column and not timed
+            is_clock = k == column and not timed
             channels.append(
                 Channel(
                     name=name,
                     unit=self._columns.units[k],
                     t=stamps.t,
-                    values=stamps.t if asked else stamps.of(cells.columns[k]),
+                    values=stamps.t if is_clock else stamps.of(cells.columns[k]),
                     place=self.table.place,
                     rows=stamps.of(cells.rows),
                 )

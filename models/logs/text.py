@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.logs import arrow
 from models.logs.log import RecordingError, few
 from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
@@ -136,15 +136,15 @@ def _blocks(path: Path, layout: Layout, size: int) -> Iterator[tuple[int, bytes]
 def _in_utf8(path: Path, encoding: str) -> Iterator[bytes]:
     """Yield the text of a file in UTF-8, each line of which ends in a line feed alone."""
     decoder = codecs.getincrementaldecoder(encoding)("replace")
-    held = b""
+    pending = b""
     for part in pieces(path, RecordingError, limit="megabytes"):
         if encoding not in ("utf-8", "utf-8-sig", "cp1252"):
             part = decoder.decode(part).encode("utf-8", "replace")
-        part = held + part
-        held = b"\r" if part.endswith(b"\r") else b""  # what follows may be its line feed
+        part = pending + part
+        pending = b"\r" if part.endswith(b"\r") else b""  # what follows may be its line feed
         part = part.removesuffix(b"\r")
         yield part.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in part else part
-    if held:
+    if pending:
         yield b"\n"
 
 
@@ -285,7 +285,7 @@ class _Python:
             comma = self._layout.decimal == "," and "." in cells[k]
             raise RecordingError(
                 f"{self._path}: {self._layout.columns.names[column]} must be {what}, line "
-                f"{lines[k]} has {shown(cells[k])}"
+                f"{lines[k]} has {displayed(cells[k])}"
                 + (" where others have decimal commas" if comma else "")
             )
         return np.array(values, dtype=dtype)

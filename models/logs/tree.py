@@ -133,10 +133,10 @@ class _Walk:
     def struct(self, node: dict[str, Tree], path: str, clocks: tuple[Clock, ...]) -> None:
         """Collect the channels of a struct; clocks: of the structs around it, the nearest first."""
         clocks = (*_clocks_of(node, path), *clocks)
-        own = [clock.leaf for clock in clocks]
+        clock_leaves = [clock.leaf for clock in clocks]
         columns = _columns(node)
         data = _pick(node, _DATA)
-        if any(data is leaf for leaf in own):
+        if any(data is leaf for leaf in clock_leaves):
             return
         if isinstance(data, Leaf) and (clocks or _text(node, _UNIT)) and not _several(node):
             label = _text(node, _NAME) or path
@@ -147,7 +147,7 @@ class _Walk:
         for key, child in node.items():
             name = f"{path}.{key}" if path else key
             if isinstance(child, Leaf):
-                if not any(child is leaf for leaf in own):
+                if not any(child is leaf for leaf in clock_leaves):
                     unit = known.get(key)
                     unit = unit if isinstance(unit, str) else ""
                     self.leaf(child, name, unit, clocks, columns)
@@ -192,11 +192,11 @@ class _Walk:
                 break
             self.signals += _lines(leaf, name, unit, along, clock, columns)
             return
-        own = _clock_inside(leaf, name)
-        if own is not None:
+        inside = _clock_inside(leaf, name)
+        if inside is not None:
             along = 0 if rows >= width else 1
-            lines = _lines(leaf, name, unit, along, own, columns)
-            self.signals += [signal for signal in lines if signal.place != own.column]
+            lines = _lines(leaf, name, unit, along, inside, columns)
+            self.signals += [signal for signal in lines if signal.place != inside.column]
         else:
             self.clockless[name] = (name, unit, leaf, columns)
 

@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.logs.log import RecordingError
 
 SPEED, ANGLE, RATE = "speed", "angle", "yaw rate"
@@ -119,11 +119,11 @@ def to_si(unit: str, quantity: str, what: str) -> float:
     other = quantities(unit) or tuple(name for name, all_ in _OTHERS.items() if plain in all_)
     if other:
         raise RecordingError(
-            f"{what} must be in a unit of {_named(quantity)} ({known}), {shown(unit.strip())} is "
-            f"one of {_named(other[0])}; another channel?"
+            f"{what} must be in a unit of {_named(quantity)} ({known}), "
+            f"{displayed(unit.strip())} is one of {_named(other[0])}; another channel?"
         )
     raise RecordingError(
-        f"{what} has the unit {shown(unit.strip())}, which is not known; name one of "
+        f"{what} has the unit {displayed(unit.strip())}, which is not known; name one of "
         f"{_named(quantity)}: {known}"
     )
 

@@ -150,7 +150,7 @@ def _channels(
 
     Turns of wheels become speeds, where there is no v_x that tells their radius.
     """
-    names = list(dict.fromkeys(one for signal in signals.values() for one in signal.asked))
+    names = list(dict.fromkeys(one for signal in signals.values() for one in signal.requested))
     by_name = dict(zip(names, log.read(names, run), strict=True))
     found: dict[str, list[Raw]] = {}
     for ours, signal in signals.items():

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.logs.log import Heading, LogFile, RecordingError, some
 from models.logs.names import HINT, STILL, Proposal, propose
 from models.logs.signals import (
@@ -56,7 +56,7 @@ def chosen_signals(
     by_map = as_listed(log, log_map.signals, names)
     lost: tuple[str, ...] = ()
     if "v_x" in log_map.signals and "v_x" not in by_map:
-        channels = shown(" + ".join(log_map.signals["v_x"].channel))
+        channels = displayed(" + ".join(log_map.signals["v_x"].channel))
         lost = (f"there is no column {channels}: vx is computed from the wheels",)
     if log_map.is_complete:
         return _Reading(by_map, lost)
@@ -98,13 +98,13 @@ def as_listed(
     found = {}
     for name, signal in signals.items():
         channels = []
-        for channel in signal.asked:
+        for channel in signal.requested:
             likely = [channel] if channel in names else bare.get(channel, [])
             if not likely and name == "v_x" and has_wheels(signals):
                 break
             if len(likely) != 1:
                 raise RecordingError(
-                    f"{log.path}: there is no column {shown(channel)} to read as "
+                    f"{log.path}: there is no column {displayed(channel)} to read as "
                     f"{column_of(name)}; {_listing(likely or names)}"
                 )
             channels += likely

@@ -19,7 +19,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.files import resolved, write_atomically
 from models.logs.door import open_log
 from models.logs.log import LogFile, RecordingError
@@ -97,7 +97,9 @@ class LogMap:
     def __post_init__(self) -> None:
         require_fitting(self.signals, "")
         if self.axes not in AXES:
-            raise RecordingError(f"axes must be one of {', '.join(AXES)}, not {shown(self.axes)}")
+            raise RecordingError(
+                f"axes must be one of {', '.join(AXES)}, not {displayed(self.axes)}"
+            )
         for name, unit in (("longest_gap", ""), ("rate", "in Hz, "), ("low_pass", "")):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < math.inf:
@@ -107,7 +109,7 @@ class LogMap:
         for name, other in (("holes", CUT), ("order", MEND)):
             value = getattr(self, name)
             if value not in (_REFUSE, other):
-                raise RecordingError(f"{name} must be {_REFUSE} or {other}, not {shown(value)}")
+                raise RecordingError(f"{name} must be {_REFUSE} or {other}, not {displayed(value)}")
         for name, signal in self.signals.items():
             if signal.unit:
                 to_si(signal.unit, quantity_of(name, signal.unit), f"signals.{name}")
@@ -243,10 +245,10 @@ def given_signals(pairs: Sequence[str]) -> dict[str, Signal]:
         name, equals, rest = (part.strip() for part in pair.partition("="))
         ours = signal_name(name)
         if not (name and equals and rest):
-            raise RecordingError(f'--columns wants "NAME=COLUMN [UNIT]", not {shown(pair)}')
+            raise RecordingError(f'--columns wants "NAME=COLUMN [UNIT]", not {displayed(pair)}')
         if ours is None:
             known = ", ".join(QUANTITIES)
-            raise RecordingError(f"{shown(name)} is no column of ours: {known}")
+            raise RecordingError(f"{displayed(name)} is no column of ours: {known}")
         if ours in found:
             raise RecordingError(f"--columns gives {name} twice")
         found[ours] = given_channel(rest)
@@ -267,11 +269,11 @@ def given_channel(text: str) -> Signal:
     while found := _CHANGE.search(text):
         key, text = keys[found["sign"]], text[: found.start()]
         if key in given:
-            raise RecordingError(f"--columns gives the {key} of {shown(pair)} twice")
+            raise RecordingError(f"--columns gives the {key} of {displayed(pair)} twice")
         try:
             given[key] = float(found["number"])
         except ValueError:
-            raise RecordingError(f"--columns: {shown(found['number'])} is no number") from None
+            raise RecordingError(f"--columns: {displayed(found['number'])} is no number") from None
     if found := _UNIT.search(text):
         given["unit"], text = found["unit"].strip(), text[: found.start()]
     if found := _SIGN.search(text):
@@ -280,4 +282,4 @@ def given_channel(text: str) -> Signal:
     try:
         return Signal(channel=tuple(part.strip() for part in text.split(" + ")), **given)
     except RecordingError as error:
-        raise RecordingError(f"--columns {shown(pair)}: {error}") from None
+        raise RecordingError(f"--columns {displayed(pair)}: {error}") from None

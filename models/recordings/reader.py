@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.logs.door import ENDINGS, open_log
 from models.logs.log import LogFile, RecordingError
 from models.logs.memory import open_arrays
@@ -139,7 +139,7 @@ def with_columns(given: LogMap, columns: Mapping[str, str]) -> LogMap:
     """Return a map with columns that are given beside it; "t" is the time."""
     if not isinstance(columns, Mapping):
         raise RecordingError(
-            f'columns must be a mapping as {{"r": "yaw_rate"}}, it is {shown(columns)}'
+            f'columns must be a mapping as {{"r": "yaw_rate"}}, it is {displayed(columns)}'
         )
     signals = {name: words for name, words in columns.items() if name != "t"}
     given = given.with_signals(given_signals([f"{a}={b}" for a, b in signals.items()]))

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array, blocks, filled, large
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.logs.log import RecordingError
 from models.recordings.record import CHANNELS, MINIMUM_SAMPLES, Recording
 from models.schema import Table, changed
@@ -57,7 +57,7 @@ class Repair:
             for key, value in getattr(self, name).items():
                 if key not in known:
                     raise RecordingError(
-                        f"repair: {name} must be of {', '.join(known)}, not of {shown(key)}"
+                        f"repair: {name} must be of {', '.join(known)}, not of {displayed(key)}"
                     )
                 _require_finite(f"{name}.{key}", value)
                 if name == "factor" and value == 0.0:

@@ -125,7 +125,7 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: ca.SX, free: ca.SX) ->
 
     # Nobody is trusted: it goes on as it went, unless that leads away from all wheels.
     astray = ca.logic_all((c - ahead) * a < 0.0)
-    v_held, a_held = ca.if_else(astray, v, ahead), ca.if_else(astray, 0.0, a)
+    v_onward, a_onward = ca.if_else(astray, v, ahead), ca.if_else(astray, 0.0, a)
 
     # Driven wheels run ahead of the car, however little.
     likely = _rather(likely, free, ca.logic_not(a > BRAKED))
@@ -143,8 +143,8 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: ca.SX, free: ca.SX) ->
     slope = ca.fmin(ca.fmax(slope, -most), most)
     a_now = a + (1.0 - ca.exp(-passed / MEMORY)) * (slope - a)
     return _Trust(
-        ca.if_else(some, now, v_held),
-        ca.if_else(some, a_now, a_held),
+        ca.if_else(some, now, v_onward),
+        ca.if_else(some, a_now, a_onward),
         ca.if_else(some, 0.0, passed),
         ca.if_else(some, now, known),
     )

@@ -19,7 +19,7 @@ COPY = 1e-4  # of a signal, rms, that is left of it beside another one which it 
 _ALTERNATE = -0.35  # correlation of neighboring second differences, below which they are noise
 _NO_STEP = 1e-9  # of a signal's peak: values that differ by less are equal
 _ON_GRID = 0.99  # share of the steps of a rounded signal that are multiples of the smallest
-_ON_GRID_HELD = 0.9  # the same of values that repeat
+_ON_GRID_REPEATED = 0.9  # the same of values that repeat
 _FEW = 5  # steps that tell the rounding of values that repeat
 _GOES_ON = 0.6  # of a step after a rest, that the next but one has where a signal begins to move
 _SPIKE = 12.0  # times the noise beyond its neighbors
@@ -126,7 +126,7 @@ class Runs(NamedTuple):
         values say nothing.
         """
         kept = np.unique(signal[self.first[self.length > 2]])
-        return _step(kept, _ON_GRID_HELD) if kept.size > _FEW else None
+        return _step(kept, _ON_GRID_REPEATED) if kept.size > _FEW else None
 
     def lost(self, signal: Array, rounded: float | None) -> NDArray[np.bool_]:
         """Return which runs may be samples that were lost: a rest of a rounded signal is none.

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from codegen.errors import TireidError
-from codegen.escape import shown
+from codegen.escape import displayed
 from models.schema import read_bytes
 from models.tires.magic_formula_coefficients import ESSENTIAL, Coefficients
 
@@ -117,7 +117,7 @@ class TirFile:
             if math.isfinite(value):
                 return value
         raise self.error(
-            f"line {entry.line}: {key} must be a finite number, it is {shown(entry.value)}"
+            f"line {entry.line}: {key} must be a finite number, it is {displayed(entry.value)}"
         )
 
     def _text(

@@ -13,7 +13,7 @@ seen after 1.7/l. A channel that is stuck, flipped, scaled or noisy breaks the s
 import math
 from typing import NamedTuple
 
-from models.sensors import LARGEST_SHOWN, is_shown
+from models.sensors import LARGEST_MEASURED, is_measured
 from mpc.loop.sensing import Measured
 
 # How far good sensors may disagree.
@@ -55,7 +55,7 @@ class Consistency:
     """
 
     def __init__(self, dt: float) -> None:
-        self._dt, self._calm, self._calm_asked = dt, math.inf, CALM
+        self._dt, self._calm, self._calm_needed = dt, math.inf, CALM
         self._begin()
         self.agrees, self.worst = True, _NONE
 
@@ -63,29 +63,29 @@ class Consistency:
         self._predicted: tuple[float, ...] | None = None  # X, Y, ψ, v_y as predicted
         self._rates: tuple[float, ...] = ()
         self._means: tuple[float, ...] = (0.0,) * 6
-        self._last_asked = 0.0
+        self._last_requested = 0.0
 
-    def observe(self, measured: Measured, asked: float | None = None) -> bool:
+    def observe(self, measured: Measured, requested: float | None = None) -> bool:
         """Take a sample; return whether the sensors agree.
 
-        asked : angle asked of the wheels that should have been reached by now [rad]; None where it
+        requested : angle of the wheels that should have been reached by now [rad]; None where it
         is not known.
         """
-        self.worst = self._judged(measured, asked)
+        self.worst = self._judged(measured, requested)
         if self.worst.share > 1.0:
             if self.agrees and self._calm < RELAPSE:  # a channel that is bad now and then
-                self._calm_asked = min(2.0 * self._calm_asked, RELAPSE)
+                self._calm_needed = min(2.0 * self._calm_needed, RELAPSE)
             self._calm = 0.0
         else:
             self._calm += self._dt
             if self._calm >= RELAPSE:
-                self._calm_asked = CALM
-        self.agrees = self._calm >= self._calm_asked
+                self._calm_needed = CALM
+        self.agrees = self._calm >= self._calm_needed
         return self.agrees
 
-    def _judged(self, m: Measured, asked: float | None) -> Residual:
+    def _judged(self, m: Measured, requested: float | None) -> Residual:
         dt = self._dt
-        if not all(is_shown(channel, getattr(m, channel)) for channel in LARGEST_SHOWN):
+        if not all(is_measured(channel, getattr(m, channel)) for channel in LARGEST_MEASURED):
             self._begin()
             return _NOT_A_NUMBER
         cos_psi, sin_psi = math.cos(m.psi), math.sin(m.psi)
@@ -95,14 +95,14 @@ class Consistency:
             m.r,
             m.a_y - m.v_x * m.r,
         )
-        shown = (m.X, m.Y, m.psi, m.v_y)
+        measured = (m.X, m.Y, m.psi, m.v_y)
         if self._predicted is None:
-            self._predicted, self._rates = shown, rates
-            self._last_asked = m.delta if asked is None else asked
+            self._predicted, self._rates = measured, rates
+            self._last_requested = m.delta if requested is None else requested
         # Trapezoidal: half a sample of a turning car is 0.1 m/s across.
         moved = [0.5 * dt * (a + b) for a, b in zip(self._rates, rates, strict=True)]
         predicted = [a + b for a, b in zip(self._predicted, moved, strict=True)]
-        residuals = [a - b for a, b in zip(shown, predicted, strict=True)]
+        residuals = [a - b for a, b in zip(measured, predicted, strict=True)]
         residuals[2] = math.remainder(residuals[2], math.tau)
         self._predicted = tuple(
             x + RATE * dt * e for x, e in zip(predicted, residuals, strict=True)
@@ -113,9 +113,9 @@ class Consistency:
             residuals[1] * cos_psi - residuals[0] * sin_psi,
         )
         steering, turning = self._means[4:]
-        if asked is not None:
-            steering, turning = m.delta - asked, abs(asked - self._last_asked) / dt
-            self._last_asked = asked
+        if requested is not None:
+            steering, turning = m.delta - requested, abs(requested - self._last_requested) / dt
+            self._last_requested = requested
         pulled = [RATE * one for one in (along, across, residuals[2], residuals[3])]
         now = (*pulled, steering, turning)
         self._means = tuple(a + RATE * dt * (b - a) for a, b in zip(self._means, now, strict=True))

@@ -67,7 +67,7 @@ class Learner:
 
         tracker : which steers; its tire is moved.
         """
-        agree = self._sensors.observe(measured, self._asked(tracker))
+        agree = self._sensors.observe(measured, self._requested(tracker))
         decision = self.supervisor.observe(
             measured.v_x,
             measured.v_y,
@@ -83,7 +83,7 @@ class Learner:
         self._move(tracker)
         return f"{decision.verdict.value}: {decision.reason}" if decision and changed else None
 
-    def _asked(self, tracker: Tracker) -> float | None:
+    def _requested(self, tracker: Tracker) -> float | None:
         """Return the angle that the wheels should have by now [rad], None before it is known."""
         ago = tracker.delay / tracker.period
         self._steered.append(tracker.steering)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from models.sensors import is_shown
+from models.sensors import is_measured
 from mpc.cars import CarState, DoubleTrackCar
 from mpc.loop.lateral import LateralVelocity
 from mpc.loop.record import Drive, Recorder
@@ -86,10 +86,10 @@ def drive(
     place = _Place(state.X, state.Y, state.psi, state.v_x, 0.0, 0.0, (0.0,) * len(GUIDES))
     ending = ""
     while not ending:
-        shown = measured = sensors.measure(state, rng)
-        given = None if lateral is None else lateral.tell(shown)
+        sensed = measured = sensors.measure(state, rng)
+        given = None if lateral is None else lateral.tell(sensed)
         if given is not None:
-            measured = given.in_place_of(shown)
+            measured = given.in_place_of(sensed)
         place = _located(measured, place, car.period)
         for channel in place.just_lost(car.period):
             record.note(state.t, f"{channel} is no number: dead reckoning")
@@ -101,8 +101,8 @@ def drive(
         situation = Measurement(
             e_y=projected.e_y,
             e_psi=projected.heading_error(place.psi),
-            v_y=measured.v_y if is_shown("v_y", measured.v_y) else math.nan,
-            r=measured.r if is_shown("r", measured.r) else math.nan,
+            v_y=measured.v_y if is_measured("v_y", measured.v_y) else math.nan,
+            r=measured.r if is_measured("r", measured.r) else math.nan,
             kappa=ahead.kappa,
             v_x=ahead.v_x,
         )
@@ -111,7 +111,7 @@ def drive(
         if record.plan_is_due:
             there = profile.ahead(projected.s, place.v_x, tracker.plan_times, car.speed_gain)
             record.plan(command, there.s)
-        record.add(state, here, shown, v_ref, command, given)
+        record.add(state, here, sensed, v_ref, command, given)
         waiting.append(command.steering)
         try:
             state = car.step(state, waiting.popleft(), v_ref)
@@ -167,17 +167,17 @@ class _Place(NamedTuple):
 def _located(measured: Measured, last: _Place, dt: float) -> _Place:
     """Return the measured place; what shows no number goes on by dead reckoning."""
 
-    def shown(channel: str, otherwise: float) -> float:
+    def value_of(channel: str, otherwise: float) -> float:
         value: float = getattr(measured, channel)
-        return value if is_shown(channel, value) else otherwise
+        return value if is_measured(channel, value) else otherwise
 
-    v_x, v_y, r = shown("v_x", last.v_x), shown("v_y", last.v_y), shown("r", last.r)
-    psi = shown("psi", last.psi + dt * r)
+    v_x, v_y, r = value_of("v_x", last.v_x), value_of("v_y", last.v_y), value_of("r", last.r)
+    psi = value_of("psi", last.psi + dt * r)
     cos_psi, sin_psi = math.cos(psi), math.sin(psi)
-    X = shown("X", last.X + dt * (v_x * cos_psi - v_y * sin_psi))
-    Y = shown("Y", last.Y + dt * (v_x * sin_psi + v_y * cos_psi))
+    X = value_of("X", last.X + dt * (v_x * cos_psi - v_y * sin_psi))
+    Y = value_of("Y", last.Y + dt * (v_x * sin_psi + v_y * cos_psi))
     silent = tuple(
-        0.0 if is_shown(channel, getattr(measured, channel)) else time + dt
+        0.0 if is_measured(channel, getattr(measured, channel)) else time + dt
         for channel, time in zip(GUIDES, last.silent, strict=True)
     )
     return _Place(X, Y, psi, v_x, v_y, r, silent)

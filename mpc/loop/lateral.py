@@ -20,7 +20,7 @@ from codegen.arrays import Array
 from identifier.inertial.beliefs import Body
 from identifier.run import OnlineIdentifier
 from models.rules import require_positive_fields
-from models.sensors import is_shown
+from models.sensors import is_measured
 from mpc.loop.sensing import Measured
 
 _UNKNOWN = 1.0  # m/s: standard deviation of v_y where nothing is known
@@ -118,7 +118,7 @@ class LateralVelocity:
         if math.isnan(self._v_y):
             self._v_y, self._P[1, 1] = (v_y, sd**2) if math.isfinite(v_y) else (0.0, _UNKNOWN**2)
         felt = m.a_y - self._bias
-        if is_shown("a_y", m.a_y):
+        if is_measured("a_y", m.a_y):
             level = felt - self._roll * self._rolls[0]
             self._rolls = self._body.step(self._rolls, level, dt)
         level = felt - self._roll * self._rolls[0]
@@ -143,7 +143,7 @@ class LateralVelocity:
     def _go_on(self, m: Measured, level: float) -> None:
         """Move place and velocity by a sample of an acceleration in the plane of the road."""
         trust, dt = self.trust, self._dt
-        felt = all(is_shown(name, getattr(m, name)) for name in ("v_x", "r", "a_y"))
+        felt = all(is_measured(name, getattr(m, name)) for name in ("v_x", "r", "a_y"))
         slides = level + self._bias - m.v_x * m.r if felt else self._bias
         last, before = self._last if self._last is not None else (m, slides)
         then = self._v_y
@@ -156,10 +156,10 @@ class LateralVelocity:
         F[0, 1], F[2, 2] = dt, kept
         if felt:
             F[1, 2], F[1, 3] = -dt, -dt * self._rolls[0]
-        turned = m.v_x * trust.heading * dt if is_shown("v_x", m.v_x) else 0.0
+        turned = m.v_x * trust.heading * dt if is_measured("v_x", m.v_x) else 0.0
         Q = np.diag([turned**2, error**2, trust.bias**2 * (1.0 - kept**2), 0.0])
         self._P = F @ self._P @ F.T + Q
-        if not all(is_shown(name, getattr(m, name)) for name in ("X", "Y", "psi", "v_x")):
+        if not all(is_measured(name, getattr(m, name)) for name in ("X", "Y", "psi", "v_x")):
             self._place = None
         elif self._place is None:
             self._place = np.array([m.X, m.Y])

@@ -159,18 +159,20 @@ class FaultySensors:
 
         rng : source of the noise; of a fault's own noise too, so that it changes no other draw.
         """
-        shown = self._sensors.measure(state, rng)
-        last_good = self._good if self._good is not None else shown
-        good = shown
+        measured = self._sensors.measure(state, rng)
+        last_good = self._good if self._good is not None else measured
+        good = measured
         for fault in self._faults:
             name = fault.channel
             if fault.active(state.t):
                 noise = np.random.default_rng(round(1e6 * state.t)).standard_normal()
-                value = fault.shown(state.t, getattr(shown, name), getattr(last_good, name), noise)
-                shown = shown._replace(**{name: float(value)})
+                value = fault.measured(
+                    state.t, getattr(measured, name), getattr(last_good, name), noise
+                )
+                measured = measured._replace(**{name: float(value)})
                 good = good._replace(**{name: getattr(last_good, name)})
         self._good = good
-        return shown
+        return measured
 
 
 Measures: TypeAlias = CarSensors | FaultySensors  # what a loop measures a car with

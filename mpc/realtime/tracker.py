@@ -137,13 +137,13 @@ class Tracker:
         if self._preview is None:
             single = now.state["u"].dtype == np.float32
             self._preview = Instance(self.tire.structure, self.problem.horizon, single=single)
-        asked = self._preview
-        for there, here in zip(asked.numbers, now.numbers, strict=True):
+        preview = self._preview
+        for there, here in zip(preview.numbers, now.numbers, strict=True):
             there[...] = here
-        self._write_tire(asked, tire)
-        asked.start[:] = now.state["x"][0]
-        asked.solve()
-        return float(asked.state["u"][0])
+        self._write_tire(preview, tire)
+        preview.start[:] = now.state["x"][0]
+        preview.solve()
+        return float(preview.state["u"][0])
 
     def _write_tire(self, instance: Instance, tire: PredictionTire) -> None:
         """Write weights, car, and the slip that is of use; what was prepared is of another tire."""

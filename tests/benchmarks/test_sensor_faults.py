@@ -41,7 +41,7 @@ def test_the_compiled_run_is_that_of_a_car_sample_by_sample(drive, name):
     online, broken = OnlineIdentifier(design, car, log.dt), fault.active(log.t)
     signals = {one: np.array(getattr(log, one)) for one in ("v_x", "v_y", "r", "delta_f")}
     good = signals[fault.channel]
-    signals[fault.channel] = np.where(broken, fault.shown(log.t, good, math.nan, math.nan), good)
+    signals[fault.channel] = np.where(broken, fault.measured(log.t, good, math.nan, math.nan), good)
     first = None
     for k, t in enumerate(log.t):
         v_x, v_y, r, delta_f = (float(one[k]) for one in signals.values())

@@ -28,8 +28,8 @@ def test_a_stiffness_is_printed_in_kilonewtons_of_a_car_of_any_size():
 def test_a_summary_says_what_the_model_misses_once_somebody_looked(tmp_path):
     run = ti.identify(ti.sample_recording(), ti.sedan())
     verdict, tire = run.verdict, run.tire
-    assert tuple(tire.force_missed) == verdict.force_missed
-    front, rear = (with_doubt(100.0 * share) for share in verdict.force_missed)
+    assert tuple(tire.model_error) == verdict.model_error
+    front, rear = (with_doubt(100.0 * share) for share in verdict.model_error)
     (line,) = (one for one in tire.summary().splitlines() if one.startswith("model error"))
     assert line.split()[-2:] == [front, rear]
     for number in verdict.numbers:
@@ -38,7 +38,7 @@ def test_a_summary_says_what_the_model_misses_once_somebody_looked(tmp_path):
     assert f"({NOT_IDENTIFIABLE})" in gentle.summary()
     tire.save(tmp_path / "tire.json")
     assert ti.TireModel.load(tmp_path / "tire.json").summary() == tire.summary()
-    assert run.freeze().force_missed is None
+    assert run.freeze().model_error is None
     assert "model error" not in run.freeze().summary()
     for other in (tire.at_friction(0.5), tire.mounted_on(tire.vehicle)):
-        assert other.force_missed is None
+        assert other.model_error is None

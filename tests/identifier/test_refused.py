@@ -158,7 +158,7 @@ def test_forces_are_zero_and_stale_after_half_a_second_without_a_sample(name, sl
             np.testing.assert_array_equal(force, 0.0)
             assert all((value == 0.0).all() for value in online.outputs.values())
     assert np.abs(force).max() > 100.0
-    assert online.counts.missed == 0
+    assert online.counts.refused_in_row == 0
 
 
 def test_a_held_force_is_told_until_it_is_stale(slalom):

@@ -26,8 +26,10 @@ LAG, OFFSET = np.array([0.9, 0.6]), np.array([0.004, -0.08])  # m; rad and m/s
 def told(method, recording, car, **signals):
     """All that a step tells and carries, with some signals replaced."""
     setup = method.setup(car)
-    shown = setup.shown(recording)
-    return setup.scan(shown.samples, {**setup.carry, **shown.signals, **signals, **setup.constants})
+    sampled = setup.sampled(recording)
+    return setup.scan(
+        sampled.samples, {**setup.carry, **sampled.signals, **signals, **setup.constants}
+    )
 
 
 def rms(x):

@@ -29,16 +29,16 @@ def test_a_fault_lasts_from_its_start_to_its_end():
 )  # fmt: skip
 def test_each_kind_shows_what_it_says(kind, expected):
     """Half a second into the fault a good sensor shows 3, it began at 7, the noise is 2."""
-    assert fault(kind).shown(2.5, 3.0, 7.0, 2.0) == pytest.approx(expected)
+    assert fault(kind).measured(2.5, 3.0, 7.0, 2.0) == pytest.approx(expected)
 
 
 def test_a_lost_channel_shows_no_number():
-    assert np.isnan(fault("lost").shown(2.5, 3.0, 7.0, 2.0))
+    assert np.isnan(fault("lost").measured(2.5, 3.0, 7.0, 2.0))
 
 
 def test_spikes_are_single_samples():
     t = 2.0 + 0.01 * np.arange(150)
-    beside = fault("spiking").shown(t, 3.0, 7.0, 0.0) - 3.0
+    beside = fault("spiking").measured(t, 3.0, 7.0, 0.0) - 3.0
     hit = np.flatnonzero(beside)
     assert set(beside[hit]) == {0.5}
     assert hit.size == 12

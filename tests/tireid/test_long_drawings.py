@@ -12,7 +12,7 @@ from models.recordings import Recording
 from models.vehicle import sedan
 from tireid.figures import thinned
 from tireid.figures.forces import inputs_figure
-from tireid.figures.thinned import cloud, drawn_times, shown, shown_of_run
+from tireid.figures.thinned import cloud, drawn_of_run, drawn_samples, drawn_times
 from tireid.learning import identify
 from tireid.output import write_csv, write_long_csv
 from tireid.reports.common import _recording_digest
@@ -28,7 +28,7 @@ def signal(rng):
 def test_all_samples_of_a_short_recording_are_drawn(rng):
     t = 0.01 * np.arange(1000)
     within = np.flatnonzero((t >= 1.0) & (t <= 2.0))
-    np.testing.assert_array_equal(shown(t, (1.0, 2.0)), within)
+    np.testing.assert_array_equal(drawn_samples(t, (1.0, 2.0)), within)
 
 
 def test_no_peak_is_lost_and_few_points_are_drawn(signal, rng):
@@ -36,7 +36,7 @@ def test_no_peak_is_lost_and_few_points_are_drawn(signal, rng):
     spikes = rng.choice(N, 20, replace=False)
     signal[spikes] = rng.choice([-1.0, 1.0], 20) * rng.uniform(8.0, 9.0, 20)
     other = np.column_stack([signal[::-1], np.zeros(N)])
-    part = shown(t, (t[0], t[-1]), signal, other)
+    part = drawn_samples(t, (t[0], t[-1]), signal, other)
     assert len(part) < 8 * thinned.COLUMNS
     assert (np.diff(part) > 0).all()
     assert (part[0], part[-1]) == (0, N - 1)
@@ -48,7 +48,7 @@ def test_no_peak_is_lost_and_few_points_are_drawn(signal, rng):
 
 def test_a_window_of_a_long_recording_is_drawn_within_its_ends(signal):
     t = 0.01 * np.arange(N)
-    few, many = (shown(t, (10.0, end), signal) for end in (20.0, 3010.0))
+    few, many = (drawn_samples(t, (10.0, end), signal) for end in (20.0, 3010.0))
     np.testing.assert_array_equal(few, np.arange(1000, 2001))
     assert (many[0], many[-1]) == (1000, 301_000)
 
@@ -102,12 +102,12 @@ def test_what_a_run_recorded_is_drawn_with_its_peaks(drive, monkeypatch):
     def tell(block):
         return [track.values for track in history.tracks_over(block)]
 
-    _, whole = shown_of_run(history, tell)
+    _, whole = drawn_of_run(history, tell)
     for module in (arrays, thinned):
         monkeypatch.setattr(module, "LONG", 500)
     monkeypatch.setattr(arrays, "BLOCK", 170)
     monkeypatch.setattr(thinned, "COLUMNS", 30)
-    t, some = shown_of_run(history, tell)
+    t, some = drawn_of_run(history, tell)
     assert (np.diff(t) > 0.0).all()
     assert t.size < 0.5 * len(drive)
     for one, all_of_it in zip(some, whole, strict=True):

@@ -59,7 +59,7 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
     return lines
 
 
-_NOT_SHOWN = "get no v_y; they estimate it, and side slip is judged by the recorded one"
+_WITHOUT_V_Y = "get no v_y; they estimate it, and side slip is judged by the recorded one"
 
 
 def summary_table(comparison: Comparison) -> str:
@@ -77,7 +77,7 @@ def remarks(comparison: Comparison) -> list[str]:
             method = make_method(name, comparison.course.vehicle, comparison.seed)
             notes.setdefault(method.remark, []).append(name)
             if "v_y" not in method.needs:
-                notes.setdefault(_NOT_SHOWN, []).append(name)
+                notes.setdefault(_WITHOUT_V_Y, []).append(name)
     for name, why in comparison.left_out.items():
         notes.setdefault(why, []).append(name)
     return [f"{', '.join(names)}: {remark}" for remark, names in notes.items() if remark]

@@ -46,7 +46,7 @@ from tireid.reports.identify import (
     learnt_blocks,
 )
 from tireid.verdicts import (
-    missed_headline,
+    model_error_headline,
     number_headlines,
     verdict_headline,
     verdict_section,
@@ -242,7 +242,7 @@ def _demo_report(
         summary=_SUMMARY,
         numbers=[
             verdict_headline(verdict),
-            *missed_headline(verdict),
+            *model_error_headline(verdict),
             *number_headlines(verdict),
             *identify_headlines(story.axle),
             *drive_numbers(driven),

@@ -36,7 +36,7 @@ from tireid.fleet.watch import ALARM, BASELINE, watch
 from tireid.output import output_folder, text_table, write_json
 from tireid.progress import Progress, Stopwatch, say, tell
 
-_SHOWN = 5  # logs with errors that are named
+_LISTED = 5  # logs with errors that are named
 
 
 def add_parser(commands: Any) -> None:
@@ -121,7 +121,7 @@ def _learn(options: argparse.Namespace) -> int:
     """Learn logs into a store; return 1 where a log could not be used."""
     clock, jobs, log_map = Stopwatch(), jobs_of(options), given_map(options)
     tasks, left = find_logs(options.logs, options.vehicle, options.tags)
-    for log, why in list(left.items())[:_SHOWN]:
+    for log, why in list(left.items())[:_LISTED]:
         say(f"{log}: left out, {why}")
     if log_map.dbc:  # whoever reads a log may run in another folder
         log_map = replace(log_map, dbc=str(Path(log_map.dbc).absolute()))
@@ -146,7 +146,7 @@ def _learn(options: argparse.Namespace) -> int:
     columns = (*INDEX, "seconds", "valid")
     rows = [row for row in store.stream(columns) if row.file in files]
     errors = [row for row in rows if row.error]
-    for row in errors[:_SHOWN]:
+    for row in errors[:_LISTED]:
         say(f"{row.name}: {row.error}")
     hours = sum(row.seconds or 0.0 for row in rows) / 3600.0
     refused = sum(row.valid is False for row in rows)

@@ -110,7 +110,7 @@ def run(options: argparse.Namespace) -> int:
         pieces = learnt.parts(logs) if len(logs) > 1 else []
         noted = partial(with_doctor, diagnosis=diagnosis, repair=repair)
         found = Results.learnt(law, runs, freeze_times, others, pieces, noted)
-        verdict, asked = found.verdict, found.asked
+        verdict, replayed = found.verdict, found.evaluated
         figures = found.write(folder, progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(folder, found, figures, diagnosis, options.words)
@@ -118,7 +118,7 @@ def run(options: argparse.Namespace) -> int:
             found.table(),
             _closing_line(learnt, last, vehicle),
             doctor_text(diagnosis, repair, options.repair),
-            verdicts_text(asked, "replayed on"),
+            verdicts_text(replayed, "replayed on"),
             verdict_text(verdict),
         )
     if repair:
@@ -126,7 +126,7 @@ def run(options: argparse.Namespace) -> int:
         say(f"wrote {options.repair}")
     tell("\n".join(part for part in given if part))
     say(f"wrote {options.out}/")
-    return max(shared.exit_code(one, options) for one in (verdict, *asked.values()))
+    return max(shared.exit_code(one, options) for one in (verdict, *replayed.values()))
 
 
 def _require_model(law: str, design: Method, vehicle: Vehicle) -> None:

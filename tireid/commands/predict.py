@@ -30,15 +30,15 @@ from tireid.learning import replay
 from tireid.progress import say, tell
 from tireid.reports.common import READ, REPORT, drawing, origin
 from tireid.reports.identify import (
-    asked_warnings,
     band_sentence,
     curve_drawing,
     error_numbers,
     error_table,
+    stored_model_warnings,
 )
 from tireid.verdicts import (
     known_headline,
-    missed_headline,
+    model_error_headline,
     of_answer,
     stored_warning,
     verdict_headline,
@@ -132,10 +132,10 @@ def summary(prediction: Prediction, half: Array | None) -> dict[str, Any]:
     half : width of the band (n, 2) [N]; None where the model has none.
     """
     model, recording, motion = prediction.model, prediction.recording, prediction.motion
-    friction, truth, held = prediction.verdict.friction, recording.axle_force, None
+    friction, truth, coverage = prediction.verdict.friction, recording.axle_force, None
     if half is not None and truth is not None and (half > 0.0).any():
         inside = (np.abs(prediction.axle_force - truth) <= half) & (half > 0.0)
-        held = inside.sum(axis=0) / np.maximum((half > 0.0).sum(axis=0), 1)
+        coverage = inside.sum(axis=0) / np.maximum((half > 0.0).sum(axis=0), 1)
     return {
         "verdict": prediction.verdict.to_dict(),
         "recording": recording.name,
@@ -154,7 +154,7 @@ def summary(prediction: Prediction, half: Array | None) -> dict[str, Any]:
         "known_slip_rad": model.known_slip,
         "beyond_known_slip": beyond_known(model, recording),
         "windows_within_band": within_band(model, recording),
-        "truth_within_band": held,
+        "truth_within_band": coverage,
         "friction": None
         if friction is None
         else {"unchanged": friction.unchanged, "roads": [one._asdict() for one in friction.roads]},
@@ -219,7 +219,10 @@ def write_predict_report(
     lines : what is said of it beside its errors.   source : the model's file.
     """
     model, recording, verdict = prediction.model, prediction.recording, prediction.verdict
-    notes: list[str | page.Marked] = [*stored_warning(source), *asked_warnings(model, recording)]
+    notes: list[str | page.Marked] = [
+        *stored_warning(source),
+        *stored_model_warnings(model, recording),
+    ]
     error, found = prediction.against_truth, list[page.Block]()
     if error is not None:
         found.append(error_table([[recording.name, *error_numbers(error, prediction.true_force)]]))
@@ -242,7 +245,7 @@ def write_predict_report(
         "identification.",
         numbers=[
             verdict_headline(verdict, notes),
-            *of_answer(verdict, [*missed_headline(verdict), *_predict_headlines(prediction)]),
+            *of_answer(verdict, [*model_error_headline(verdict), *_predict_headlines(prediction)]),
         ],
         lead=[curve_drawing(figures, verdict)],
         warnings=[*verdict_warnings(verdict), *notes],

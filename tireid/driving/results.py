@@ -153,8 +153,8 @@ class Drives(NamedTuple):
         save_figures(folder, figures)
         if film != NO_FILM:
             title = f"{first.drive.path.name}: {first.label} tires"
-            shown = Film(title, drives, curves, setup.drops, first.known, first.model)
-            write_film(folder / f"drive.{film}", shown)
+            drawn = Film(title, drives, curves, setup.drops, first.known, first.model)
+            write_film(folder / f"drive.{film}", drawn)
         return figures
 
     def text(self) -> str:

@@ -27,10 +27,10 @@ def method_label(name: str) -> str:
     return mathtext(name.replace("_", " "))
 
 
-ONLINE, _OWN, _OTHER = "online", "frozen, same drive", "frozen, other recordings"
+ONLINE, _SAME, _OTHER = "online", "frozen, same drive", "frozen, other recordings"
 _KINDS = {
     ONLINE: (style.BLUE, "o", -0.22),
-    _OWN: (style.GREEN, "D", 0.0),
+    _SAME: (style.GREEN, "D", 0.0),
     _OTHER: (style.ORANGE, "s", 0.22),
 }
 
@@ -51,8 +51,8 @@ def methods_figure(comparison: Comparison) -> Figure:
         for kind, values in errors.items():
             if values:
                 color, marker, shift = _KINDS[kind]
-                y, shown = position + shift, np.minimum(values, _FARTHEST * 1.1)
-                axes.hlines(y, shown.min(), shown.max(), color=color, linewidth=1.0, alpha=0.6)
+                y, drawn = position + shift, np.minimum(values, _FARTHEST * 1.1)
+                axes.hlines(y, drawn.min(), drawn.max(), color=color, linewidth=1.0, alpha=0.6)
                 mean = min(float(np.mean(values)), _FARTHEST * 1.1)
                 axes.plot(mean, y, marker, color=color, ms=4.5, clip_on=False, label=kind)
         if label in lost:
@@ -79,5 +79,5 @@ def _method_errors(comparison: Comparison, name: str) -> dict[str, list[float]]:
     trial, course = comparison.trials[name], comparison.course
     sane = {rec: error for rec, error in trial.online.items() if rec not in trial.diverged_at}
     online = [course.share(rec, error) for rec, error in sane.items()]
-    frozen = zip((_OWN, _OTHER), same_and_other(trial.frozen or {}), strict=True)
+    frozen = zip((_SAME, _OTHER), same_and_other(trial.frozen or {}), strict=True)
     return {ONLINE: online} | {kind: [course.share(*one) for one in some] for kind, some in frozen}

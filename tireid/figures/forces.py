@@ -21,7 +21,7 @@ from models.recordings import Recording
 from models.rules import require_kind
 from models.vehicle import Vehicle
 from tireid.figures import style
-from tireid.figures.thinned import drawn_times, shown
+from tireid.figures.thinned import drawn_samples, drawn_times
 
 _Curve = tuple[Array, Mapping[str, Any]]  # forces of both axles (n, 2) [N], and their look
 _RESIDUAL: Mapping[str, Any] = {  # noise for the most part, which would make a drawing large
@@ -35,7 +35,7 @@ def _force_panels(
     recording: Recording,
     rows: Sequence[tuple[str, Sequence[_Curve]]],
     known: Array | None,
-    missed: Sequence[_Curve],
+    judged: Sequence[_Curve],
     window: tuple[float, float] | None = None,
     heights: tuple[float, float] = (2.0, 1.0),
 ) -> tuple[Figure, NDArray[Any], style.ForceUnit]:
@@ -48,14 +48,14 @@ def _force_panels(
     curves = [force for _, row in rows for force, _ in row]
     reference = curves[0] if known is None else known
     errors = [force - reference for force in curves]
-    part = shown(recording.t, ends, reference, *curves, *errors)
+    part = drawn_samples(recording.t, ends, reference, *curves, *errors)
     t, unit = drawn_times(recording, recording.t[part]), style.force_unit_of(reference[part])
 
     def scaled(force: Array) -> Array:
         return force[part] / unit.newtons
 
     limits = style.force_range(scaled(reference), *map(scaled, curves))
-    residuals = [] if known is None else [(scaled(f) - scaled(known), look) for f, look in missed]
+    residuals = [] if known is None else [(scaled(f) - scaled(known), look) for f, look in judged]
     ratios = [heights[0]] * len(rows) + [heights[1]] * bool(residuals)
     figure, panels = style.axle_panels(ratios, room=0.9)
     for axle, name in enumerate(style.AXLES):
@@ -100,16 +100,16 @@ def force_figure(
     replays = dict(sorted((replays or {}).items()))
     recording, truth, first = history.recording, history.recording.axle_force, int(history.online)
     online: list[_Curve] = [(history.axle_force, style.ONLINE)] * first
-    shown_in_all = online if truth is None else [(truth, style.TRUTH), *online]
+    drawn_in_all = online if truth is None else [(truth, style.TRUTH), *online]
     frozen = {at: (replay.axle_force, style.FROZEN) for at, replay in replays.items()}
-    rows: list[tuple[str, Sequence[_Curve]]] = [(", online", shown_in_all)] * first
+    rows: list[tuple[str, Sequence[_Curve]]] = [(", online", drawn_in_all)] * first
     rows += [
-        (f", {style.frozen_title(recording.t, at)}", [*shown_in_all, curve])
+        (f", {style.frozen_title(recording.t, at)}", [*drawn_in_all, curve])
         for at, curve in frozen.items()
     ]
     known = history.axle_force if truth is None and first else truth
-    missed = [*(online if truth is not None else []), *list(frozen.values())[-1:]]
-    figure, panels, unit = _force_panels(recording, rows, known, missed, window, (1.45, 1.05))
+    judged = [*(online if truth is not None else []), *list(frozen.values())[-1:]]
+    figure, panels, unit = _force_panels(recording, rows, known, judged, window, (1.45, 1.05))
     error = online_error(history, since=since)
     for axle, name in enumerate(style.AXLES):
         if history.diverged_at is not None:
@@ -173,7 +173,7 @@ def inputs_figure(recording: Recording) -> Figure:
         "$a_y$ [m/s²]": recording.a_y,
     }
     signals = {label: one for label, one in logged.items() if one is not None}
-    part = shown(recording.t, ends, recording.delta_r, *signals.values())
+    part = drawn_samples(recording.t, ends, recording.delta_r, *signals.values())
     t = drawn_times(recording, recording.t[part])
     figure = style.new_figure(0.5 + 1.05 * len(signals))
     panels = figure.subplots(len(signals), 1, sharex=True)

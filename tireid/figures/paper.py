@@ -15,7 +15,7 @@ from identifier.setup import force_unit_name
 from identifier.stability.loop import Loop, eigenvalues, root_locus
 from identifier.stability.margins import gain_margin, phase_margin
 from tireid.figures import style
-from tireid.figures.thinned import shown_of_run
+from tireid.figures.thinned import drawn_of_run
 
 _WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
 _OFFSET = 0.2  # between neighboring laws, as a share of the distance of columns
@@ -38,7 +38,7 @@ def error_figure(
     """
     recording = history.recording
     # A root of squares would overflow where a law diverges; hypot does not.
-    t, (norm,) = shown_of_run(history, lambda block: [np.hypot(*block.outputs["xi_tilde"].T)])
+    t, (norm,) = drawn_of_run(history, lambda block: [np.hypot(*block.outputs["xi_tilde"].T)])
     known = {name: bound for name, bound in (bounds or {}).items() if np.isfinite(bound)}
     drawn = norm[np.isfinite(norm) & (norm > 0.0) & (norm < 1e12)]
     typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
@@ -84,7 +84,7 @@ def weights_figure(history: History, freeze_times: Sequence[float] = ()) -> Figu
     freeze_times : times at which weights were taken [s].
     """
     recording, design = history.recording, style.paper_design(history)
-    t, (W, V) = shown_of_run(history, lambda block: [block.before["W"], block.before["V"]])
+    t, (W, V) = drawn_of_run(history, lambda block: [block.before["W"], block.before["V"]])
 
     figure = style.new_figure(4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)

@@ -15,19 +15,19 @@ _POINTS: Mapping[str, Any] = {"linestyle": "", "marker": ".", "markersize": 3.0,
 
 
 @style.styled
-def motion_figure(shown: WindowForces, vehicle: Vehicle) -> Figure:
+def motion_figure(windows: WindowForces, vehicle: Vehicle) -> Figure:
     """Draw the force that the motion shows and that of the model, and what is missed below."""
     loads = np.array(vehicle.axle_loads)
-    measured, modelled = shown.measured * loads, shown.modelled * loads
+    measured, modelled = windows.measured * loads, windows.modelled * loads
     unit = style.force_unit_of(measured)
     figure, panels = style.axle_panels([2.0, 1.0])
     for axle, (upper, lower) in enumerate(panels.T):
         seen, said = measured[:, axle] / unit.newtons, modelled[:, axle] / unit.newtons
-        upper.plot(shown.t, seen, color=style.BLACK, label="from the motion", **_POINTS)
-        upper.plot(shown.t, said, color=style.ORANGE, label="model", **_POINTS)
+        upper.plot(windows.t, seen, color=style.BLACK, label="from the motion", **_POINTS)
+        upper.plot(windows.t, said, color=style.ORANGE, label="model", **_POINTS)
         lower.axhline(0.0, color=style.BLACK, linewidth=0.6)
-        lower.plot(shown.t, said - seen, color=style.ORANGE, **_POINTS)
-        style.label_time(lower, shown.t)
+        lower.plot(windows.t, said - seen, color=style.ORANGE, **_POINTS)
+        style.label_time(lower, windows.t)
     panels[0, 0].set_ylabel(f"mean force [{unit.name}]")
     panels[1, 0].set_ylabel(f"missed [{unit.name}]")
     return figure

@@ -14,7 +14,7 @@ from models.recordings import Recording
 from tireid.figures import style
 from tireid.figures.compare import method_label, short_names
 from tireid.figures.drive import ARC
-from tireid.figures.thinned import drawn_times, shown
+from tireid.figures.thinned import drawn_samples, drawn_times
 
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
@@ -65,7 +65,7 @@ def _draw(
     """Draw the side slip of a recording, with the band of the first estimate."""
     truth, first = recording.logged_v_y, next(iter(given.values()))
     ends = recording.t[0], recording.t[-1]
-    part = shown(recording.t, ends, *(one.v_y for one in given.values()))
+    part = drawn_samples(recording.t, ends, *(one.v_y for one in given.values()))
     t = drawn_times(recording, recording.t[part])
 
     def slip(v_y: Array) -> Array:

@@ -32,7 +32,7 @@ RESOLUTION = 200  # [dots per inch]
 CLOUDS = 130  # dots per inch of what is pixels in a drawing
 # s: of a clock that begins later, as a Unix time does, only the last digits are shown
 FAR = 1e5
-DIGITS_SHOWN = 100.0  # s
+CLOCK_STEP = 100.0  # s
 # an axis reaches at most this many times beyond the force it is compared with
 FARTHEST = 3.0
 
@@ -107,8 +107,8 @@ def axle_panels(
 def label_forces(panels: NDArray[Any], unit: "ForceUnit", *, residual: bool) -> None:
     """Name the axes of rows of forces, the last row of residuals where there is one."""
     for row, axes in enumerate(panels[:, 0]):
-        missed = residual and row == len(panels) - 1
-        axes.set_ylabel(f"{'residual' if missed else 'lateral force'} [{unit.name}]")
+        of_residuals = residual and row == len(panels) - 1
+        axes.set_ylabel(f"{'residual' if of_residuals else 'lateral force'} [{unit.name}]")
 
 
 @contextmanager
@@ -166,7 +166,7 @@ def _clock_zero(t: Array) -> float:
     t : times of the samples (n,) [s].
     """
     first = float(t[0])
-    return 0.0 if abs(first) < FAR else DIGITS_SHOWN * float(np.floor(first / DIGITS_SHOWN))
+    return 0.0 if abs(first) < FAR else CLOCK_STEP * float(np.floor(first / CLOCK_STEP))
 
 
 def frozen_title(t: Array, t_freeze: float) -> str:

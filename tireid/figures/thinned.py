@@ -20,7 +20,7 @@ COLUMNS = 1500  # of pixels, more than any panel has
 _Samples = NDArray[np.intp]  # indices
 
 
-def shown(t: Array, ends: tuple[float, float], *signals: Array) -> _Samples:
+def drawn_samples(t: Array, ends: tuple[float, float], *signals: Array) -> _Samples:
     """Return which samples within the ends of a time axis are drawn.
 
     t : times of the samples (n,) [s].   ends : first and last time [s].
@@ -58,7 +58,7 @@ def _outermost(signals: Iterable[Array], of: int) -> _Samples:
     return np.unique(np.hstack(found))
 
 
-def shown_of_run(
+def drawn_of_run(
     history: History, tell: Callable[[Block], Sequence[Array]]
 ) -> tuple[Array, list[Array]]:
     """Return times and values as they are drawn of what a run recorded: (k,) and (k, ...) each.
@@ -81,5 +81,5 @@ def cloud(t: Array, *signals: Array) -> _Samples:
     t : times of the samples (n,) [s].   signals : across and up.
     """
     every = np.arange(0, len(t), thinning(len(t)))
-    outermost = shown(t, (float(t[0]), float(t[-1])), *signals)
+    outermost = drawn_samples(t, (float(t[0]), float(t[-1])), *signals)
     return every if len(t) <= LONG else np.union1d(every, outermost)

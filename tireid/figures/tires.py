@@ -17,7 +17,7 @@ from models.bicycle import measured_slip
 from models.recordings import Recording
 from tireid.figures import style
 from tireid.figures.drive import tire_look
-from tireid.figures.thinned import cloud, shown_of_run
+from tireid.figures.thinned import cloud, drawn_of_run
 
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
@@ -178,7 +178,7 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     tracks, t = history.tracks_over(next(history.blocks())), history.recording.t
     if not tracks:
         raise TypeError(f"{history.method} has no estimates of the axles")
-    at, curves = shown_of_run(history, lambda block: [o.values for o in history.tracks_over(block)])
+    at, curves = drawn_of_run(history, lambda block: [o.values for o in history.tracks_over(block)])
     figure = style.new_figure(4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):

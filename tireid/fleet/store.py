@@ -196,9 +196,9 @@ class Store:
         pyarrow, dataset = needed("pyarrow"), needed("pyarrow.dataset")
         fs, files = self._place[0], self.files() if files is None else files
         # Threads of pyarrow's may outlive Python, and must hold nothing of Python's then.
-        own = pyarrow.fs.LocalFileSystem() if "file" in protocols(fs) else fs
+        place = pyarrow.fs.LocalFileSystem() if "file" in protocols(fs) else fs
         try:
-            rows = dataset.dataset(files, schema=schema(), format="parquet", filesystem=own)
+            rows = dataset.dataset(files, schema=schema(), format="parquet", filesystem=place)
             for batch in rows.to_batches(list(columns), batch_size=BATCH, use_threads=False):
                 for row in batch.to_pylist():
                     if row["version"] != VERSION:

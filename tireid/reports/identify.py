@@ -39,11 +39,11 @@ def write_identify_report(
     command: str,
 ) -> None:
     """Write the report of what was learnt."""
-    learnt, model, verdict, asked = found.runs[0], found.model, found.verdict, found.asked
+    learnt, model, verdict, evaluated = found.runs[0], found.model, found.verdict, found.evaluated
     notes = [*diagnosis_warnings(diagnosis), *identify_warnings(model, found.runs)]
     numbers = [
-        *verdicts.missed_headline(verdict),
-        *_asked_headlines(asked),
+        *verdicts.model_error_headline(verdict),
+        *_evaluated_headlines(evaluated),
         *verdicts.number_headlines(verdict),
         *identify_headlines(found),
     ]
@@ -57,7 +57,7 @@ def write_identify_report(
         lead=[curve_drawing(figures, verdict)],
         warnings=[
             *verdicts.verdict_warnings(verdict),
-            *verdicts.verdicts_warnings(asked, "{}, replayed: "),
+            *verdicts.verdicts_warnings(evaluated, "{}, replayed: "),
             *notes,
         ],
         sections=[
@@ -66,7 +66,8 @@ def write_identify_report(
                 heading="Identified tires", blocks=learnt_blocks(found.method, model, figures)
             ),
             page.Section(
-                heading="How well it predicts", blocks=[*_asked(asked), *_errors(found, figures)]
+                heading="How well it predicts",
+                blocks=[*_evaluated(evaluated), *_errors(found, figures)],
             ),
             page.Section(
                 heading="What went in",
@@ -125,11 +126,11 @@ def identify_headlines(found: Results) -> list[page.Headline]:
     return [*numbers, *verdicts.known_headline(found.model)]
 
 
-def _asked_headlines(asked: Mapping[str, Verdict]) -> list[page.Headline]:
+def _evaluated_headlines(evaluated: Mapping[str, Verdict]) -> list[page.Headline]:
     """Return on how many validation drives a model is valid, and its error."""
     meaning = "replayed validation drives with a valid prediction"
-    numbers = verdicts.verdicts_headline(asked, meaning)
-    shares = [one.force_missed for one in asked.values() if one.force_missed is not None]
+    numbers = verdicts.verdicts_headline(evaluated, meaning)
+    shares = [one.model_error for one in evaluated.values() if one.model_error is not None]
     if shares:
         front, rear = (f"{PERCENT * share:.1f}" for share in np.mean(shares, axis=0))
         meaning = "error over the force in the motion of these drives, front / rear"
@@ -161,7 +162,7 @@ def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
     return said
 
 
-def asked_warnings(model: TireModel, recording: Recording) -> list[str]:
+def stored_model_warnings(model: TireModel, recording: Recording) -> list[str]:
     """Return what speaks against a stored model over a drive beside the verdict."""
     estimated = [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
     return [*estimated, *_extrapolated(model, recording)]
@@ -217,11 +218,11 @@ def band_sentence(model: TireModel) -> str:
     )
 
 
-def _asked(asked: Mapping[str, Verdict]) -> list[page.Block]:
+def _evaluated(evaluated: Mapping[str, Verdict]) -> list[page.Block]:
     rows: list[list[page.Cell]] = []
-    for name, verdict in asked.items():
-        missed = verdict.force_missed or (None, None)
-        shares = [None if one is None else with_doubt(PERCENT * one) for one in missed]
+    for name, verdict in evaluated.items():
+        errors = verdict.model_error or (None, None)
+        shares = [None if one is None else with_doubt(PERCENT * one) for one in errors]
         tone: page.Tone = "" if verdict.valid else "bad"
         rows.append([name, page.Marked("valid" if verdict.valid else "NOT VALID", tone), *shares])
     if not rows:

@@ -83,7 +83,7 @@ def test_calibration_leaves_the_frozen_model_as_it_is(run, model):
     for name in ("W", "compliance", "offset", "covariance", "prior_covariance", "excitation"):
         np.testing.assert_array_equal(getattr(model, name), getattr(frozen, name))
     assert "band" not in frozen.to_dict()
-    more = {"band": model.calibration.to_dict(), "force_missed": model.force_missed.tolist()}
+    more = {"band": model.calibration.to_dict(), "force_missed": model.model_error.tolist()}
     assert model.to_dict() == frozen.to_dict() | more
     np.testing.assert_array_equal(calibrated(run, 15.0).W, run.freeze(15.0).W)
 

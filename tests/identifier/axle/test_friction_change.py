@@ -106,7 +106,7 @@ def broken(channel, kind, size=0.0):
     clean = drive()
     fault = SensorFault(channel=channel, kind=kind, start=STARTS, duration=LASTS, size=size)
     good, wrong = getattr(clean, channel), fault.active(clean.t)
-    shown = fault.shown(clean.t, good, good[np.argmax(wrong)], 0.0)
+    shown = fault.measured(clean.t, good, good[np.argmax(wrong)], 0.0)
     return replace(clean, **{channel: np.where(wrong, shown, good)})
 
 

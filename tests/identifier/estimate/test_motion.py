@@ -71,7 +71,7 @@ def of(drive, p, car):
     v_y = v_y - one["v_y_angle"] * v_x - one["v_y_lever"] * r
     d = (1.0 + one["steering_gain"]) * (d + one["steering_lag"] * d_rate) + one["steering_zero"]
     inertia = I_z * np.exp(one["ln_inertia"])
-    force, missed = np.zeros((n, 2)), np.zeros((n, 2))
+    force, left = np.zeros((n, 2)), np.zeros((n, 2))
     x = rho = rate = late = None
     for j in range(len(steps)):
         slip = np.array([d[j], 0.0]) - np.arctan((v_y[j] + arm * r[j]) / v_x[j])
@@ -91,13 +91,13 @@ def of(drive, p, car):
         u = across - v_x[j] * r[j] / GRAVITY + bank[j] / GRAVITY + one["bank"]
         late = -xi if late is None else late
         if j % FINE == 0:
-            force[j // FINE], missed[j // FINE] = across, RATE * (late + xi)
+            force[j // FINE], left[j // FINE] = across, RATE * (late + xi)
         late = late + dt * (-u - RATE * (late + xi))
         sigma = s * slope + 0.001 * L
         x = x + (1.0 - np.exp(-dt * v_x[j] / sigma)) * (slip - x)
         rate = rate + dt * (omega**2 * (GRAVITY * (share @ F) - rho) - 2.0 * zeta * omega * rate)
         rho = rho + dt * rate
-    return force, missed
+    return force, left
 
 
 @pytest.fixture(scope="module")
@@ -110,7 +110,7 @@ def test_the_model_is_its_equations_integrated_finely(drive):
     found = simulate(drive, p, car)
     settled = slice(150, None)  # six times that of the filter
     for port, expected, within in zip(
-        ("force", "missed"), of(drive, p, car), (0.02, 0.02), strict=True
+        ("force", "residual"), of(drive, p, car), (0.02, 0.02), strict=True
     ):
         away = found[port][settled] - expected[settled]
         size = np.sqrt(np.mean(expected[settled] ** 2, axis=0))
@@ -141,9 +141,9 @@ def test_slopes_over_faults_and_the_road_are_finite_differences(drive):
     def run(p, port):
         return scan(len(drive.signals), {**inputs, "parameters": p}, ports=(port,))[port]
 
-    slopes = run(p, "missed_slopes")
+    slopes = run(p, "residual_slopes")
     for column, name in enumerate(names):
         step = 1e-5 * np.eye(len(p))[INDEX[name]]
-        expected = (run(p + step, "missed") - run(p - step, "missed")) / 2e-5
+        expected = (run(p + step, "residual") - run(p - step, "residual")) / 2e-5
         away = np.abs(slopes[:, :, column] - expected).max()
         assert away <= 2e-3 * np.abs(expected).max(), name

@@ -14,8 +14,8 @@ from identifier.inertial.motion import (
     Laws,
     Sample,
     _size,
+    expected_signals,
     predicted,
-    shown,
     static_load,
     unknowns,
 )
@@ -138,7 +138,7 @@ def expected(z, tilt=3.0, delta=0.05):
     now = Sample(ca.SX(V_X), ca.SX(ca.DM([delta, 0.0])))
     named = unknowns(symbol, N)
     at = of_units(hidden_units(named.slip, SCALES, STEPS), named.W, SCALES)
-    seen = shown(car(), laws(0.01), named, tilt, now, at)
+    seen = expected_signals(car(), laws(0.01), named, tilt, now, at)
     return np.array(ca.Function("f", [symbol], [ca.vertcat(seen.r, seen.a_y)])(z)).ravel()
 
 

@@ -16,8 +16,8 @@ from identifier.inertial.motion import (
     Laws,
     Sample,
     _size,
+    expected_signals,
     predicted,
-    shown,
     unknowns,
 )
 from identifier.run import identify
@@ -62,7 +62,7 @@ def compiled_model():
     way, moving = a.by_way
     gradient = ca.Function("gradient", [z, tilt, old, new], [way.gradient(z, moving)])
     at = curve(unknowns(z, N).slip, unknowns(z, N).W, scales, steps)
-    seen = shown(car, laws, unknowns(z, N), tilt[0], now, at)
+    seen = expected_signals(car, laws, unknowns(z, N), tilt[0], now, at)
     look = ca.Function("look", [z, tilt, new], [ca.vertcat(seen.r, seen.a_y), at.force])
 
     def numbers(f):
