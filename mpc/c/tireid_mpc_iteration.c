@@ -10,7 +10,7 @@
 
 #define N TIREID_MPC_HORIZON
 #define NX TIREID_MPC_STATES
-#define STEERING 4U /* place of the angle among the states */
+#define STEERING 4U                    /* place of the angle among the states */
 #define FRESH ((N + 2U) / 3U)          /* stages linearized anew where the others are prepared */
 #define FEW_PRESSED (N / 2U)           /* stages, so few that the plan's limits are believed */
 #define NEARLY_TURN TIREID_MPC_C(0.1)  /* lateral acceleration of a road [m/s^2] that is the same */
