@@ -26,7 +26,7 @@ import tireid as ti
 from benchmarks.answers import blind
 from benchmarks.random_cars import CLASSES, FIRST_SEED, RandomCar, drawn, random_steering
 from benchmarks.targets import Table, Targets, Values, parse
-from identifier.verdict.motion import BRISK
+from identifier.evidence import BRISK
 from models.friction import Friction, FrictionChange
 from models.plant import PlantError
 from models.recordings import Recording

@@ -5,10 +5,11 @@ from functools import cached_property
 
 from codegen.arrays import Array
 from identifier.band import UNCALIBRATED
+from identifier.day import Day
+from identifier.evidence import MotionError, motion_error
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.tire_model import TireModel
 from identifier.verdict import RoadFriction, Verdict, judge_prediction
-from identifier.verdict.motion import MotionError, motion_error
 from models.recordings import Recording
 
 
@@ -41,6 +42,11 @@ class Prediction:
             f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms error, "
             f"{front:.1f} / {rear:.1f} % of the force, front / rear>"
         )
+
+    @cached_property
+    def day(self) -> Day | None:
+        """Errors of this log's sensors, taken off; None of a model that finds none."""
+        return self.model.on(self.recording)
 
     @cached_property
     def verdict(self) -> Verdict:

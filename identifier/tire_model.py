@@ -31,6 +31,7 @@ from models.schema import Table, read_json
 from models.vehicle import Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
+    from identifier.day import Day
     from identifier.estimate.latent import LateralVelocity
 
 # As summaries and verdicts name what is learnt of an axle.
@@ -227,6 +228,16 @@ class TireModel(ABC):
 
     scales_with_load = False
     """Whether forces are in static axle loads, so that another car's model scales to a car."""
+
+    def on(self, recording: Recording) -> "Day | None":
+        """Return the errors of a log's sensors that `predict` takes off; None: it finds none."""
+        del recording
+        return None
+
+    def held_on(self, recording: Recording) -> "TireModel":
+        """Return the model as it reads the sensors of a log, to be asked about it many times."""
+        del recording
+        return self
 
     def mounted_on(self, vehicle: Vehicle) -> "TireModel":
         """Return the tires on another car, their forces scaled by its static axle loads.

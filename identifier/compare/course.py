@@ -2,7 +2,7 @@
 
 All methods are judged on the same samples. Shares are RMSE over the rms of the true force, both
 axles together, in percent. Where a recording has no true forces, all are judged by the motion: by
-mean forces over windows of 0.3 s, which the motion shows (`identifier.verdict.motion`), the white
+mean forces over windows of 0.3 s, which the motion shows (`identifier.evidence`), the white
 noise of the sensors taken off.
 """
 
@@ -16,11 +16,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.method import CannotFreezeError, Method
-from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
-from identifier.run import History, identify
-from identifier.tire_model import TireModel
-from identifier.verdict.motion import (
+from identifier.evidence import (
     BRISK,
     FEWEST,
     brisk_windows,
@@ -28,6 +24,10 @@ from identifier.verdict.motion import (
     measured_force,
     noise_variance,
 )
+from identifier.method import CannotFreezeError, Method
+from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
+from identifier.run import History, identify
+from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.recordings.evidence import Windows
 from models.vehicle import Vehicle

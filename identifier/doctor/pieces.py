@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import blocks, large
-from identifier.verdict.motion import BRISK
+from identifier.evidence import BRISK
 from models.recordings import Recording
 from models.recordings.evidence import Windows
 from models.vehicle import Vehicle

@@ -2,8 +2,9 @@
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import casadi as ca
 import numpy as np
@@ -15,8 +16,10 @@ from identifier.axle.curve import Curve
 from identifier.axle.dynamics import lagged_force, series_compliance
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.slip import SHORTEST, Sway
+from identifier.day import Day
 from identifier.estimate import report
 from identifier.estimate.band import FittedBand
+from identifier.estimate.day import day_of
 from identifier.estimate.drive import Drive
 from identifier.estimate.latent import LateralVelocity, estimate_v_y
 from identifier.estimate.posterior import Reach
@@ -36,6 +39,7 @@ from models.rules import require_positive
 from models.schema import Table
 from models.vehicle import DOWNFORCE_SPEED, Vehicle, load_ratio
 
+_Found = TypeVar("_Found")
 _WARM = 300  # samples before a part of a long drive, over which lag and sway settle
 
 
@@ -47,6 +51,7 @@ class FittedModel(TireModel):
     reach : what the identification drives reached.
     model_error : share of the measured force that it misses of them, (2,); None where not
         computed.
+    day : errors of the sensors that are held for every log; None finds them anew for each.
     """
 
     kind = "fit"
@@ -57,6 +62,7 @@ class FittedModel(TireModel):
     covariance: Array
     reach: Reach
     model_error: Array | None = None
+    day: Day | None = None
 
     def __post_init__(self) -> None:
         numbers = (self.p, self.covariance, *self.reach[:5])
@@ -153,14 +159,25 @@ class FittedModel(TireModel):
     def predict(self, recording: Recording) -> Array:
         """Return lateral axle forces over a recording, (n, 2) [N], frame of the body.
 
-        Signals go through a zero-phase mean of 0.07 s (`estimate.drive`); where the car is slower
-        than `min_speed` forces are zero.
+        Signals go through a zero-phase mean of 0.07 s (`estimate.drive`), the errors of this log's
+        sensors (`on`) are taken off; where the car is slower than `min_speed` forces are zero.
         """
         return self._over(recording)[0] * self._loads
 
     def lagged_slip(self, recording: Recording) -> Array:
         """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
         return self._over(recording)[1]
+
+    def on(self, recording: Recording) -> Day:
+        """Return the errors of a log's sensors, found from its motion with the tires held."""
+        return self.day or self._known(recording, day_of)
+
+    def of_day(self, day: Day) -> Self:
+        """Return the tires read by sensors with these errors: every log, the tracker, C."""
+        return replace(self, p=day.on(self.p), day=day)
+
+    def held_on(self, recording: Recording) -> Self:
+        return self.of_day(self.on(recording))
 
     def estimated_v_y(self, recording: Recording) -> LateralVelocity:
         """Return the v_y of a drive whose sensors show none, smoothed on these tires.
@@ -170,28 +187,32 @@ class FittedModel(TireModel):
         RecordingError
             Where there is no a_y either.
         """
-        log = recording
+        return self._known(recording, estimate_v_y)
+
+    def _known(self, log: Recording, find: Callable[..., _Found]) -> _Found:
+        """Return what a log and these tires tell, kept for the next who asks."""
         key = (
-            *(log.t, log.v_x, log.r, log.a_y, log.a_x, log.delta_f, log.delta_r),
-            *(self.p, self.covariance, self.vehicle),
+            *(log.t, log.v_x, log.r, log.a_y, log.a_x, log.delta_f, log.delta_r, log.v_y),
+            *(self.p, self.covariance, self.vehicle, find),
         )
-        for known, breaks, found in _LAST:
+        for known, about, found in _LAST:
             same = all(one is other for one, other in zip(known, key, strict=True))
-            if same and breaks == log.breaks:
+            if same and about == (log.breaks, log.estimated):
                 return found
-        found = estimate_v_y(recording, self.vehicle, self.p, self.covariance)
-        _LAST.append((key, log.breaks, found))
+        found = find(log, self.vehicle, self.p, self.covariance)
+        _LAST.append((key, (log.breaks, log.estimated), found))
         return found
 
     def _over(self, recording: Recording) -> tuple[Array, Array]:
         force, slip = large((len(recording), 2)), large((len(recording), 2))
+        p = self.on(recording).on(self.p)
         for segment in recording.segments:
             begin, end = segment.start, min(segment.stop, len(recording))
             for part in blocks(end - begin):
                 first = max(part.start - _WARM, 0)
                 some = slice(begin + first, begin + part.stop)
                 drive = Drive.of(recording, self.vehicle, some, replay=True)
-                out = simulate(drive, self.p, self.vehicle)
+                out = simulate(drive, p, self.vehicle)
                 kept = slice(begin + part.start, begin + part.stop)
                 force[kept] = out["force"][part.start - first :]
                 slip[kept] = out["slip"][part.start - first :]
@@ -287,4 +308,4 @@ class FittedModel(TireModel):
 
 
 # A run, its verdict and its report ask about the same drive: the last few answers are kept.
-_LAST: deque[tuple[tuple[Any, ...], tuple[int, ...], LateralVelocity]] = deque(maxlen=4)
+_LAST: deque[tuple[tuple[Any, ...], tuple[Any, ...], Any]] = deque(maxlen=8)

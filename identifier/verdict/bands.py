@@ -28,10 +28,10 @@ from identifier.axle.band import (
 )
 from identifier.axle.learning import Regression
 from identifier.band import LEVEL, Band, BandSpread, normal_quantile
+from identifier.evidence import Evidence, evidence, modelled_force
 from identifier.run import History, learn, state_index
 from identifier.tire_model import TireModel
 from identifier.verdict.judging import judge
-from identifier.verdict.motion import Evidence, evidence, modelled_force
 from identifier.verdict.verdict import Verdict
 from models.recordings import Recording
 from models.recordings.evidence import Windows

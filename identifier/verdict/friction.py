@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.band import LEVEL, normal_quantile
+from identifier.evidence import evidence, modelled_force
 from identifier.measured import with_doubt
 from identifier.tire_model import GRIP, TireModel
-from identifier.verdict.motion import evidence, modelled_force
 from models.recordings import Recording
 from models.recordings.portion import portion
 
@@ -118,6 +118,7 @@ def road_friction(
         [weights]; None where nobody knows of it.
     """
     part = portion(recording)
+    model = model.held_on(part.recording)
     band, found = model.band, evidence(model, part.recording, road)
     if band is None or not band.calibrated or found is None:
         return None

@@ -10,20 +10,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from codegen.arrays import Array
-from identifier.estimate.drive import Drive
-from identifier.reproducibility import beyond_known
-from identifier.run import History, state_index
-from identifier.tire_model import AXLES, Reached, TireModel
-from identifier.verdict.friction import RoadFriction, road_friction
-from identifier.verdict.motion import (
+from identifier.evidence import (
     FEWEST,
     WINDOW,
     Evidence,
     evidence,
     lateral_noise,
     motion_error,
+    road_push,
 )
+from identifier.reproducibility import beyond_known
+from identifier.run import History, state_index
+from identifier.tire_model import AXLES, Reached, TireModel
+from identifier.verdict.friction import RoadFriction, road_friction
 from identifier.verdict.verdict import (
     LARGEST_MODEL_ERROR,
     PERCENT,
@@ -134,7 +133,7 @@ def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
     evaluated = _evaluated(model, recording, taught=False)
     if evaluated is None:
         return _too_short(model, FEWEST)
-    friction = road_friction(model, recording, _road(evaluated.recording, model))
+    friction = road_friction(model, recording, road_push(evaluated.recording, model))
     verdict = _verdict(evaluated, [*_findings(evaluated), *_roads(friction)], recording)
     return replace(verdict, friction=friction)
 
@@ -144,7 +143,7 @@ def _evaluated(
 ) -> _Evaluated | None:
     """Return what is judged; None where too little is driven."""
     part = portion(recording) if frozen is None else portion(recording, frozen)
-    found = evidence(model, part.recording, _road(part.recording, model))
+    found = evidence(model, part.recording, road_push(part.recording, model))
     if taught and found is not None:
         other = model.drives.road_differs(recording.t[part.samples])
         found = found.where(~other[found.windows.starts])
@@ -159,24 +158,10 @@ def _evaluated(
     return _Evaluated(model, part, judged, taught, left_out)
 
 
-def _road(recording: Recording, model: TireModel) -> Array | None:
-    """Return what a banked road pushes to the left, by the accelerometer (n,) [weights].
-
-    Where no v_y was logged, what the accelerometer shows beside forces; None where nobody tells.
-    """
-    if recording.a_y is None:
-        return None
-    if recording.logged_v_y is None:
-        found = model.estimated_v_y(recording.as_logged())
-        return None if found is None else found.beside
-    bank: Array = Drive.of(recording, model.vehicle, replay=True).signals[:, 6] / GRAVITY
-    return bank
-
-
 def _findings(evaluated: _Evaluated) -> list[Objection]:
     rules = (
         _v_y_stuck, _no_force, _model_error, _left_out, _unsure, _no_tire, _beyond, _turning,
-        _unobserved,
+        _unobserved, _sensors,
     )  # fmt: skip
     return [finding for rule in rules for finding in rule(evaluated)]
 
@@ -311,6 +296,12 @@ def _unobserved(evaluated: _Evaluated) -> Iterator[Objection]:
             f"{np.degrees(RULES.side_slip):.2g} deg): measure v_y, or drive a slalom"
         )
         yield Objection("side_slip_unknown", None, text, True)
+
+
+def _sensors(evaluated: _Evaluated) -> Iterator[Objection]:
+    day = evaluated.model.on(evaluated.recording)
+    for code, text in () if day is None else day.notes:
+        yield Objection(code, None, text, False)
 
 
 def _roads(found: RoadFriction | None) -> list[Objection]:

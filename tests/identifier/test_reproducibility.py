@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identifier.evidence import MotionError
 from identifier.frozen import FrozenModelError
 from identifier.paper.design import PaperIdentifier
 from identifier.prediction import predict
@@ -20,7 +21,6 @@ from identifier.reproducibility import (
 )
 from identifier.run import identify
 from identifier.tire_model import load_model
-from identifier.verdict.motion import MotionError
 
 
 @pytest.fixture(name="history")

@@ -7,10 +7,10 @@ import pytest
 
 import tireid as ti
 from identifier.axle.gate import GateState
+from identifier.evidence import brisk_windows, motion_error
 from identifier.methods import METHODS, make_method
 from identifier.refused import GATE
 from identifier.run import identify
-from identifier.verdict.motion import brisk_windows, motion_error
 from models.recordings import Recording, RecordingError, Repair, joined
 from models.recordings.evidence import windows
 

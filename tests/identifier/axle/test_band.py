@@ -16,12 +16,12 @@ from identifier.axle.band import (
     ranges_of,
 )
 from identifier.band import normal_quantile
+from identifier.evidence import brisk_windows
 from identifier.methods import make_method
 from identifier.run import identify
 from identifier.tire_model import load_model
 from identifier.verdict import calibrated, within_band
 from identifier.verdict.bands import color_of, quantile
-from identifier.verdict.motion import brisk_windows
 from models.vehicle import sedan
 from tests.identifier.conftest import steered
 

@@ -9,12 +9,12 @@ import pytest
 
 import identifier.verdict
 from identifier.estimate.method import FitMethod
+from identifier.evidence import brisk_windows, clean_rms, measured_force
 from identifier.methods import make_method
 from identifier.motion.parameters import INDEX
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
 from identifier.verdict import judge, judge_prediction
-from identifier.verdict.motion import brisk_windows, clean_rms, measured_force
 from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.sensors import Sensor, Sensors

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.axle.car import Car, axle_impulse, car_numbers
+from identifier.estimate.drive import Drive
 from identifier.tire_model import TireModel
 from models.recordings import Recording
 from models.recordings.evidence import Windows
@@ -170,6 +171,20 @@ def evidence(model: TireModel, recording: Recording, road: Array | None = None) 
         modelled=modelled_force(model, recording, windows),
         noise=noise_variance(recording, vehicle, windows),
     )
+
+
+def road_push(recording: Recording, model: TireModel) -> Array | None:
+    """Return what a banked road pushes to the left, by the accelerometer (n,) [weights].
+
+    Where no v_y was logged, what the accelerometer shows beside forces; None where nobody tells.
+    """
+    if recording.a_y is None:
+        return None
+    if recording.logged_v_y is None:
+        found = model.estimated_v_y(recording.as_logged())
+        return None if found is None else found.beside
+    bank: Array = Drive.of(recording, model.vehicle, replay=True).signals[:, 6] / GRAVITY
+    return bank
 
 
 # A frozen model against measured motion, without true forces: the mean of (F_f + F_r)/m is the

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identifier.verdict.motion import (
+from identifier.evidence import (
     Evidence,
     brisk_windows,
     clean_rms,

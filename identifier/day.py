@@ -1,0 +1,141 @@
+"""What the sensors of one log read wrongly: found anew for each log, with the tires held.
+
+Zeros of sensors differ from day to day, tires do not: they must not travel from the log that
+identified the tires to another one. A fit estimates them with its own balance
+(`identifier.estimate.day`); for a model that does not, `identifier.compare.zeros` does.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.estimate.priors import Priors
+from identifier.measured import with_doubt
+from identifier.motion.model import SENSORS, true_signals
+from identifier.motion.parameters import INDEX
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+NUMBERS = ("steering_zero", "v_y_bias", "v_y_angle", "v_y_lever", "steering_gain")
+INSTALLED = ("v_y_lever", "steering_gain")  # stay with the car: about what was identified
+WHERE = [INDEX[name] for name in NUMBERS]
+ENOUGH = 15.0  # [s] of driving: 10 s, left turns only, made three times the error of none
+_FAR = 3.0  # standard deviations of what is expected, beyond which a number is noted
+_SIDEWAYS = 0.0045  # [rad] of b/v + β that is noted, and
+_SURELY = 5.0  # its standard deviations: 0 of 46 simulated logs, 32 of 32 planted errors
+_APART = 0.7  # of the prior's, up to which bias and angle of v_y are told apart
+
+_ROWS = (  # title, unit that is printed, per SI, of NUMBERS
+    ("zero of the steering", "°", math.degrees(1.0)),
+    ("bias of v_y", " m/s", 1.0),
+    ("mounting angle of the v_y sensor", "°", math.degrees(1.0)),
+    ("place of the v_y sensor ahead of the center of gravity", " m", 1.0),
+    ("steering angle, relative error", " %", 100.0),
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Day:
+    """Errors of the sensors in one log.
+    value : of `NUMBERS`, SI, (5,).   covariance : with the tires held, (5, 5).
+    expected, usual : what was believed before the log, and its standard deviation, (5,).
+    speed : at which is driven, median [m/s].
+    anew : whether the log was long enough; else they are those of the identification drive.
+    """
+
+    value: Array
+    covariance: Array
+    expected: Array
+    usual: Array
+    speed: float
+    anew: bool
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.value[NUMBERS.index(name)])
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviations, (5,)."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    def on(self, p: Array) -> Array:
+        """Return parameters of the forward model with these errors, (p,)."""
+        moved = p.copy()
+        moved[WHERE] = self.value
+        return moved
+
+    def corrected(self, recording: Recording) -> Recording:
+        """Return the log without the errors."""
+        return corrected(recording, self.value)
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Each number with its standard deviation, in words."""
+        return tuple(
+            f"{title}: {with_doubt(factor * float(value), factor * float(sd))}{unit}"
+            for (title, unit, factor), value, sd in zip(_ROWS, self.value, self.sd, strict=True)
+            if sd > 0.0
+        )
+
+    @property
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """What is larger than expected: code and one line of each."""
+        listed, sideways = [], self._sideways()
+        if sideways:
+            listed.append(("v_y_reads", sideways))
+        rows = zip(NUMBERS, _ROWS, self.value - self.expected, self.usual, self.sd, strict=True)
+        for name, (title, unit, factor), away, usual, sd in rows:
+            if sideways and name in ("v_y_bias", "v_y_angle"):
+                continue
+            if self.anew and usual > 0.0 and abs(away) > _FAR * math.hypot(usual, sd):
+                than = "of the identification drive" if name in INSTALLED else "of a good sensor"
+                said = with_doubt(factor * float(away), factor * float(sd))
+                text = f"{title}: {said}{unit} from that {than}; the forces allow for it"
+                listed.append((name, text))
+        return tuple(listed)
+
+    def _sideways(self) -> str:
+        """Return by how much v_y reads wrong at the driven speed; empty where that is little.
+
+        At one speed bias and mounting angle are one error, and each hides behind half of it.
+        """
+        b, beta = NUMBERS.index("v_y_bias"), NUMBERS.index("v_y_angle")
+        h = np.zeros(len(NUMBERS))
+        h[b], h[beta] = 1.0 / self.speed, 1.0
+        s, sd = float(h @ self.value), math.sqrt(max(float(h @ self.covariance @ h), 0.0))
+        if not (self.anew and abs(s) > max(_SIDEWAYS, _SURELY * sd)):
+            return ""
+        said = with_doubt(abs(s) * self.speed, sd * self.speed)
+        words = (
+            f"v_y reads {said} m/s too {'much' if s > 0.0 else 'little'} at {self.speed:.3g} m/s"
+        )
+        if (self.sd[[b, beta]] < _APART * self.usual[[b, beta]]).all():
+            return f"{words}: {self.lines[b]}, {self.lines[beta]}; the forces allow for it"
+        return f"{words}: a bias, or its sensor is turned; one speed cannot tell"
+
+
+def corrected(recording: Recording, value: Array) -> Recording:
+    """Return a log without errors of its sensors.   value : of `NUMBERS`, SI, (5,)."""
+    v_y = recording.logged_v_y
+    errors = dict(zip(NUMBERS, value, strict=True))
+    p = [float(errors.get(name, 0.0)) for name in SENSORS]
+    still = np.zeros(len(recording))
+    given = (recording.v_x, still if v_y is None else v_y, recording.r, recording.delta_f)
+    _, true_v_y, _, delta = true_signals((*given, 0.0, 0.0, 0.0), p)
+    return replace(recording, delta_f=delta, v_y=recording.v_y if v_y is None else true_v_y)
+
+
+def of_day(
+    value: Array, covariance: Array, expected: Array, usual: Array, v_x: Array, *, anew: bool
+) -> Day:
+    """Return a day of a log.   v_x : speeds that count [m/s]; the others as of `Day`."""
+    speed = float(np.median(v_x)) if v_x.size else 1.0
+    return Day(value=value, covariance=covariance, expected=expected, usual=usual,
+               speed=max(speed, 1e-3), anew=anew)  # fmt: skip
+
+
+def usual_errors(vehicle: Vehicle) -> Array:
+    """Return the standard deviations of sensors that nobody has looked at, (5,)."""
+    return Priors.of(vehicle).sd[WHERE]

@@ -1,0 +1,54 @@
+"""The errors of the sensors in a log, by the balance of the estimate with the tires held."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.day import ENOUGH, INSTALLED, NUMBERS, WHERE, Day, of_day, usual_errors
+from identifier.estimate.drive import Drive, hardest
+from identifier.estimate.priors import Priors
+from identifier.estimate.solve import estimate
+from identifier.motion.parameters import INDEX
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+_STEERED = np.array([name.startswith("steering") for name in NUMBERS])
+_LONGEST = 600.0  # [s] of a log that are looked at: those of hardest cornering
+_LEAST_DOUBT = 0.02  # of what was identified, in standard deviations of the table
+
+
+def day_of(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) -> Day:
+    """Return the errors of a log's sensors with the tires held, by its motion alone.
+
+    What is installed (steering gain, place of the v_y sensor) is believed about what was
+    identified, as sure as that is, the rest about zero. Of a log with less than 15 s of driving
+    they are those of the identification drive; a v_y that was estimated has none.
+    p, covariance : of the tires, as `motion.parameters` lists them (p,), (p, p).
+    """
+    table, usual = Priors.of(vehicle), usual_errors(vehicle)
+    taught, doubt = p[WHERE], covariance[np.ix_(WHERE, WHERE)]
+    if recording.logged_v_y is None:
+        on = recording.v_x > vehicle.lowest_speed
+        value, P = taught * _STEERED, doubt * np.outer(_STEERED, _STEERED)
+        return of_day(value, P, taught, usual, recording.v_x[on], anew=False)
+    drive = Drive.of(recording, vehicle, hardest(recording, _LONGEST))
+    v_x = drive.signals[drive.counts, 0]
+    if v_x.size * drive.dt < ENOUGH:
+        return of_day(taught, doubt, taught, usual, v_x, anew=False)
+    mean, moves = p.copy(), np.zeros(p.size, dtype=bool)
+    information = np.zeros_like(table.information)
+    information[np.ix_(WHERE, WHERE)] = table.information[np.ix_(WHERE, WHERE)]
+    moves[WHERE] = table.moves[WHERE]
+    for name in NUMBERS:
+        k = INDEX[name]
+        if name not in INSTALLED:
+            mean[k] = 0.0
+        elif covariance[k, k] > 0.0:
+            sd = max(float(np.sqrt(covariance[k, k])), _LEAST_DOUBT * float(table.sd[k]))
+            information[k, k] = sd**-2
+            usual[NUMBERS.index(name)] = sd
+    held = replace(table, mean=mean, information=information, moves=moves)
+    found = estimate([drive], vehicle, held)
+    P = found.covariance[np.ix_(WHERE, WHERE)]
+    return of_day(found.p[WHERE], P, mean[WHERE], usual, v_x, anew=True)
