@@ -6,7 +6,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.day import ENOUGH, INSTALLED, NUMBERS, WHERE, Day, of_day, usual_errors
-from identifier.estimate.drive import Drive, hardest
+from identifier.estimate.drive import SLOW, Drive, hardest
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import estimate
 from identifier.motion.parameters import INDEX
@@ -14,6 +14,9 @@ from models.recordings import Recording
 from models.vehicle import Vehicle
 
 _STEERED = np.array([name.startswith("steering") for name in NUMBERS])
+_ZEROS = 3  # of NUMBERS, that change from day to day
+_ANOTHER = 30.0  # squared deviations of a segment's zeros from those of the whole: another day
+_MOST = 20  # segments that are asked
 _LONGEST = 600.0  # [s] of a log that are looked at: those of hardest cornering
 _LEAST_DOUBT = 0.02  # of what was identified, in standard deviations of the table
 
@@ -52,3 +55,31 @@ def day_of(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) 
     found = estimate([drive], vehicle, held)
     P = found.covariance[np.ix_(WHERE, WHERE)]
     return of_day(found.p[WHERE], P, mean[WHERE], usual, v_x, anew=True)
+
+
+def days_of(
+    recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
+) -> list[tuple[int, Day]]:
+    """Return the days of a log: the first sample of each, and the day.
+
+    Of several logs in a row each long segment is asked; where one differs clearly from the whole,
+    each has a day of its own, and short ones have that of the one before.
+    """
+    whole = day_of(recording, vehicle, p, covariance)
+    moving = np.concatenate([[0], np.cumsum(recording.v_x > SLOW * vehicle.froude_speed)])
+    long = [
+        one
+        for one in recording.segments
+        if (moving[one.stop] - moving[one.start]) * recording.dt >= ENOUGH
+    ]
+    if not (whole.anew and 1 < len(long) <= _MOST):
+        return [(0, whole)]
+    each = [day_of(recording.taken(one), vehicle, p, covariance) for one in long]
+    z, away = slice(0, _ZEROS), [one.value - whole.value for one in each]
+    far = [
+        d[z] @ np.linalg.solve(one.covariance[z, z], d[z])
+        for one, d in zip(each, away, strict=True)
+    ]
+    if not max(far) > _ANOTHER:
+        return [(0, whole)]
+    return list(zip([0, *(one.start for one in long[1:])], each, strict=True))

@@ -6,13 +6,15 @@ Logs with a v_y are estimated by the balance (`solve`), those without by `latent
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
 from codegen.arrays import Array
+from identifier.day import ENOUGH as ENOUGH_DRIVEN
+from identifier.estimate.day import days_of
 from identifier.estimate.drive import FASTEST, Drive, hardest
-from identifier.estimate.information import Information
+from identifier.estimate.information import CHANGES, Information
 from identifier.estimate.latent import Learnt, lateness, latent_priors, learn_latent
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes, TooShortError
@@ -22,7 +24,7 @@ from identifier.estimate.roads import Roads, with_roads
 from identifier.estimate.solve import ENOUGH, STRIDE, error_size, estimate, simulate
 from identifier.frozen import PROBE
 from identifier.motion.parameters import INDEX, SLIPS
-from models.recordings import Recording
+from models.recordings import Recording, joined
 from models.vehicle import GRAVITY, Vehicle
 
 _BLOCK = 600.0  # [s] that are estimated at once
@@ -31,6 +33,8 @@ _ENOUGH_MORE = 1.0  # [nats] of improvement by a later block, below which it end
 _LONG = 3600.0  # [s]: samples of longer logs are averaged
 _COARSE = 2.0  # times the usual interval, to which they are averaged
 _REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
+_ZEROS = [INDEX[name] for name in CHANGES]
+Days: TypeAlias = Literal["found", "one", "each"]
 _LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of its model are not
 
 
@@ -51,13 +55,16 @@ def fit(
     *,
     block: float = _BLOCK,
     coarse: bool = False,
+    days: Days = "found",
     progress: Callable[[float], None] | None = None,
 ) -> _Fit:
-    """Estimate the tires of a car from logs, with the same sensors.
+    """Estimate the tires of a car from logs.
     recordings : logs of the car; a longer log is taken in blocks, and what these tell adds up.
     priors : beliefs; None takes those of the car.
     block : longest time that is estimated at once [s].
     coarse : whether samples are averaged to twice the interval, as they are of logs of hours.
+    days : whether zeros of sensors are of all logs ("one"), of each ("each"), or of each where
+        they clearly differ ("found").
     progress : called now and then with the share that is done, 0 to 1.
 
     Raises
@@ -81,9 +88,10 @@ def fit(
         if progress is not None:
             progress(min(done / max(total, 1e-9), 1.0))
 
-    for drives in _blocks(
-        [one for one in recordings if one.logged_v_y is not None], vehicle, block, coarse=coarse
-    ):
+    measured = [one for one in recordings if one.logged_v_y is not None]
+    if days == "each":
+        measured = [part for one in measured for part in _alone(one)]
+    for drives in _blocks(measured, vehicle, block, coarse=coarse, alone=days == "each"):
         if not any(one.counts.any() for one in drives):
             continue
         begin = None if found is None else found.p
@@ -96,7 +104,7 @@ def fit(
         part = Information.about(
             found.p, found.slope, found.curvature, sd, here.slip, found.seconds
         )
-        known += part
+        known += part.of_one_day(sd[_ZEROS]) if days == "each" else part
         parts.append((drives[0].begin, part))
         went_on(sum(len(one.signals) * one.dt for one in drives))
     beliefs = before if found is None else _after(before, found)
@@ -126,8 +134,23 @@ def fit(
         if not force > 0.0 and before.moves[INDEX[f"residual{j}_{axle}"]]
     ]
     if falling:  # as where a servo has play: such a curve is no tire, the formula alone is one
-        return fit(recordings, vehicle, before.without(falling), block=block, coarse=coarse)
+        return fit(
+            recordings, vehicle, before.without(falling), block=block, coarse=coarse, days=days
+        )
+    alike = len({one.dt for one in measured}) == 1
+    if days == "found" and alike and sum(len(_alone(one)) for one in measured) > 1:
+        whole = joined(measured)
+        if len(days_of(whole, vehicle, model.p, model.covariance)) > 1:
+            return fit(recordings, vehicle, priors, block=block, coarse=coarse, days="each")
     return _Fit(model, found, parts)
+
+
+def _alone(recording: Recording) -> list[Recording]:
+    """Return the segments of a log that are long enough for a day of their own, or the log."""
+    long = [
+        one for one in recording.segments if (one.stop - one.start) * recording.dt >= ENOUGH_DRIVEN
+    ]
+    return [recording.taken(one) for one in long] if len(long) > 1 else [recording]
 
 
 def _after(beliefs: Priors, found: Posterior) -> Priors:
@@ -209,9 +232,14 @@ def _most(signals: Array) -> Array:
 
 
 def _blocks(
-    recordings: Sequence[Recording], vehicle: Vehicle, longest: float, *, coarse: bool
+    recordings: Sequence[Recording],
+    vehicle: Vehicle,
+    longest: float,
+    *,
+    coarse: bool,
+    alone: bool = False,
 ) -> Iterator[list[Drive]]:
-    """Yield drives that last no longer together."""
+    """Yield drives that last no longer together.   alone : whether each is of one recording."""
     group: list[Drive] = []
     length = 0.0
     small = _COARSE * float(np.sqrt(vehicle.wheelbase / SEDAN)) < 1.0
@@ -222,7 +250,7 @@ def _blocks(
         edges = np.linspace(0, len(recording), count + 1).astype(int)
         for begin, end in itertools.pairwise(edges):
             seconds = (end - begin) * recording.dt
-            if group and length + seconds > longest:
+            if (group and alone) or (group and length + seconds > longest):
                 yield group
                 group, length = [], 0.0
             part = slice(int(begin), int(end))

@@ -35,6 +35,7 @@ BESIDE = tuple(
 FORCES = 2 * len(GRID)
 PLACE = {name: FORCES + k for k, name in enumerate(BESIDE)}  # in u
 SIZE = FORCES + len(BESIDE)
+CHANGES = ("steering_zero", "v_y_bias", "v_y_angle")  # of sensors, from day to day
 
 
 def coordinates(p: Array) -> tuple[Array, Array]:
@@ -126,6 +127,14 @@ class Information:
         toward = self.matrix @ u - self.vector
         loss = 0.5 * float(u @ (toward - self.vector))
         return loss, slopes.T @ toward, slopes.T @ self.matrix @ slopes
+
+    def of_one_day(self, sd: Array) -> "Information":
+        """Return the same where this drive's sensors were off by errors of their own.
+        sd : of `CHANGES` (3,).
+        """
+        along = np.zeros((SIZE, len(CHANGES)))
+        along[[PLACE[name] for name in CHANGES], range(len(CHANGES))] = 1.0
+        return self.loosened(along, sd)
 
     def loosened(self, along: Array, sd: Array) -> "Information":
         """Return the same where u was off by errors of these drives alone.

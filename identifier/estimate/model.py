@@ -19,7 +19,7 @@ from identifier.axle.slip import SHORTEST, Sway
 from identifier.day import Day
 from identifier.estimate import report
 from identifier.estimate.band import FittedBand
-from identifier.estimate.day import day_of
+from identifier.estimate.day import day_of, days_of
 from identifier.estimate.drive import Drive
 from identifier.estimate.latent import LateralVelocity, estimate_v_y
 from identifier.estimate.posterior import Reach
@@ -172,6 +172,11 @@ class FittedModel(TireModel):
         """Return the errors of a log's sensors, found from its motion with the tires held."""
         return self.day or self._known(recording, day_of)
 
+    def _days(self, recording: Recording) -> list[tuple[int, Day]]:
+        if self.day is not None or not recording.breaks:
+            return [(0, self.on(recording))]
+        return self._known(recording, days_of)
+
     def of_day(self, day: Day) -> Self:
         """Return the tires read by sensors with these errors: every log, the tracker, C."""
         return replace(self, p=day.on(self.p), day=day)
@@ -205,8 +210,10 @@ class FittedModel(TireModel):
 
     def _over(self, recording: Recording) -> tuple[Array, Array]:
         force, slip = large((len(recording), 2)), large((len(recording), 2))
-        p = self.on(recording).on(self.p)
+        firsts, days = zip(*self._days(recording), strict=True)
         for segment in recording.segments:
+            k = int(np.searchsorted(firsts, segment.start, side="right")) - 1
+            p = days[k].on(self.p)
             begin, end = segment.start, min(segment.stop, len(recording))
             for part in blocks(end - begin):
                 first = max(part.start - _WARM, 0)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.estimate.information import PLACE, SIZE, Information, coordinates
+from identifier.estimate.information import CHANGES, Information, coordinates
 from identifier.estimate.model import FittedModel
 from identifier.estimate.posterior import Reach
 from identifier.estimate.priors import ANOTHER_ROAD, Priors
@@ -27,8 +27,7 @@ from tireid.fleet.store import LogRow, StoreError
 _TAGGED = ("vehicle", "tires", "date")
 BY = (*_TAGGED, "week", "month", "log", "setting")
 COLUMNS = (*WHICH, *_TAGGED, "tags", "valid", "car", "reach", "driven", "matrix", "vector")
-CHANGES = ("steering_zero", "v_y_bias", "v_y_angle")  # of sensors, from log to log
-APART = 0.1  # standard deviation of these, of that of their prior
+APART = 1.0  # standard deviation of the zeros from log to log, of that of their prior
 _ROAD = INDEX["ln_road"]
 _Key = tuple[tuple[str, str], ...]
 
@@ -157,7 +156,7 @@ class _Sum:
 
     def add(self, row: LogRow) -> None:
         one, (slip, speeds, a_x, unexplained) = row.learnt()
-        one = one.loosened(*self.errors)
+        one = one.of_one_day(self.errors)
         if self.at is not None:
             u, slopes = self.at
             along = slopes[:, _ROAD]
@@ -183,14 +182,11 @@ class _Sum:
     def merged(self, key: _Key) -> Merged:
         p, covariance = self._settled()
         of_next = [INDEX[name] for name in CHANGES]  # its sensors are off by an error of its own
-        covariance[of_next, of_next] += self.errors[1] ** 2
+        covariance[of_next, of_next] += self.errors**2
         model = FittedModel(vehicle=self.vehicle, p=p, covariance=covariance, reach=self.reach)
         return Merged(key, self.logs, self.elsewhere, self.information, model)
 
 
-def errors_of(beliefs: Priors) -> tuple[Array, Array]:
-    """Return along what in u sensors change from log to log (m, k), and by how much (k,)."""
-    along = np.zeros((SIZE, len(CHANGES)))
-    for k, name in enumerate(CHANGES):
-        along[PLACE[name], k] = 1.0
-    return along, APART * beliefs.sd[[INDEX[name] for name in CHANGES]]
+def errors_of(beliefs: Priors) -> Array:
+    """Return by how much sensors change from log to log, (3,)."""
+    return APART * beliefs.sd[[INDEX[name] for name in CHANGES]]

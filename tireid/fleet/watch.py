@@ -85,7 +85,7 @@ def watch(
         car, day = name_of(key), str(day_of(row))
         if car not in beliefs:
             beliefs[car], driven[car] = Priors.of(row.declared_car), {}
-        one = row.learnt()[0].loosened(*errors_of(beliefs[car]))
+        one = row.learnt()[0].of_one_day(errors_of(beliefs[car]))
         driven[car][day] = driven[car].get(day, Information.nothing()) + one
     compared = {car: _compared(driven[car], beliefs[car], baseline) for car in sorted(driven)}
     T = _scatter(list(compared.values()))
