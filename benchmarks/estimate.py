@@ -2,7 +2,8 @@
 
     python -m benchmarks.estimate [--quick] [--record] [--only PART ...]
 
-By the road of a user: `ti.identify`, `freeze`, `ti.replay`; rivals are all methods of `compare`
+By the road of a user: `ti.identify`, `freeze`, forces of another log, as `ti.replay` and `compare`
+have them: each method with that log's own zeros of the sensors. Rivals are all methods of `compare`
 that use v_y, but the paper's laws. The error is that of both axles in percent of their rms force;
 where a drive has no measured force, against what its motion shows (inverse single-track forces).
 Places: random cars of four classes with good sensors, identified from a full drive, a gentle one or
@@ -29,6 +30,7 @@ from benchmarks.random_cars import CLASSES, FIRST_SEED, random_car, random_drive
 from benchmarks.recorded_cars import CARMAKER, CARMAKER_RUNS, DART, DATA, FERRARI
 from benchmarks.targets import Table, Targets, Values, parse, show
 from codegen.arrays import Array
+from identifier.compare.zeros import replayed
 from identifier.estimate.drive import Drive
 from identifier.estimate.fit import fit
 from identifier.estimate.priors import Priors
@@ -240,7 +242,7 @@ def missed(
     """
     error, size = np.zeros(2), np.zeros(2)
     for one in asked:
-        truth, force = one.axle_force, ti.replay(one, tire).axle_force
+        truth, force = one.axle_force, replayed(tire, one)
         assert truth is not None
         counts = (one.t >= since) & (one.v_x >= max(slow, tire.min_speed))
         error += np.sum((force - truth)[counts] ** 2, axis=0)

@@ -7,6 +7,7 @@ identified the tires to another one. A fit estimates them with its own balance
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -71,13 +72,27 @@ class Day:
         return corrected(recording, self.value)
 
     @property
-    def lines(self) -> tuple[str, ...]:
-        """Each number with its standard deviation, in words."""
-        return tuple(
-            f"{title}: {with_doubt(factor * float(value), factor * float(sd))}{unit}"
+    def words(self) -> dict[str, str]:
+        """Each number with its standard deviation and unit, by its title."""
+        return {
+            title: f"{with_doubt(factor * float(value), factor * float(sd))}{unit}"
             for (title, unit, factor), value, sd in zip(_ROWS, self.value, self.sd, strict=True)
             if sd > 0.0
-        )
+        }
+
+    @property
+    def line(self) -> str:
+        """The numbers in one line."""
+        said = ", ".join(f"{title} {words}" for title, words in self.words.items())
+        return said if self.anew else f"{said} (of the identification drive)"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain numbers, SI, ready for JSON."""
+        numbers = zip(NUMBERS, self.value.tolist(), self.sd.tolist(), strict=True)
+        return {
+            "anew": self.anew,
+            **{name: {"value": value, "sd": sd} for name, value, sd in numbers},
+        }
 
     @property
     def notes(self) -> tuple[tuple[str, str], ...]:
@@ -97,23 +112,30 @@ class Day:
         return tuple(listed)
 
     def _sideways(self) -> str:
-        """Return by how much v_y reads wrong at the driven speed; empty where that is little.
-
-        At one speed bias and mounting angle are one error, and each hides behind half of it.
-        """
-        b, beta = NUMBERS.index("v_y_bias"), NUMBERS.index("v_y_angle")
-        h = np.zeros(len(NUMBERS))
-        h[b], h[beta] = 1.0 / self.speed, 1.0
-        s, sd = float(h @ self.value), math.sqrt(max(float(h @ self.covariance @ h), 0.0))
-        if not (self.anew and abs(s) > max(_SIDEWAYS, _SURELY * sd)):
+        where = [NUMBERS.index("v_y_bias"), NUMBERS.index("v_y_angle")]
+        b, beta = where
+        text = sideways(self.value[where], self.covariance[np.ix_(where, where)], self.speed)
+        if not (text and self.anew):
             return ""
-        said = with_doubt(abs(s) * self.speed, sd * self.speed)
-        words = (
-            f"v_y reads {said} m/s too {'much' if s > 0.0 else 'little'} at {self.speed:.3g} m/s"
-        )
-        if (self.sd[[b, beta]] < _APART * self.usual[[b, beta]]).all():
-            return f"{words}: {self.lines[b]}, {self.lines[beta]}; the forces allow for it"
-        return f"{words}: a bias, or its sensor is turned; one speed cannot tell"
+        if (self.sd[where] < _APART * self.usual[where]).all():
+            known = ", ".join(f"{_ROWS[k][0]} {self.words[_ROWS[k][0]]}" for k in (b, beta))
+            return f"{text}: {known}; the forces allow for it"
+        return f"{text}: a bias, or its sensor is turned; one speed cannot tell"
+
+
+def sideways(errors: Array, covariance: Array, speed: float) -> str:
+    """Return by how much v_y reads wrong at a speed, in words; empty where that is little.
+
+    At one speed bias and mounting angle are one error, and each hides behind half of its prior.
+    errors, covariance : bias [m/s] and mounting angle [rad] of v_y, (2,), (2, 2).
+    speed : [m/s].
+    """
+    h = np.array([1.0 / speed, 1.0])
+    s, sd = float(h @ errors), math.sqrt(max(float(h @ covariance @ h), 0.0))
+    if not abs(s) > max(_SIDEWAYS, _SURELY * sd):
+        return ""
+    said, much = with_doubt(abs(s) * speed, sd * speed), "much" if s > 0.0 else "little"
+    return f"v_y reads {said} m/s too {much} at {speed:.3g} m/s"
 
 
 def corrected(recording: Recording, value: Array) -> Recording:

@@ -116,6 +116,12 @@ class Results:
         return list(self.models.values())[-1]
 
     @property
+    def drives(self) -> list[Recording]:
+        """The logs: those that were learnt, then the others."""
+        first, *others = self.runs
+        return [one.recording for one in (*(self.parts or [first]), *others)]
+
+    @property
     def replays(self) -> Mapping[str, Replay]:
         """Those of the last, by recording."""
         return list(self.frozen.values())[-1]
@@ -160,6 +166,11 @@ class Results:
         split = of_frozen("reproduction")
         return {
             "verdict": self.verdict.to_dict(),
+            "sensors": {
+                one.name: day.to_dict()
+                for one in self.drives
+                if (day := self.model.on(one)) is not None
+            },
             "replay_verdicts": {name: one.to_dict() for name, one in self.evaluated.items()},
             "rms_force_N": {h.recording.name: force_rms(h) for h in runs},
             "rmse_N": {

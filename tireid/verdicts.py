@@ -1,6 +1,6 @@
 """A verdict as commands print it: lines, a table of what was learnt, the exit code, a section."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from identifier.measured import NOT_IDENTIFIABLE, printed_unit, with_doubt
 from identifier.tire_model import AXLES, Axle, TireModel, stored_verdict
 from identifier.verdict import Number, Verdict
 from identifier.verdict.verdict import LARGEST_MODEL_ERROR, PERCENT
+from models.recordings import Recording
 from tireid.output import text_table
 from tireid.progress import complain
 from tireid.report import Block, Cell, Headline, Marked, Paragraph, Section, Table, Tone, printed
@@ -67,6 +68,28 @@ def verdicts_text(verdicts: Mapping[str, Verdict], what: str) -> str:
         lines.append(f"{what} {visible(name)}: {given}")
         lines += [f"  {finding.line}" for finding in verdict.findings]
     return "\n".join(lines)
+
+
+def sensors_text(model: TireModel, recordings: Iterable[Recording]) -> str:
+    """Return the errors of the sensors of each log that were taken off, a line each."""
+    days = {one.name: model.on(one) for one in recordings}
+    return "\n".join(
+        f"sensors of {visible(name)}: {day.line}" for name, day in days.items() if day is not None
+    )
+
+
+def sensors_section(model: TireModel, recordings: Iterable[Recording]) -> list[Section]:
+    """Return the same as a section of a report; none of a model that finds none."""
+    days = {one.name: day for one in recordings if (day := model.on(one)) is not None}
+    if not days:
+        return []
+    titles = list(dict.fromkeys(title for day in days.values() for title in day.words))
+    rows: list[list[Cell]] = [
+        [name, *(day.words.get(title, "") for title in titles)] for name, day in days.items()
+    ]
+    caption = "Errors that were found from its motion with the tires held, and taken off."
+    table = Table(caption=caption, header=["log", *titles], rows=rows)
+    return [Section(heading="Sensors of each log", blocks=[table])]
 
 
 def verdict_headline(verdict: Verdict, others: Sequence[str | Marked] = ()) -> Headline:

@@ -16,6 +16,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.compare.zeros import replayed
 from identifier.evidence import (
     BRISK,
     FEWEST,
@@ -98,8 +99,8 @@ class Course:
         return found if np.isfinite([found.front, found.rear]).all() else INFINITE
 
     def replays(self, model: TireModel) -> dict[str, AxleRmse]:
-        """Return by recording the error of a frozen model."""
-        return {rec.name: self.error(rec, model.predict(rec)) for rec in self.recordings}
+        """Return by recording the error of a frozen model, read by that log's own sensors."""
+        return {rec.name: self.error(rec, replayed(model, rec)) for rec in self.recordings}
 
     def share(self, name: str, error: AxleRmse) -> float:
         """Return an error as a share of the true force, both axles together [%].

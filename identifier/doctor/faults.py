@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
+from identifier.day import sideways
 from identifier.doctor.accelerometer import OF_A_Y, Accelerometer, Line, descended
 from identifier.doctor.finding import Finding
 from identifier.doctor.pieces import segments_of
@@ -471,10 +472,25 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
         share = f"{100.0 * worst.max():.0f} % model error (typical: below 12 %)"
         one = Finding(code="no_tire", channel=channel, confidence=0.9, text=f"{text}; {share}")
         return Examination((one,), (_SIZES_BLIND,), taken)
-    found = list(search.findings(post))
+    found = [*search.findings(post), *_sideways(search, post)]
     if search.accelerometer is not None:
         found = _of_one_device(found, vehicle)
     return Examination(tuple(found), tuple(search.unobservable(post)), taken)
+
+
+def _sideways(search: Search, post: Posterior) -> Iterator[Finding]:
+    """Yield a note on a v_y that is off at one speed, where no bias and no angle was found."""
+    names = ("v_y_bias", "v_y_angle")
+    if any(name in search.wide for name in names):
+        return
+    where = [INDEX[name] for name in names]
+    on = np.concatenate([one.signals[one.counts, 0] for one in search.problem.drives])
+    P, speed = post.covariance[np.ix_(where, where)], float(np.median(on))
+    if text := sideways(post.p[where], P, speed):
+        yield Finding(
+            code="v_y_reads", channel="v_y", confidence=0.9, note=True,
+            text=f"{text}: a bias, or its sensor is turned; one speed cannot tell",
+        )  # fmt: skip
 
 
 def prepared(recording: Recording, vehicle: Vehicle) -> Search | None:

@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import get_args
 
 from codegen.arrays import Array
 from identifier.axle.gate import GATE_PORT
-from identifier.estimate.fit import fit
+from identifier.estimate.fit import Days, fit
 from identifier.estimate.model import FittedModel
 from identifier.estimate.poor import on_time
 from identifier.estimate.priors import Priors
@@ -32,15 +33,19 @@ class FitMethod(Method):
 
     By `estimate.solve`, without a v_y by `estimate.latent`.
     min_speed : below this speed [m/s] forces read zero.   dt : sampling interval of the log [s].
+    days : of zeros of the sensors, as of `fit.fit`.
     """
 
     judged_by = "tireid predict on another drive"
 
     min_speed: float
     dt: float = 0.01
+    days: Days = "found"
 
     def __post_init__(self) -> None:
         require_positive(ValueError, dt=self.dt, min_speed=self.min_speed)
+        if self.days not in get_args(Days):
+            raise ValueError(f"days must be one of {get_args(Days)}, it is {self.days!r}")
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> "FitMethod":
@@ -74,7 +79,7 @@ class FitMethod(Method):
         priors = Priors.of(vehicle)
         if start is not None:
             priors = priors.known(start.p, start.covariance)
-        return fit([recording], vehicle, priors, progress=progress).model
+        return fit([recording], vehicle, priors, days=self.days, progress=progress).model
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
         del vehicle, state

@@ -56,14 +56,6 @@ def estimates(model: Any) -> tuple[Estimate, ...]:
             (GRIP, axle, top[i], sd_top[i], "static load", None, known[1]),
             (RELAXATION, axle, lag[i], C[i] * now, "m", None, now <= _DECIDED * prior),
         ]
-    zeros: tuple[tuple[str, Axle, str, str, float], ...] = (
-        ("zero of the steering", "front", "steering_zero", "deg", math.degrees(1.0)),
-        ("bias of v_y", "rear", "v_y_bias", "m/s", 1.0),
-    )
-    for title, axle, name, unit, scale in zeros:
-        now, prior = sd_of(name)
-        known_zero, value = now <= _DECIDED * prior, scale * model[name]
-        rows.append((title, axle, value, scale * now, unit, 0.0, known_zero))
     return tuple(
         Estimate(title, axle, float(value), float(sd), unit, declared, bool(known))
         for title, axle, value, sd, unit, declared, known in rows

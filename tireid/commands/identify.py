@@ -1,6 +1,7 @@
 """`tireid identify LOG --vehicle FILE --out DIR`: learn the tires of a recording, freeze them."""
 
 import argparse
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -8,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from identifier.doctor import diagnose
+from identifier.estimate.method import FitMethod
 from identifier.frozen import FrozenModelError, require_alive
 from identifier.method import CannotFreezeError, Method
 from identifier.reproducibility import counted_samples, freeze_key
@@ -22,7 +24,7 @@ from tireid.learning import identify
 from tireid.output import output_folder, require_free, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
-from tireid.verdicts import verdict_text, verdicts_text
+from tireid.verdicts import sensors_text, verdict_text, verdicts_text
 
 _LEARNING, _JUDGING, _DRAWING = "learning", "replays and verdict", "curves and figures"
 
@@ -47,6 +49,12 @@ def declare(new: Any) -> None:
     parser.add_argument("--freeze", type=float, metavar="T", help=text, **several)
     text = "validation drives to predict, each with a verdict"
     parser.add_argument("--replay", default=[], metavar="LOG[:RUN]", help=text, **several)
+    parser.add_argument(
+        "--each-day",
+        action="store_true",
+        help="logs of different days: each has zeros of its sensors of its own (found where they "
+        "clearly differ)",
+    )
     shared.add_log_reading(parser)
     add_repair(parser, "identify the repaired log, and write the repair to")
     shared.add_weights(parser, "begin with this model")
@@ -59,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return 3 where what was learnt is not valid, or not of a replayed log."""
     vehicle = shared.read_vehicle(options)
     seed = None if options.seed is None else shared.seed_of(options)
-    law, design = shared.chosen_method(options, vehicle, seed)
+    law, design = _method(options, vehicle, seed)
     start = shared.stored_model(options.weights)
     if options.repair is not None:
         require_free(options.repair, force=options.force)
@@ -79,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
         logs, others = ([repair.apply(one, vehicle)[0] for one in some] for some in (logs, others))
         recording = joined(logs)
         vehicle = repair.on(vehicle)
-        law, design = shared.chosen_method(options, vehicle, seed)
+        law, design = _method(options, vehicle, seed)
     if options.repair is not None and not options.no_check:
         for one in (*logs, *others):
             check_physics(one)
@@ -118,6 +126,7 @@ def run(options: argparse.Namespace) -> int:
             found.table(),
             _closing_line(learnt, last, vehicle),
             doctor_text(diagnosis, repair, options.repair),
+            sensors_text(found.model, found.drives),
             verdicts_text(replayed, "replayed on"),
             verdict_text(verdict),
         )
@@ -127,6 +136,15 @@ def run(options: argparse.Namespace) -> int:
     tell("\n".join(part for part in given if part))
     say(f"wrote {options.out}/")
     return max(shared.exit_code(one, options) for one in (verdict, *replayed.values()))
+
+
+def _method(options: argparse.Namespace, vehicle: Vehicle, seed: int | None) -> tuple[str, Method]:
+    law, design = shared.chosen_method(options, vehicle, seed)
+    if not options.each_day:
+        return law, design
+    if not isinstance(design, FitMethod):
+        raise ValueError(f"--each-day is of the method fit: {law} reads one log after the other")
+    return law, replace(design, days="each")
 
 
 def _require_model(law: str, design: Method, vehicle: Vehicle) -> None:

@@ -40,6 +40,8 @@ from tireid.verdicts import (
     known_headline,
     model_error_headline,
     of_answer,
+    sensors_section,
+    sensors_text,
     stored_warning,
     verdict_headline,
     verdict_section,
@@ -104,7 +106,12 @@ def run(options: argparse.Namespace) -> int:
         name = visible(recording.name)
         cells = [name, *error_cells(error, prediction.true_force)]
         table = output.text_table([["predicted", "front", "rear"], cells], "<>>")
-    tell("\n".join(one for one in (table, lines, verdict_text(verdict, numbers=False)) if one))
+    sensors = sensors_text(model, [recording])
+    tell(
+        "\n".join(
+            one for one in (table, lines, sensors, verdict_text(verdict, numbers=False)) if one
+        )
+    )
     say(f"wrote {options.out}/")
     return shared.exit_code(verdict, options)
 
@@ -142,6 +149,7 @@ def summary(prediction: Prediction, half: Array | None) -> dict[str, Any]:
         "samples": len(recording),
         "rmse_N": prediction.against_truth,
         "rms_force_N": prediction.true_force,
+        "sensors": None if prediction.day is None else prediction.day.to_dict(),
         "motion": None
         if motion is None
         else {
@@ -252,6 +260,7 @@ def write_predict_report(
         sections=[
             verdict_section(verdict),
             page.Section(heading="What it predicts", blocks=found),
+            *sensors_section(model, [recording]),
             origin(
                 command,
                 model.vehicle,

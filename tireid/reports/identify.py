@@ -65,6 +65,7 @@ def write_identify_report(
             page.Section(
                 heading="Identified tires", blocks=learnt_blocks(found.method, model, figures)
             ),
+            *verdicts.sensors_section(model, found.drives),
             page.Section(
                 heading="How well it predicts",
                 blocks=[*_evaluated(evaluated), *_errors(found, figures)],
