@@ -277,8 +277,13 @@ class FittedModel(TireModel):
     # Another car, another road, another form.
 
     def mounted_on(self, vehicle: Vehicle) -> "FittedModel":
+        there = Priors.of(vehicle)  # lengths that a small car cannot have end at its bounds
         return replace(
-            self, vehicle=vehicle, reach=self.reach._replace(segments=()), model_error=None
+            self,
+            vehicle=vehicle,
+            p=np.clip(self.p, there.low, there.high),
+            reach=self.reach._replace(segments=()),
+            model_error=None,
         )
 
     def at_friction(self, ratio: float) -> "FittedModel":

@@ -70,6 +70,7 @@ def declare(new: Any) -> None:
         f"the first leads ({driving.FROZEN})",
     )
     shared.add_weights(parser, "the frozen tires, as identified")
+    shared.add_day(parser)
     shared.add_method(parser)
     shared.add_vehicle(parser)
     numbers = {
@@ -244,7 +245,7 @@ def frozen_tires(
     if not {driving.FROZEN, driving.LEARNING} & set(labels):
         return "no tires were identified", None
     if options.weights is not None:
-        model = shared.stored_model(options.weights)
+        model = shared.model_of_day(options)
         assert model is not None
         _require_its_car(options, model.vehicle, setup)
         return f"frozen ones from {options.weights}", model

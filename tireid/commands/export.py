@@ -19,6 +19,7 @@ def declare(new: Any) -> None:
     shared.add_vehicle(parser)
     shared.add_method(parser, LIVE)
     shared.add_weights(parser, "begin with it, as identified")
+    shared.add_day(parser)
     parser.add_argument("--name", default="tireid", help="prefix of every symbol (%(default)s)")
     flags = {
         "--single": "float unless the build says double",
@@ -41,7 +42,7 @@ def run(options: argparse.Namespace) -> None:
     require_within(ValueError, 0.0, 1.0, **{"--caution": options.caution})
     if options.caution and not options.mpc:
         raise ValueError("--caution goes with --mpc: it is of the tracker")
-    start = shared.stored_model(options.weights)
+    start = shared.model_of_day(options)
     vehicle = shared.read_vehicle(options, start, options.weights)
     v_y = options.method != WITHOUT_V_Y
     if start is None or (v_y and shared.method_is_given(options)):

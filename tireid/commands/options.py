@@ -25,7 +25,7 @@ from identifier.methods import (
 from identifier.paper.design import read_design
 from identifier.tire_model import TireModel, load_model
 from identifier.verdict import Verdict
-from models.recordings import LogMap, Recording, read_repaired, split_log_argument
+from models.recordings import LogMap, Recording, read_recording, read_repaired, split_log_argument
 from models.recordings.map import CUT, MEND
 from models.recordings.reader import map_of, with_columns
 from models.schema import require_few
@@ -116,6 +116,31 @@ def stored_model(path: Path | None) -> TireModel | None:
     model = load_model(path)
     warn_of_stored(path)
     return model
+
+
+def add_day(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--day",
+        metavar="LOG[:RUN]",
+        help="log with the sensors as they are today, whose zeros are found from it (those of the "
+        "log that identified the tires)",
+    )
+
+
+def model_of_day(options: argparse.Namespace) -> TireModel | None:
+    """Return the model of --weights with the sensors of --day, None where no model is given."""
+    model = stored_model(options.weights)
+    if options.day is None:
+        return model
+    if model is None:
+        raise ValueError("--day is of a stored model: give --weights, too")
+    path, named = split_log_argument(options.day)
+    log = read_recording(path, run=named)
+    day = model.on(log)
+    if day is None:
+        raise ValueError(f"--day is for tires of a fit, {options.weights} is a {model.kind}")
+    say(f"sensors of {log.name}: {day.line}")
+    return model.held_on(log)
 
 
 def require_toml(path: Path) -> None:

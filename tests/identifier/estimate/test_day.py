@@ -1,0 +1,124 @@
+"""Sensors of a log are found anew for each, the tires held: zeros do not travel with tires."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identifier.compare.zeros import replayed, zeros
+from identifier.doctor import diagnose
+from identifier.estimate.fit import fit
+from identifier.methods import make_method
+from identifier.prediction import predict
+from identifier.run import identify
+from models.recordings import joined
+from models.vehicle import Vehicle, sedan
+from mpc.tires import prediction_tire
+from tests.identifier.estimate.conftest import driven
+from tests.identifier.estimate.test_fit import share_missed
+
+ZERO, BIAS = 0.02, 0.3  # rad, m/s
+
+
+def of_another_day(drive, sign=1.0):
+    return replace(drive, delta_f=drive.delta_f - sign * ZERO, v_y=drive.v_y + sign * BIAS)
+
+
+@pytest.fixture(scope="module")
+def tire(learnt):
+    return learnt.model
+
+
+def test_zeros_of_another_day_are_found_and_do_not_reach_the_forces(tire):
+    clean, other = driven(5), of_another_day(driven(5))
+    day = tire.on(other)
+    assert day.anew
+    assert day["steering_zero"] == pytest.approx(ZERO, rel=0.2)
+    assert day["v_y_bias"] + day.speed * day["v_y_angle"] == pytest.approx(BIAS, rel=0.1)
+    assert share_missed(tire, other).max() < share_missed(tire, clean).max() + 0.02
+    held = tire.of_day(tire.on(clean))
+    assert share_missed(held, other).max() > 0.2  # as the sensors of a day without them read it
+
+
+def test_a_verdict_names_zeros_that_are_large_and_stays_valid(tire):
+    found = predict(tire, of_another_day(driven(5)))
+    codes = {one.code for one in found.verdict.findings}
+    assert found.verdict.valid
+    assert codes & {"v_y_reads", "v_y_bias"} and "steering_zero" not in codes  # 1.1 deg: usual
+    assert not {"v_y_reads", "v_y_bias"} & {
+        one.code for one in predict(tire, driven(5)).verdict.findings
+    }
+
+
+def test_what_is_too_short_to_tell_keeps_the_zeros_that_were_identified(tire):
+    short = driven(5)[0.0:10.0]
+    assert not tire.on(short).anew
+    np.testing.assert_array_equal(tire.on(short).on(tire.p), tire.p)
+
+
+def test_logs_of_different_days_have_zeros_of_their_own():
+    logs = [of_another_day(driven(3)), of_another_day(driven(4), -1.0)]
+    apart, one = (fit(logs, sedan(), days=days).model for days in ("found", "one"))
+    clean = fit([driven(3), driven(4)], sedan()).model
+    slip = np.linspace(0.005, 0.05, 10)
+    away = [np.abs(each.force(slip) / clean.force(slip) - 1.0).max() for each in (apart, one)]
+    assert away[0] < 0.08 < away[1]
+    together = joined(logs)
+    forces = apart.predict(together)
+    error = np.sqrt(np.mean((forces - together.axle_force) ** 2, axis=0))
+    assert (error < 0.08 * np.sqrt(np.mean(together.axle_force**2, axis=0))).all()
+
+
+def test_a_v_y_that_was_estimated_has_no_errors_of_a_sensor(tire):
+    taught = tire.of_day(replace(tire.on(driven(5)), value=np.array([0.0, 0.2, 0.0, 0.0, 0.0])))
+    model = replace(taught, day=None)
+    blind = replace(driven(5), estimated=("v_y",))
+    assert model["v_y_bias"] == 0.2
+    assert model.on(blind)["v_y_bias"] == 0.0
+
+
+def test_the_tracker_reads_the_sensors_of_a_day(tire):
+    day = tire.on(of_another_day(driven(5)))
+    weights = prediction_tire(tire.of_day(day)).weights
+    np.testing.assert_allclose(weights[[0, 2]], [day["steering_zero"], day["v_y_bias"]])
+    np.testing.assert_array_equal(weights[4:], prediction_tire(tire).weights[4:])
+    assert tire.of_day(day).at_friction(0.5).on(driven(5)) is day
+
+
+def test_a_rival_gets_the_same_step():
+    drive, car = driven(3), sedan()
+    rival = identify(drive, car, make_method("lagged_ekf", car)).freeze()
+    other = of_another_day(driven(5))
+    assert zeros(rival, other)["steering_zero"] == pytest.approx(ZERO, rel=0.3)
+    raw, given = (
+        np.sqrt(np.mean((force - other.axle_force) ** 2))
+        for force in (rival.predict(other), replayed(rival, other))
+    )
+    assert given < 0.7 * raw
+
+
+def test_the_band_on_a_log_is_as_wide_as_what_is_missed_of_it(tire):
+    clean = driven(5)
+    other = tire.at_friction(0.6)
+    narrow, wide = (np.mean(one.band.over(clean), axis=0) for one in (tire, other))
+    assert (wide > 1.5 * narrow).any()
+    missed = np.abs(tire.predict(clean) - clean.axle_force)
+    assert np.mean(missed <= tire.band.over(clean)) > 0.8
+
+
+@pytest.mark.parametrize("errors", [(0.3, 0.0), (0.0, np.radians(1.0))])
+def test_at_one_speed_the_doctor_names_the_sum(errors):
+    bias, angle = errors
+    drive = driven(6, swing=0.0)
+    v_y = drive.v_y + bias + angle * drive.v_x
+    said = [one for one in diagnose(replace(drive, v_y=v_y), sedan()).findings]
+    assert any(one.channel == "v_y" for one in said)
+    assert not any(one.channel == "v_y" for one in diagnose(drive, sedan()).findings)
+
+
+def test_a_fit_is_mounted_on_a_model_car(tire):
+    small = Vehicle(
+        mass=1.6, yaw_inertia=0.005, l_f=0.08, l_r=0.09, cornering_stiffness_front=30.0,
+        cornering_stiffness_rear=30.0,
+    )  # fmt: skip
+    assert np.isfinite(tire.mounted_on(small).stiffness).all()
