@@ -164,13 +164,11 @@ class Results:
             }
 
         split = of_frozen("reproduction")
+        days = {one.name: self.model.on(one) for one in self.drives}
+        sensors = {name: day.to_dict() for name, day in days.items() if day is not None}
         return {
             "verdict": self.verdict.to_dict(),
-            "sensors": {
-                one.name: day.to_dict()
-                for one in self.drives
-                if (day := self.model.on(one)) is not None
-            },
+            **({"sensors": sensors} if sensors else {}),
             "replay_verdicts": {name: one.to_dict() for name, one in self.evaluated.items()},
             "rms_force_N": {h.recording.name: force_rms(h) for h in runs},
             "rmse_N": {

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identifier.estimate.fit import fit
-from identifier.estimate.information import GRID, SIZE, Information, coordinates
+from identifier.estimate.information import CHANGES, GRID, PLACE, SIZE, Information, coordinates
 from identifier.estimate.priors import SENSORS, Priors
 from identifier.estimate.solve import settled
 from identifier.frozen import vehicle_numbers
@@ -16,7 +16,7 @@ from identifier.motion.parameters import INDEX
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tireid.fleet.learn import DT, learn_recording
-from tireid.fleet.merge import APART, CHANGES, errors_of, merge, usable
+from tireid.fleet.merge import APART, errors_of, merge, usable
 from tireid.fleet.store import OBSERVABLE, LogRow, Store, StoreError, information_columns
 from tireid.fleet.watch import LARGEST, USUAL, watch
 
@@ -89,14 +89,16 @@ def test_a_merged_model_is_the_optimum_of_prior_and_logs():
     assert (one.name, one.logs, one.elsewhere) == (f"{CAR.name} 2026-01 ann", 6, 0)
     assert merged(rows)[0].name == "all"
     beliefs, model = Priors.of(CAR), one.model
-    sd = APART * beliefs.sd[[INDEX[name] for name in CHANGES]]
+    sd = errors_of(beliefs)
+    np.testing.assert_allclose(sd, APART * beliefs.sd[[INDEX[name] for name in CHANGES]])
+    along = np.zeros((SIZE, len(CHANGES)))
+    along[[PLACE[name] for name in CHANGES], range(len(CHANGES))] = 1.0
 
     def cost(p):
         """Over each log's own errors of sensors, the least."""
         u, _ = coordinates(p)
         total = 0.5 * (p - beliefs.mean) @ beliefs.information @ (p - beliefs.mean)
         for part in parts:
-            along, _ = errors_of(beliefs)
             H = along.T @ part.matrix @ along + np.diag(sd**-2.0)
             d = -np.linalg.solve(H, along.T @ (part.matrix @ u - part.vector))
             v = u + along @ d
@@ -236,7 +238,7 @@ def test_the_number_of_a_day_is_the_chi_square_of_its_estimate():
     sums = [Information.nothing(), Information.nothing(), Information.nothing()]
     for row in by_day:
         at = 0 if row.date <= "2026-01-02" else 1 if row.date == "2026-01-03" else 2
-        sums[at] += row.learnt()[0].loosened(*errors_of(beliefs))
+        sums[at] += row.learnt()[0].of_one_day(errors_of(beliefs))
     p, _ = settled(beliefs.after(sums[0]), beliefs.mean)
     free = [INDEX[name] for name in ("ln_stiffness_f", "ln_stiffness_r", "ln_road", *SENSORS)]
     sd = [LARGEST] * 3 + [beliefs.sd[INDEX[name]] for name in SENSORS]

@@ -149,7 +149,7 @@ def summary(prediction: Prediction, half: Array | None) -> dict[str, Any]:
         "samples": len(recording),
         "rmse_N": prediction.against_truth,
         "rms_force_N": prediction.true_force,
-        "sensors": None if prediction.day is None else prediction.day.to_dict(),
+        **({} if prediction.day is None else {"sensors": prediction.day.to_dict()}),
         "motion": None
         if motion is None
         else {

@@ -166,7 +166,6 @@ def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
         "cornering stiffness",
         "grip",
         "relaxation length",
-        "bias of v_y",
     }
 
 
