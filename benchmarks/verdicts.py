@@ -7,12 +7,16 @@ recordings, where they are there: a third with nothing wrong, a third with a beg
 kind, a third with faults of the log or of what is declared. Without v_y: drives on banked roads
 with what inertial sensors add; the first part of each is identified, the rest evaluated, with the
 same sensors; beside each clean log stands one with a fault. A model is bad above `WRONG` in an
-axle's force on the evaluated drive, and good below `RIGHT` in both. Constants of the verdict were
-chosen on seeds below `FIRST_SEED`, without recordings.
+axle's force on the evaluated drive, and good below `RIGHT` in both.
+
+Beside these, other logs: every log of `benchmarks.estimate` identifies tires, every other of that
+car asks for the verdict on them, as they are and with something planted: another friction, another
+stiffness of one axle, swapped axles, a center of gravity or a steering ratio that is wrong.
+Constants of the verdict were chosen on seeds below `FIRST_SEED`, without recordings.
 """
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
@@ -21,7 +25,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import tireid as ti
-from benchmarks.answers import RIGHT, WRONG, Answer, answer, force_error
+from benchmarks.answers import RIGHT, WRONG, Answer, answer, blind, force_error
+from benchmarks.estimate import PLACES, of_random_cars
 from benchmarks.fault_cases import Case, random_case
 from benchmarks.random_cars import (
     BEGINNINGS,
@@ -33,6 +38,10 @@ from benchmarks.random_cars import (
 )
 from benchmarks.recorded_cars import CARMAKER, DART, DATA
 from benchmarks.targets import Table, Targets, Values, parse, show
+from identifier.estimate.model import FittedModel
+from identifier.estimate.priors import Priors
+from identifier.motion.parameters import INDEX, curve_index
+from identifier.tire_model import TireModel
 from models.recordings import Recording, Repair, read_recording
 from models.vehicle import Vehicle
 
@@ -199,6 +208,116 @@ def blind_answers(job: tuple[str, int]) -> list[Judged]:
     return found
 
 
+class Pair(NamedTuple):
+    """A log that identified tires of a car, and one that asks about them."""
+
+    place: str
+    car: Vehicle
+    log: Recording
+    other: Recording
+    since: float
+
+
+def pairs(*, quick: bool) -> list[Pair]:
+    """Return all pairs; of random cars those of a full drive.
+
+    Parameters
+    ----------
+    quick : one of each place.
+    """
+    found = []
+    for part, drives in PLACES.items():
+        if part != "random" and not DATA.is_dir():
+            continue
+        of_place = of_random_cars(1) if quick and part == "random" else drives()
+        for place, tasks in of_place.items():
+            if place in ("gentle", "step"):
+                continue
+            some = [
+                Pair(place, one.car, one.log, other, one.since)
+                for one in tasks
+                for others in one.asked
+                for other in others
+            ]
+            found += some[:1] if quick else some
+    return found
+
+
+def _with(tire: TireModel, **added: float) -> TireModel:
+    """Return tires with something added to some parameters, within their bounds."""
+    assert isinstance(tire, FittedModel)
+    p, beliefs = tire.p.copy(), Priors.of(tire.vehicle)
+    for name, more in added.items():
+        p[INDEX[name]] += more
+    return replace(tire, p=np.clip(p, beliefs.low, beliefs.high))
+
+
+def _swapped(tire: TireModel) -> TireModel:
+    assert isinstance(tire, FittedModel)
+    p = tire.p.copy()
+    p[[*curve_index("f")[:-1], *curve_index("r")[:-1]]] = tire.p[
+        [*curve_index("r")[:-1], *curve_index("f")[:-1]]
+    ]
+    return replace(tire, p=p)
+
+
+def _on(ratio: float) -> Callable[[TireModel], TireModel]:
+    return lambda tire: tire.at_friction(ratio)
+
+
+def _as_stiff(axle: str, times: float) -> Callable[[TireModel], TireModel]:
+    return lambda tire: _with(tire, **{f"ln_stiffness_{axle}": float(np.log(times))})
+
+
+PLANTED = {
+    **{f"friction x {ratio:g}": _on(ratio) for ratio in (0.5, 0.7, 1.3)},
+    **{
+        f"stiffness {axle} x {times:g}": _as_stiff(axle, times)
+        for axle in "fr"
+        for times in (0.7, 1.42)
+    },
+    "swapped axles": _swapped,
+}
+GROUPS = ("nothing", "friction", "stiffness", "swapped axles", "center of gravity", "ratio")
+CENTER, RATIOS = (-0.1, 0.1), (0.8, 1.25)  # wheelbases; of the steering
+
+
+def pair_answers(job: tuple[Pair, bool]) -> list[Judged]:
+    """Return the verdicts of a log on tires of another, as they are and with something planted.
+
+    Parameters
+    ----------
+    job : the pair, and whether something is planted.
+    """
+    (place, car, log, other, since), planted = job
+    asked = other.between(since, float(other.t[-1])) if since > other.t[0] else other
+
+    def judged(what: str, tire: TireModel, asked: Recording = asked) -> Judged:
+        verdict = ti.replay(blind(asked), tire).verdict
+        codes = tuple(one.code for one in verdict.findings if one.refuses)
+        found = Answer(force_error(tire, asked), verdict.valid, codes)
+        return Judged(f"planted: {what}", 0, f"{place} {log.name} -> {other.name}", found)
+
+    def taught(log: Recording, car: Vehicle) -> TireModel:
+        return ti.identify(blind(log), car, check=False).freeze()
+
+    tire = taught(log, car)
+    found = [judged("nothing", tire)]
+    if not planted:
+        return found
+    for what, change in PLANTED.items():
+        found.append(judged(next(one for one in GROUPS if what.startswith(one)), change(tire)))
+    for share in CENTER:
+        moved = share * car.wheelbase
+        told = replace(car, l_f=car.l_f + moved, l_r=car.l_r - moved)
+        found.append(judged("center of gravity", taught(log, told)))
+    for ratio in RATIOS:
+        tire = taught(replace(log, delta_f=ratio * log.delta_f), car)
+        alike = replace(asked, delta_f=ratio * asked.delta_f)
+        found += [judged("ratio", tire), judged("ratio", tire, alike)]
+    return found
+
+
 def report(found: Sequence[Judged], targets: Targets) -> None:
     """Print the counts of each group of answers, and record them.
 
@@ -244,6 +363,10 @@ def judge(targets: Targets) -> None:
         targets.at_most(f"{way}: good models rejected", share, 3.0)
         for what, count in total.items():
             targets.record(f"{way}/{what}", count)
+    wrong = sum(int(targets.values.get(f"planted: {one}/accepted", 0)) for one in GROUPS)
+    targets.at_most("other logs: bad models accepted, planted or not", wrong, 0, "")
+    right = [int(targets.values[f"planted: nothing/{what}"]) for what in ("rejected", "good")]
+    targets.at_most("other logs: good rejected", 100.0 * right[0] / max(right[1], 1), 1.0)
     silent = int(targets.values["with v_y/silent"])
     targets.at_most("bad models accepted, and no word of the doctor", silent, 0, "")
 
@@ -268,7 +391,16 @@ def tables(v: Values) -> dict[str, Table]:
         "logs", "answers", f"bad models (error above {WRONG:g} %)", "of these accepted",
         "and no word of the doctor", f"good models (below {RIGHT:g} %)", "of these rejected",
     )  # fmt: skip
-    return {"verdicts": Table(header, rows)}
+    planted = [
+        [name, *(f"{v[f'planted: {name}/{what}']}" for what in COUNTS if what != "silent")]
+        for name in GROUPS
+    ]
+    return {
+        "verdicts": Table(header, rows),
+        "verdicts/planted": Table(
+            ("what was planted; verdict of another log", *header[1:4], *header[5:]), planted
+        ),
+    }
 
 
 def main() -> int:
@@ -279,14 +411,21 @@ def main() -> int:
     seeds = range(FIRST_SEED, FIRST_SEED + each // PER_CAR)
     jobs = [(kind, seed) for seed in seeds for kind in classes]
     first = (FIRST + len(CLASSES) * k for k in range(drives))
-    blind = [(kind, seed + i) for seed in first for i, kind in enumerate(classes)]
+    blind_jobs = [(kind, seed + i) for seed in first for i, kind in enumerate(classes)]
+    first_of: set[tuple[str, str]] = set()
+    asked = []
+    for one in pairs(quick=options.quick):  # planted is in the first log that asks of each
+        key = (one.place, one.log.name)
+        asked.append((one, key not in first_of))
+        first_of.add(key)
     parts = range(FIRST_SEED, FIRST_SEED + each) if recordings() else range(0)
     if not recordings():
         print(f"  without recordings: they are not there: {DATA} (set TIREID_DATA)")
     with ProcessPoolExecutor() as pool:
         found = [one for some in pool.map(plant_answers, jobs) for one in some]
         found += pool.map(recorded_answer, parts)
-        found += [one for some in pool.map(blind_answers, blind) for one in some]
+        found += [one for some in pool.map(blind_answers, blind_jobs) for one in some]
+        found += [one for some in pool.map(pair_answers, asked) for one in some]
     report(found, targets)
     judge(targets)
     return targets.finish(keep=options.record and bool(recordings()))
