@@ -114,6 +114,14 @@ class Evidence:
         share: Array = np.divide(rms, size, out=np.ones(2), where=size > 0.0)
         return share
 
+    def worst(self, n: int) -> Array:
+        """Return the largest of that share over `n` windows that follow each other, (2,)."""
+        size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
+        missed = ((self.measured - self.modelled) ** 2 - self.noise) / size
+        total, n = np.cumsum(np.vstack([np.zeros(2), missed]), axis=0), min(n, len(missed))
+        share: Array = np.sqrt(np.maximum((total[n:] - total[:-n]).max(axis=0) / n, 0.0))
+        return share
+
     def where(self, kept: NDArray[np.bool_]) -> "Evidence":
         """Return the evidence of some of the windows (m,)."""
         return replace(

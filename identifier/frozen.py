@@ -29,13 +29,14 @@ VEHICLE_KEYS = ("name", *BICYCLE)
 def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
     """Return the name and the six numbers of the bicycle by the words of a vehicle file, SI.
 
-    Where the car has downforce its areas follow, and what it tells of `LENGTHWISE`; where some
-    numbers are estimated, `estimated` lists which.
+    Where the car has downforce its areas follow, and what it tells of `LENGTHWISE` and of the doubt
+    of its center of gravity; where some numbers are estimated, `estimated` lists which.
     """
     numbers = {key: getattr(vehicle, key) for key in VEHICLE_KEYS}
     if vehicle.has_downforce:
         numbers |= {key: getattr(vehicle, key) for key in AREAS}
-    given = {key: value for key in LENGTHWISE if (value := getattr(vehicle, key)) is not None}
+    told = (*LENGTHWISE, "center_of_gravity_sd")
+    given = {key: value for key in told if (value := getattr(vehicle, key)) is not None}
     return numbers | given | ({"estimated": list(vehicle.estimated)} if vehicle.estimated else {})
 
 

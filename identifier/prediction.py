@@ -9,7 +9,7 @@ from identifier.day import Day
 from identifier.evidence import MotionError, motion_error
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.tire_model import TireModel
-from identifier.verdict import RoadFriction, Verdict, judge_prediction
+from identifier.verdict import RoadFriction, Verdict, friction_of, judge_prediction
 from models.recordings import Recording
 
 
@@ -56,7 +56,8 @@ class Prediction:
     def friction(self) -> RoadFriction | None:
         """Return the friction of the drive's road over that of the identification drive, over time.
 
-        None where the model has no band, or too little is driven. It is part of the verdict.
+        None where the model has no band, or too little is driven. The verdict asks for it where the
+        model misses some of the motion.
 
         Raises
         ------
@@ -65,7 +66,7 @@ class Prediction:
         """
         if self.model.band is not None and not self.model.band.calibrated:
             raise ValueError(f"friction() wants a calibrated band; this one is {UNCALIBRATED}")
-        return self.verdict.friction
+        return self.verdict.friction or friction_of(self.model, self.recording)
 
     def motion_text(self) -> str:
         """Return what the forces explain of the motion, in a line; empty where unknown."""

@@ -139,6 +139,7 @@ _OF_CHASSIS = ("cg_height", "drive_front_share", "brake_front_share")  # declare
 LENGTHWISE = (*_OF_CHASSIS, "drag_area")  # of a `Vehicle`
 _MOST_HEIGHT = 0.6  # wheelbases: a van that is loaded high has 0.35
 _DRAG_AREA, FULL_SIZE = 0.7, 1.0  # m² of a passenger car; wheelbase [m] below which it has none
+_MOST_CENTER_SD = 0.2  # wheelbases: half of where any car has its center of gravity
 _MOST_DRAG = 1.0  # weights, at `DOWNFORCE_SPEED`: a Formula car has about 0.1
 
 
@@ -207,6 +208,8 @@ class Vehicle:
     drive_front_share, brake_front_share : share of the front axle in the driving and the braking
         force [-]; None is that of the chassis, or not known.
     drag_area : coefficient of drag times frontal area [m^2]; None is not known.
+    center_of_gravity_sd : standard deviation of l_f at a given wheelbase [wheelbases]: about 0.01
+        where the axles were weighed, 0.04 of a data sheet; None is not known.
     chassis : what the double-track plant needs, or None.
     estimated : names of the values that nobody measured, but that follow from the others by a
         rule; two cars that differ in it alone are equal.
@@ -225,6 +228,7 @@ class Vehicle:
     drive_front_share: float | None = None
     brake_front_share: float | None = None
     drag_area: float | None = None
+    center_of_gravity_sd: float | None = None
     chassis: Chassis | None = None
     estimated: tuple[str, ...] = field(default=(), compare=False)
 
@@ -271,6 +275,8 @@ class Vehicle:
                     f"static loads of the axle at {DOWNFORCE_SPEED:g} m/s, it is "
                     f"{getattr(self, name):g}: check the units"
                 )
+        if (sd := self.center_of_gravity_sd) is not None:
+            require_within(VehicleError, 0.0, _MOST_CENTER_SD, center_of_gravity_sd=sd)
         most_drag = _MOST_DRAG * self.weight / (0.5 * _AIR_DENSITY * DOWNFORCE_SPEED**2)
         highest = {"cg_height": _MOST_HEIGHT * self.wheelbase, "drag_area": most_drag}
         for name in LENGTHWISE:

@@ -38,6 +38,8 @@ def _marked_number(verdict: Verdict, number: Number | None) -> Marked:
         return Marked("")
     if not number.identified:
         return Marked(number.words, "unknown", NOT_IDENTIFIABLE)
+    if not number.judged:
+        return Marked(number.words, "refused", "not judged")
     if not number.valid:
         return Marked(number.words, "struck", "not valid")
     return Marked(number.words, "" if verdict.valid else "refused")
@@ -93,9 +95,10 @@ def sensors_section(model: TireModel, recordings: Iterable[Recording]) -> list[S
 
 
 def verdict_headline(verdict: Verdict, others: Sequence[str | Marked] = ()) -> Headline:
-    """Return the verdict as the first number of a report: green, amber with notes, red."""
+    """Return the verdict as the first number of a report: green, red; amber with notes, or open."""
     if not verdict.valid:
-        return Headline("NOT VALID", f"the verdict on this answer: {verdict.against}", "bad")
+        meaning = f"the verdict on this answer: {verdict.against}"
+        return Headline(verdict.word, meaning, "bad" if verdict.judged else "doubt")
     notes = len(verdict.findings) + len(others)
     noted = f", with {notes} note{'s' * (notes > 1)}" if notes else ""
     meaning = f"the verdict on this answer: it reproduces the measured motion{noted}"
@@ -145,8 +148,9 @@ def verdicts_headline(
 
     fine : what it is worth where all are.
     """
-    valid = sum(verdict.valid for verdict in verdicts.values())
-    tone: Tone = fine if valid == len(verdicts) else "bad"
+    words = [verdict.word for verdict in verdicts.values()]
+    valid, refused = words.count("valid"), words.count("NOT VALID")
+    tone: Tone = fine if valid == len(words) else "bad" if refused else "doubt"
     return [Headline(f"{valid} of {len(verdicts)}", meaning, tone)] * bool(verdicts)
 
 
@@ -216,6 +220,6 @@ def stored_warning(path: Path | str) -> list[Marked]:
 
 def warn_of(verdict: Verdict, what: str) -> None:
     """Say on standard error where what is about to be used is not valid."""
-    if not verdict.valid:
+    if verdict.judged and not verdict.valid:
         first = next(finding for finding in verdict.findings if finding.refuses)
         complain(f"warning: {what} is not valid: {first.line.removeprefix('not valid: ')}")

@@ -30,6 +30,7 @@ from identifier.motion.model import (
     carcass_curve,
     curve_function,
     replay_scan,
+    slope_function,
 )
 from identifier.motion.parameters import INDEX, NAMES, curve_index
 from identifier.setup import Setup
@@ -227,7 +228,11 @@ class FittedModel(TireModel):
 
     def slope_at(self, slip: Array) -> Array:
         """Return the slope of the curves under static loads at slips [static loads/rad], (n, 2)."""
-        return self.curve_at(slip)[1]
+        both = [
+            np.array(slope_function()(self.p[curve_index(axle)], x[None]))
+            for axle, x in zip("fr", slip.T, strict=True)
+        ]
+        return np.vstack(both).T
 
     @property
     def drives(self) -> Drives:
@@ -235,7 +240,7 @@ class FittedModel(TireModel):
             speeds=self.reach.speeds,
             lengthwise=(self.p, self.covariance),
             elsewhere=tuple((one.begin, one.end) for one in self.reach.segments),
-            notes=report.notes(self.reach, self.p, self.covariance),
+            notes=report.notes(self.reach, self.p, self.covariance) + report.of_ratio(self),
             at_bounds=report.at_bounds(self.vehicle, self.p),
         )
 

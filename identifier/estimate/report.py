@@ -10,7 +10,7 @@ from identifier.estimate.latent import TRUST
 from identifier.estimate.posterior import Reach, Segment
 from identifier.estimate.priors import Priors
 from identifier.frozen import FORMAT, vehicle_from, vehicle_numbers
-from identifier.motion.parameters import INDEX, NAMES, UNITS
+from identifier.motion.parameters import INDEX, NAMES, UNITS, curve_index
 from identifier.tire_model import AXLES, GRIP, RELAXATION, STIFFNESS, Axle, Estimate, Reached
 from models.schema import Table
 from models.vehicle import Vehicle
@@ -18,6 +18,7 @@ from models.vehicle import Vehicle
 WIDEST = 0.6  # rad, within which the largest force is looked for
 _DECIDED = 0.5  # standard deviation over the prior's, up to which drives decided a number
 _SLOPE_STEP = 1e-4  # rad, over which a slope is taken
+_WIDE, _WIDENED = 0.2, 1.5  # sd of a stiffness, of it, that a free ratio leaves; over the plain one
 _SURELY = 3.0  # standard deviations of an error of the steering that is noted
 _NOTED_GAIN = 0.08  # least error of the steering that is noted [-]
 _LARGEST = 1e6  # of the numbers in a file
@@ -30,7 +31,7 @@ def estimates(model: Any) -> tuple[Estimate, ...]:
     before = model.band.prior_covariance
     given = model.vehicle.bicycle[4:]
     band, loads, lag = model.band, np.array(model.vehicle.axle_loads), model.relaxation_length
-    stiff = [sd[0] / _SLOPE_STEP for sd in band.of_phi(np.full((1, 2), _SLOPE_STEP))]
+    stiff, sd_C, hidden = stiffness_doubt(model)
     stiffness = model.stiffness
     C = stiffness / loads
     slip = np.linspace(0.0, WIDEST, 201)
@@ -38,9 +39,7 @@ def estimates(model: Any) -> tuple[Estimate, ...]:
     phi = model.curve_at(slip)[0]
     peak = np.take_along_axis(slip, phi.argmax(axis=0)[None], axis=0)
     top, wide = phi.max(axis=0), [sd[0] for sd in band.of_phi(peak)]
-    sd_C, sd_top = (
-        np.hypot(sd[0], size * band.load_doubt) for sd, size in ((stiff, C), (wide, top))
-    )
+    sd_top = np.hypot(wide[0], top * band.load_doubt)
 
     def sd_of(name: str) -> tuple[float, float]:
         """Return the standard deviation of a parameter, and the prior's."""
@@ -52,13 +51,47 @@ def estimates(model: Any) -> tuple[Estimate, ...]:
         now, prior = sd_of(f"compliance_{axle[0]}")
         known = [sd[0][i] <= _DECIDED * sd[1][i] for sd in (stiff, wide)]
         rows += [
-            (STIFFNESS, axle, stiffness[i], sd_C[i] * loads[i], "N/rad", given[i], known[0]),
+            (
+                *(STIFFNESS, axle, stiffness[i], sd_C[i] * loads[i], "N/rad", given[i]),
+                known[0] and not hidden[i],
+            ),
             (GRIP, axle, top[i], sd_top[i], "static load", None, known[1]),
             (RELAXATION, axle, lag[i], C[i] * now, "m", None, now <= _DECIDED * prior),
         ]
     return tuple(
         Estimate(title, axle, float(value), float(sd), unit, declared, bool(known))
         for title, axle, value, sd, unit, declared, known in rows
+    )
+
+
+def stiffness_doubt(model: Any) -> tuple[list[Array], Array, Array]:
+    """Return how unsure the stiffnesses of a `FittedModel` are [static loads/rad].
+
+    Standard deviations of the fit and of the prior, (2,) each; that with a steering ratio that may
+    be wrong and with the loads, (2,); whether the drive leaves it to the ratio, (2,).
+    """
+    at, C = np.full((1, 2), _SLOPE_STEP), model.stiffness / np.array(model.vehicle.axle_loads)
+    stiff = [sd[0] / _SLOPE_STEP for sd in model.band.of_phi(at)]
+    opened, held = model.band.ratio_open
+    free = opened.of_phi(at)[0][0] / _SLOPE_STEP
+    plain, free = (np.hypot(sd, C * model.band.load_doubt) for sd in (stiff[0], free))
+    J = model.curve_at(at)[2][:, 0]
+    moved = [J[i] @ held[curve_index(axle)] / _SLOPE_STEP for i, axle in enumerate("fr")]
+    return stiff, np.hypot(free, moved), (free > _WIDE * C) & (free > _WIDENED * plain)
+
+
+def of_ratio(model: Any) -> tuple[tuple[str, str], ...]:
+    """Return the note on stiffnesses that a wrong steering ratio would change."""
+    _, sd, hidden = stiffness_doubt(model)
+    shares = 100.0 * sd * np.array(model.vehicle.axle_loads) / model.stiffness
+    return tuple(
+        (
+            "steering_ratio",
+            f"the {axle} cornering stiffness is not known: it rests on the given steering ratio "
+            f"(± {share:.0f} % without it): measure the ratio, or drive a harder slalom",
+        )
+        for axle, share, one in zip(AXLES, shares, hidden, strict=True)
+        if one
     )
 
 

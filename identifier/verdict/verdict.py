@@ -1,6 +1,6 @@
 """A verdict on a tire model, from the motion alone: no true force is needed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -29,17 +29,25 @@ class Objection(NamedTuple):
     """A finding on a model.
     code : for machines.   axle : that it is about, None for the car or the drive.
     text : what it means and the likely cause, one line.   refuses : whether it makes it not valid.
+    silent : whether, for that reason, the drive cannot judge the model.
     """
 
     code: str
     axle: Axle | None
     text: str
     refuses: bool
+    silent: bool = False
 
     @property
     def line(self) -> str:
         where = f"{self.axle} axle: " if self.axle else ""
-        return f"{'not valid' if self.refuses else 'note'}: {where}{self.text}"
+        said = "not valid" if self.refuses else "cannot judge" if self.silent else "note"
+        return f"{said}: {where}{self.text}"
+
+
+def drive_judges(found: Sequence[Objection]) -> bool:
+    """Return whether a drive with these findings judges a model; one that rejects it does."""
+    return any(one.refuses for one in found) or not any(one.silent for one in found)
 
 
 class Number(NamedTuple):
@@ -47,6 +55,7 @@ class Number(NamedTuple):
     sd : its standard deviation ±, None unknown.
     declared : value in the vehicle file or None.   identified : whether the drive decided it.
     valid : whether it is identified, within its bounds, and nothing was found against its axle.
+    judged : whether the drive can judge it.
     """
 
     title: str
@@ -57,6 +66,7 @@ class Number(NamedTuple):
     declared: float | None
     identified: bool
     valid: bool
+    judged: bool = True
 
     @property
     def words(self) -> str:
@@ -65,10 +75,10 @@ class Number(NamedTuple):
 
     @property
     def state(self) -> str:
-        """What it is: "valid", "not valid", or "not identifiable from this drive"."""
+        """What it is: "valid", "not valid", "not judged" or "not identifiable from this drive"."""
         if not self.identified:
             return NOT_IDENTIFIABLE
-        return "valid" if self.valid else "not valid"
+        return "valid" if self.valid else "not valid" if self.judged else "not judged"
 
 
 class WindowForces(NamedTuple):
@@ -109,12 +119,25 @@ class Verdict:
 
     @property
     def valid(self) -> bool:
-        """Whether no finding rejects the model."""
-        return not any(finding.refuses for finding in self.findings)
+        """Whether the drive judges the model, and no finding rejects it."""
+        return self.judged and not any(finding.refuses for finding in self.findings)
+
+    @property
+    def judged(self) -> bool:
+        """Whether the drive judges the model: False of one that is too short or has no force."""
+        return drive_judges(self.findings)
+
+    @property
+    def word(self) -> str:
+        """The verdict in a word or two: "valid", "NOT VALID" or "cannot judge"."""
+        return "valid" if self.valid else "NOT VALID" if self.judged else "cannot judge"
 
     @property
     def against(self) -> str:
-        """How many findings refuse the answer, in words: "1 finding against it"."""
+        """How many findings refuse the answer, in words, or why the drive cannot judge it."""
+        if not self.judged:
+            reason = next(finding for finding in self.findings if finding.silent)
+            return reason.text.split(":")[0]
         count = sum(finding.refuses for finding in self.findings)
         return f"{count} finding{'' if count == 1 else 's'} against it"
 
@@ -123,20 +146,20 @@ class Verdict:
         """The verdict in one line."""
         if self.valid:
             return f"verdict: valid for {self.reach}" if self.reach else "verdict: valid"
-        return f"verdict: NOT VALID, {self.against}"
+        return f"verdict: {self.word}, {self.against}"
 
     @property
     def model_error(self) -> tuple[float, ...] | None:
         """Error of the model over the force in the motion [-], front and rear.
 
-        None where too little is driven.
+        None where the drive cannot judge.
         """
         found = self.measures.get("force_missed")
-        return found if isinstance(found, tuple) else None
+        return found if self.judged and isinstance(found, tuple) else None
 
     @property
     def model_error_line(self) -> str:
-        """The same in one line; empty where too little is driven."""
+        """The same in one line; empty where the drive cannot judge."""
         if self.model_error is None:
             return ""
         front, rear = (f"{PERCENT * share:.1f}" for share in self.model_error)
@@ -160,6 +183,7 @@ class Verdict:
         """Return the verdict as plain numbers and words, ready for JSON."""
         return {
             "valid": self.valid,
+            "judged": self.judged,
             "findings": [finding._asdict() for finding in self.findings],
             "numbers": [number._asdict() | {"state": number.state} for number in self.numbers],
             "measures": dict(self.measures),
@@ -172,4 +196,4 @@ class Verdict:
             finding.code + (f" ({finding.axle})" if finding.axle else "")
             for finding in self.findings
         )
-        return f"<Verdict: {'valid' if self.valid else 'not valid'}{f': {codes}' if codes else ''}>"
+        return f"<Verdict: {self.word.lower()}{f': {codes}' if codes else ''}>"

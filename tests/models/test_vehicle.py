@@ -31,7 +31,8 @@ def written(tmp_path, text):
     [
         *((key, value) for key in NUMBERS for value in (0.0, -1.0, math.nan, math.inf)),
         ("cg_height", 2.0), ("cg_height", -0.1), ("drive_front_share", 1.1),
-        ("brake_front_share", math.nan), ("drag_area", 70.0), ("estimated", ("mass",)),
+        ("brake_front_share", math.nan), ("drag_area", 70.0), ("center_of_gravity_sd", 4.0),
+        ("estimated", ("mass",)),
     ],
 )  # fmt: skip
 def test_a_number_that_no_car_has_is_refused_by_name(key, value):

@@ -1,5 +1,6 @@
 """`tireid init`: read as it is, and with its comment signs taken away a car to simulate."""
 
+import io
 import re
 from dataclasses import fields
 from pathlib import Path
@@ -41,6 +42,27 @@ def test_with_the_comment_signs_taken_away_it_is_a_car_that_can_be_simulated(tmp
             ours, theirs = (getattr(c.require_chassis(), one.name) for c in (car, sedan()))
             assert ours == theirs, one.name
     assert car.require_chassis().tire == tmp_path / "my_tire.tir"
+
+
+@pytest.mark.parametrize(
+    ("options", "answer", "sd"),
+    [
+        (["--center-of-gravity", "weighed"], "", 0.01),
+        (["--center-of-gravity", "data-sheet"], "weighed", 0.04),
+        ([], "d\n", 0.04),
+        ([], "\n", None),
+    ],
+)
+def test_where_the_center_of_gravity_comes_from_is_asked(
+    tmp_path, monkeypatch, capsys, options, answer, sd
+):
+    terminal = io.StringIO(answer)
+    monkeypatch.setattr(terminal, "isatty", lambda: True)
+    monkeypatch.setattr("sys.stdin", terminal)
+    path = tmp_path / "car.toml"
+    assert main(["init", str(path), *options]) == 0
+    assert Vehicle.from_toml(path).center_of_gravity_sd == sd
+    assert ("weighed or data-sheet" in capsys.readouterr().err) == (not options)
 
 
 def test_nothing_is_replaced_unasked(tmp_path, capsys):

@@ -67,9 +67,9 @@ def test_it_leaves_a_report_with_figures(model, logs, tmp_path, capsys):
         summary, _ = predicted(out, model, asked)
         page = (out / "report.html").read_text(encoding="utf-8")
         assert faults_of(page) == []
-        for figure in ("slip", "forces", "motion", "friction"):
+        for figure in ("slip", "forces", "motion"):
             assert (out / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
-        assert page.count("<img") == 4
+        assert page.count("<img") == 3
         front, rear = (f"{100.0 * x:.1f}" for x in summary["verdict"]["measures"]["force_missed"])
         assert f"<dd>{front} / {rear} %</dd>" in page
         assert f"model error over the force in the motion: {front} / {rear} %" in (
@@ -234,5 +234,24 @@ def test_a_band_that_nobody_calibrated_tells_no_road(logs, tmp_path, capsys, und
 
 def test_a_road_that_is_the_same_is_said_to_be(model, logs, tmp_path, capsys, undrawn):
     summary, _ = predicted(tmp_path / "out", model, logs / "quick.csv")
-    assert summary["friction"] == {"unchanged": True, "roads": []}
+    assert summary["friction"] is None and summary["verdict"]["valid"]
     assert "friction: that of the identification drive" in capsys.readouterr().out
+    found = ti.replay(read_recording(logs / "quick.csv"), ti.TireModel.load(model)).friction()
+    assert found.unchanged and not found.roads
+
+
+def test_a_drive_that_cannot_judge_is_amber_and_no_failure(model, logs, tmp_path, capsys, undrawn):
+    log = read_recording(logs / "quick.csv")
+    straight = replace(log, v_y=0.02 * log.v_y, r=0.02 * log.r, delta_f=0.02 * log.delta_f)
+    for name, one in (("straight", straight), ("moment", log.between(2.0, 3.0))):
+        write_recording(replace(one, axle_force=None, a_y=None), tmp_path / f"{name}.csv")
+        asked = (model, tmp_path / f"{name}.csv", "--no-check")
+        summary, _ = predicted(tmp_path / name, *asked)
+        assert (summary["verdict"]["valid"], summary["verdict"]["judged"]) == (False, False)
+        assert {one["state"] for one in summary["verdict"]["numbers"]} <= {
+            *("not judged", "not identifiable from this drive")
+        }
+        said = capsys.readouterr().out
+        assert "verdict: cannot judge, " in said and "NOT VALID" not in said
+        page = (tmp_path / name / "report.html").read_text(encoding="utf-8")
+        assert '<div class="doubt"><dt>the verdict' in page and 'class="struck"' not in page

@@ -149,7 +149,7 @@ def require_toml(path: Path) -> None:
 
 
 def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
-    return DONE if verdict.valid or options.accept else NOT_VALID
+    return NOT_VALID if verdict.judged and not (verdict.valid or options.accept) else DONE
 
 
 def add_weights(parser: argparse.ArgumentParser, what: str) -> None:

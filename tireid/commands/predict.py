@@ -53,7 +53,7 @@ from tireid.verdicts import (
 def declare(new: Any) -> None:
     parser = new(
         description="Predict the axle forces of LOG with a stored model, which stays as it is; "
-        "write report.html, figures, forces.csv, summary.json and, where observable, "
+        "write report.html, figures, forces.csv, summary.json and, where the model misses a part, "
         "friction.csv: friction of the road over that of the identification drive. Where LOG "
         "has true forces, give the error; else how much of the measured lateral and yaw "
         "acceleration the forces explain, in means over 0.2 s.",
@@ -67,7 +67,7 @@ def declare(new: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the command; return 3 where the model does not give back the drive's motion."""
+    """Run the command; return 3 where the drive has another motion than the model gives."""
     model = _model(options)
     recording = shared.read_log(options.log, model.vehicle, options)
     prediction = replay(recording, model)
@@ -188,7 +188,8 @@ def _prediction_text(prediction: Prediction, facts: Mapping[str, Any]) -> str:
     facts : its summary.
     """
     motion, band, lines = prediction.motion, prediction.model.band, []
-    friction, known = prediction.verdict.friction, facts["known_slip_rad"]
+    verdict, known = prediction.verdict, facts["known_slip_rad"]
+    friction = verdict.friction
     if prediction.against_truth is None:
         lines.append("no true forces in the log: the error cannot be given in newtons")
     if motion is not None:
@@ -204,6 +205,8 @@ def _prediction_text(prediction: Prediction, facts: Mapping[str, Any]) -> str:
             lines.append(text.format(share, *slip))
     if band is not None and not band.calibrated:
         lines.append(f"friction: not observable, the band is {UNCALIBRATED}")
+    elif band is not None and verdict.judged and friction is None:
+        lines.append("friction: that of the identification drive, which explains every part")
     if friction is not None and not friction.roads:
         lines.append(
             "friction: that of the identification drive, as far as observable"

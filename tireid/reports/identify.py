@@ -141,8 +141,8 @@ def _evaluated_headlines(evaluated: Mapping[str, Verdict]) -> list[page.Headline
 
 def curve_drawing(figures: Mapping[str, Figure], verdict: Verdict) -> page.Picture:
     """Return the learnt curve with its band, the first figure of a report."""
-    refused = "" if verdict.valid else "NOT VALID. "
-    caption = f"{refused}Axle force over slip angle: drive, curve and its band."
+    word = "" if verdict.valid else f"{verdict.word[0].upper()}{verdict.word[1:]}. "
+    caption = f"{word}Axle force over slip angle: drive, curve and its band."
     return drawing(figures["slip"], caption, READ["slip"])
 
 
@@ -224,8 +224,8 @@ def _evaluated(evaluated: Mapping[str, Verdict]) -> list[page.Block]:
     for name, verdict in evaluated.items():
         errors = verdict.model_error or (None, None)
         shares = [None if one is None else with_doubt(PERCENT * one) for one in errors]
-        tone: page.Tone = "" if verdict.valid else "bad"
-        rows.append([name, page.Marked("valid" if verdict.valid else "NOT VALID", tone), *shares])
+        tone: page.Tone = "" if verdict.valid else "bad" if verdict.judged else "doubt"
+        rows.append([name, page.Marked(verdict.word, tone), *shares])
     if not rows:
         return []
     caption = (

@@ -9,6 +9,7 @@ import pytest
 from identifier.estimate.fit import fit
 from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
 from identifier.motion.parameters import INDEX, NAMES
+from identifier.verdict import judge_identification
 from models.vehicle import estimate, sedan
 from tests.identifier.estimate.conftest import DROP, driven
 from tireid.driving.learn import sample_recording
@@ -92,7 +93,8 @@ def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt):
 
 def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
     assert learnt.model.reach.segments == ()
-    wet = fit([driven(5, scale=0.5, amplitude=0.06, swing=0.0)], sedan()).model
+    drive = driven(5, scale=0.5, amplitude=0.06, swing=0.0)
+    wet = fit([drive], sedan()).model
     (segment,) = wet.reach.segments
     begins = segment.begin > 0.0  # else what came before the drop is the segment
     assert (segment.begin if begins else segment.end) == pytest.approx(DROP, abs=1.5)
@@ -102,6 +104,8 @@ def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
     assert wet.drives.road_differs(at).tolist() == [not begins, begins]
     (note,) = (text for _, text in wet.drives.notes)
     assert f"{segment.ratio:.2f} ±" in note
+    judged = judge_identification(wet, drive)
+    assert judged.valid and not wet.drives.road_differs(judged.forces.t - 0.15).any()
 
 
 def test_a_steering_with_play_leaves_a_curve_that_rises(learnt):

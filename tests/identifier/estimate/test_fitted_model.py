@@ -1,13 +1,16 @@
 """A fitted model as a file, in other units and sample by sample."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from codegen.arrays import blocks
+from identifier.estimate import report
 from identifier.estimate.model import FittedModel
-from identifier.tire_model import GRIP, load_model
+from identifier.motion.parameters import INDEX
+from identifier.tire_model import GRIP, STIFFNESS, load_model
 from models.maneuvers import Slalom, StepSteer
 from models.plant import Plant
 from models.vehicle import sedan
@@ -62,6 +65,48 @@ def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):
     np.testing.assert_array_equal(model.band.on_another_road().force(slip), model.force(slip))
     with pytest.raises(ValueError, match="sd_friction"):
         model.band.on_another_road(-0.1)
+
+
+def test_the_doubt_of_a_load_is_that_of_mass_and_center_of_gravity(learnt):
+    car, sd = replace(sedan(), l_f=0.9, l_r=1.8), 0.04
+    moved = replace(car, l_f=car.l_f + sd * car.wheelbase, l_r=car.l_r - sd * car.wheelbase)
+    change = np.array(moved.axle_loads) / np.array(car.axle_loads) - 1.0
+    told = learnt.model.mounted_on(replace(car, center_of_gravity_sd=sd))
+    np.testing.assert_allclose(told.band.load_doubt, np.hypot(0.03, change))
+    untold = learnt.model.mounted_on(car)
+    np.testing.assert_allclose(untold.band.load_doubt, np.hypot(0.03, change / 4.0))
+    for one, other in zip(told.estimates(), untold.estimates(), strict=True):
+        if one.title in (STIFFNESS, GRIP):
+            assert one.sd > other.sd
+
+
+def test_a_zero_of_the_steering_widens_the_band_of_the_front_axle_alone(learnt):
+    model, k = learnt.model, INDEX["steering_zero"]
+    unsure = model.covariance.copy()
+    unsure[k, k] += np.radians(1.0) ** 2
+    slip = np.array([0.0, 0.02])
+    half, wide = model.band.half(slip), replace(model, covariance=unsure).band.half(slip)
+    assert (wide[:, 0] > 1.5 * half[:, 0]).all()
+    np.testing.assert_allclose(wide[:, 1], half[:, 1])
+
+
+def test_a_gentle_drive_does_not_know_the_stiffness_where_the_ratio_may_be_wrong(learnt):
+    """A ratio that the drive does not decide is in the ±, and the number is not identified."""
+    model, k = learnt.model, INDEX["steering_gain"]
+    front, rear = [one for one in model.estimates() if one.title == STIFFNESS]
+    assert front.identified and rear.identified and not report.of_ratio(model)
+    p, blind, J = model.p.copy(), model.covariance.copy(), np.zeros(len(model.p))
+    p[k], blind[k], blind[:, k] = 0.0, 0.0, 0.0
+    J[k], J[INDEX["ln_stiffness_f"]] = 1.0, -1.0  # a drive that decides their product alone
+    gentle = replace(model, p=p, covariance=blind + 0.04**2 * np.outer(J, J))
+    opened, held = gentle.band.ratio_open
+    assert opened.model.covariance[k, k] == pytest.approx(0.25**2)
+    assert not held.any()
+    front, rear = [one for one in gentle.estimates() if one.title == STIFFNESS]
+    assert front.sd > 0.2 * front.value and not front.identified
+    assert rear.identified
+    ((code, text),) = report.of_ratio(gentle)
+    assert code == "steering_ratio" and "front cornering stiffness is not known" in text
 
 
 def test_grip_is_the_top_of_the_curve_and_known_slip_ends_where_a_drive_decides_the_force():

@@ -10,12 +10,15 @@ import pytest
 import identifier.verdict
 from identifier.estimate.method import FitMethod
 from identifier.evidence import brisk_windows, clean_rms, measured_force
+from identifier.measured import NOT_IDENTIFIABLE
 from identifier.methods import make_method
 from identifier.motion.parameters import INDEX
+from identifier.prediction import predict
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
 from identifier.verdict import judge, judge_prediction
-from models.maneuvers import RandomSteer
+from models.friction import Friction, FrictionChange
+from models.maneuvers import RandomSteer, Slalom, StepSteer
 from models.plant import Plant
 from models.sensors import Sensor, Sensors
 from models.vehicle import sedan
@@ -213,6 +216,60 @@ def test_a_prediction_has_a_verdict_of_its_own(clean, drive):
     verdict = judge_prediction(half, drive)
     assert codes(verdict) == {"force_missed"}
     assert all(0.4 < missed < 0.6 for missed in verdict.measures["force_missed"])
+
+
+def test_a_drive_without_force_at_one_axle_judges_the_other(clean):
+    quick = Slalom(
+        amplitude=np.radians(1.05), frequency=0.8, onset=1.0, rate_limit=2.0, duration=8.0
+    )
+    drive = Plant(sedan()).simulate(quick, speed=12.0).recording()
+    model = clean.freeze()
+    verdict = judge_prediction(model, drive)
+    front, rear = verdict.measures["peak_force_static_loads"]
+    assert front > 0.1 > rear
+    assert verdict.valid and ("no_force", "rear") in {(x.code, x.axle) for x in verdict.findings}
+    assert "force_missed" in codes(judge_prediction(moved(model, ln_stiffness=-0.5), drive))
+
+
+def test_a_drive_that_shows_nothing_cannot_judge_a_model(clean, drive):
+    """Neither valid nor refused; a fault of the model itself is refused all the same."""
+    model = clean.freeze()
+    for part in (drive.between(0.0, ONSET), drive.between(6.0, 6.9)):
+        verdict = judge_prediction(model, part)
+        assert (verdict.valid, verdict.judged, verdict.model_error) == (False, False, None)
+        assert verdict.headline.startswith("verdict: cannot judge, ")
+        assert {number.state for number in verdict.numbers} <= {"not judged", NOT_IDENTIFIABLE}
+        assert not verdict.to_dict()["judged"]
+    soft = {f"residual{j}": -10.0 for j in range(4)}
+    refused = judge_prediction(moved(model, **soft), drive.between(0.0, ONSET))
+    assert refused.judged and "no_tire" in codes(refused)
+
+
+def test_one_steady_corner_is_valid_for_no_slip(whole):
+    """It decides one point of the curve, and elsewhere the prior stands."""
+    corner = StepSteer(amplitude=0.03, onset=1.0, rate_limit=0.3, duration=34.0)
+    log = Plant(sedan()).simulate(corner, speed=20.0).recording()
+    run = answer(SENSORS.apply(log, np.random.default_rng(4)).between(4.0, 34.0))
+    assert codes(judge(run)) == {"prior"}
+    assert (run.freeze().known_slip == 0.0).all()
+    assert share_missed(run.freeze(), whole).max() > 0.12
+    begun = answer(SENSORS.apply(log, np.random.default_rng(4)).between(0.0, 12.0))
+    assert judge(begun).valid and (begun.freeze().known_slip > np.radians(1.0)).all()
+
+
+def test_another_friction_is_looked_for_where_a_part_is_missed(clean, drive):
+    """The search costs thirty times the rest of the verdict; who asks for it gets it."""
+    model = clean.freeze()
+    assert judge_prediction(model, drive).friction is None
+    assert predict(model, drive).friction().unchanged
+    steering = RandomSteer(
+        amplitude=0.06, frequency=0.6, seed=3, onset=1.0, rate_limit=0.8, duration=24.0
+    )
+    ice = FrictionChange(scale=0.5, at_time=12.0), FrictionChange(scale=1.0, at_time=16.0)
+    wet = Plant(sedan()).simulate(steering, speed=20.0, friction=Friction(changes=ice)).recording()
+    verdict = judge_prediction(model, SENSORS.apply(wet, np.random.default_rng(1)))
+    (road,) = verdict.friction.roads
+    assert 12.0 < road.first < 15.0
 
 
 @pytest.mark.sweep("axle*", "linear*")
