@@ -5,8 +5,8 @@
 The default on one log and on two, the axle identifier on one, as `run.tire` gives them; then
 another drive: a sample is held where the true force lies in the band around the force of the frozen
 model, whether its slip was identified or not. Random cars are those of `estimate`; where the
-recordings are there, CarMaker, five parts of a race car's drive, a hatchback on two days, and a real
-1:10 car on two floors.
+recordings are there, CarMaker, five parts of a race car's drive, a hatchback on two days, and a
+real 1:10 car on two floors.
 The width is half the band over the rms error, the median of drives; a normal error would have 1.64.
 """
 
