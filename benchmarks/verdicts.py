@@ -412,12 +412,11 @@ def main() -> int:
     jobs = [(kind, seed) for seed in seeds for kind in classes]
     first = (FIRST + len(CLASSES) * k for k in range(drives))
     blind_jobs = [(kind, seed + i) for seed in first for i, kind in enumerate(classes)]
-    first_of: set[tuple[str, str]] = set()
+    first_of: set[int] = set()
     asked = []
     for one in pairs(quick=options.quick):  # planted is in the first log that asks of each
-        key = (one.place, one.log.name)
-        asked.append((one, key not in first_of))
-        first_of.add(key)
+        asked.append((one, id(one.log) not in first_of))
+        first_of.add(id(one.log))
     parts = range(FIRST_SEED, FIRST_SEED + each) if recordings() else range(0)
     if not recordings():
         print(f"  without recordings: they are not there: {DATA} (set TIREID_DATA)")

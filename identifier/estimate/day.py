@@ -31,14 +31,14 @@ def day_of(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) 
     """
     table, usual = Priors.of(vehicle), usual_errors(vehicle)
     taught, doubt = p[WHERE], covariance[np.ix_(WHERE, WHERE)]
+    on = recording.v_x > SLOW * vehicle.froude_speed
     if recording.logged_v_y is None:
-        on = recording.v_x > vehicle.lowest_speed
         value, P = taught * _STEERED, doubt * np.outer(_STEERED, _STEERED)
         return of_day(value, P, taught, usual, recording.v_x[on], anew=False)
+    if np.count_nonzero(on) * recording.dt < ENOUGH:
+        return of_day(taught, doubt, taught, usual, recording.v_x[on], anew=False)
     drive = Drive.of(recording, vehicle, hardest(recording, _LONGEST))
     v_x = drive.signals[drive.counts, 0]
-    if v_x.size * drive.dt < ENOUGH:
-        return of_day(taught, doubt, taught, usual, v_x, anew=False)
     mean, moves = p.copy(), np.zeros(p.size, dtype=bool)
     information = np.zeros_like(table.information)
     information[np.ix_(WHERE, WHERE)] = table.information[np.ix_(WHERE, WHERE)]
