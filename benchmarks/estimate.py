@@ -8,8 +8,9 @@ that use v_y, but the paper's laws. The error is that of both axles in percent o
 where a drive has no measured force, against what its motion shows (inverse single-track forces).
 Places: random cars of four classes with good sensors, identified from a full drive, a gentle one or
 a single step; CarMaker, either run from the other; a real race car, 100 s and the rest; a real 1:10
-car, each run from every other. Beside them: several logs together, load transfer and friction
-circle against slip alone, declared stiffness, a wrong steering ratio, and the time that it takes.
+car, each run from every other; a real hatchback, on two days. Beside them: several logs together,
+load transfer and friction circle against slip alone, declared stiffness, a wrong steering ratio,
+and the time that it takes.
 Recordings are those of `recorded_cars`; without them these parts are skipped.
 """
 
@@ -27,7 +28,7 @@ import numpy as np
 
 import tireid as ti
 from benchmarks.random_cars import CLASSES, FIRST_SEED, random_car, random_drive, random_steering
-from benchmarks.recorded_cars import CARMAKER, CARMAKER_RUNS, DART, DATA, FERRARI
+from benchmarks.recorded_cars import CARMAKER, CARMAKER_RUNS, DART, DATA, FERRARI, GTI
 from benchmarks.targets import Table, Targets, Values, parse, show
 from codegen.arrays import Array
 from identifier.compare.zeros import replayed
@@ -49,6 +50,7 @@ STEPS = (0.5, 0.35, 0.2, 0.1)  # of it, the first that the car survives
 CORNER = 8.5  # s, when the corners of a random drive have begun
 SLOW = 0.8  # m/s, below which the 1:10 car is not asked
 LIMITS = {"full": 2.7, "gentle": 12.0, "step": 8.5, "carmaker": 5.3}  # %
+GTI_LIMITS = {"exp8": (8.0, 9.0), "exp12": (12.0, 20.0)}  # front, rear [%], by what taught
 PIECES, PIECE = 12, 100.0  # of the race car's drive, and how long one is [s]
 FLOORS = {  # of the real 1:10 car
     "dart": ("dart.csv.gz", ("ramp_steer02", "free_10_02_28", "free_10_12_05")),
@@ -67,7 +69,10 @@ TOLD = (0.25, 4.0)  # times the stiffness of the vehicle file
 RATIO, WRONG_RATIOS = 20.8, (16.0, 26.0, 30.0)
 BEGUN = 12.0  # s, until when the slalom slips by 1.1 degrees alone
 BEHIND = 1.1  # times the best of the other methods
-PARTS = ("random", "carmaker", "ferrari", "dart", "together", "circle", "told", "ratio", "cost")
+PARTS = (
+    *("random", "carmaker", "ferrari", "dart", "gti"),
+    *("together", "circle", "told", "ratio", "cost"),
+)
 
 
 class Taught(NamedTuple):
@@ -332,6 +337,23 @@ def judge_together(targets: Targets) -> None:
     targets.at_most("carmaker: both taught together", error, 3.5, key="together/carmaker")
 
 
+def judge_gti(targets: Targets) -> None:
+    """Judge two drives of a real hatchback, on two days, each by what the other teaches.
+
+    Parameters
+    ----------
+    targets : collects what is missed.
+    """
+    for learn, ask in permutations(read("gti.csv.gz", list(GTI_LIMITS))):
+        error, size = missed(learnt(learn, GTI, DEFAULT), [ask])
+        name = learn.name.split(":")[-1]
+        found = 100.0 * np.sqrt(error / size)
+        for axle, value, limit in zip(("front", "rear"), found, GTI_LIMITS[name], strict=True):
+            targets.at_most(
+                f"gti, {name} teaches: {axle}", float(value), limit, key=f"gti/{name}/{axle}"
+            )
+
+
 def judge_circle(targets: Targets) -> None:
     """Judge load transfer and friction circle against slip alone, where the car pulls and brakes.
 
@@ -498,6 +520,7 @@ def main() -> int:
             for place, tasks in places.items():
                 judge_place(targets, place, tasks, quick=options.quick)
     recorded = {
+        "gti": judge_gti,
         "together": judge_together,
         "circle": judge_circle,
         "told": judge_told,

@@ -62,7 +62,7 @@ OF_AXLES: dict[str, _Belief] = {
         for j in range(len(SLIPS))
     },
     "compliance": _Belief(0.008, 0.008, 0.0, 0.1, "L"),  # relaxation of about a tenth wheelbase
-    "sway_share": _Belief(0.2, 0.3, 0.0, 1.0, ""),  # roll center low to high
+    "sway_share": _Belief(0.2, 0.6, 0.0, 1.0, ""),  # roll center low to high; firmer, steps err
     "braking": _Belief(0.65, 0.3, 0.0, 2.0, ""),  # all four wheels brake
     "driving": _Belief(0.35, 0.4, 0.0, 3.0, ""),  # which axle drives is not known
 }

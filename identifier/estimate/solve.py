@@ -30,8 +30,8 @@ NU = 4.0  # degrees of freedom of the loss: a tenth of the residuals may be far 
 _LEAST_SCALE = 0.25  # S: a model is never believed to be better than that
 _SHORTEST_MEMORY = 0.25  # least T [s]
 _LONGEST_MEMORY = 8.0  # largest T [s]
-_LEAST_STIFF = 0.25  # of C: slope at zero
-_STIFF_SD = 0.1  # of C: how firmly that slope is believed
+_LEAST_STIFF = 0.25  # of C: slope at zero, which is at most C
+_STIFF_SD = 0.1  # of C: how firmly that is believed, chosen on random cars and CommonRoad's
 _ITERATIONS = 25  # of a descent, at most
 ENOUGH = 0.02  # [nats] of improvement, below which it ends
 _LASTING = 2.0  # [s]: memory from which an offset may hide
@@ -338,7 +338,8 @@ def descend(
     priors, index = problem.priors, problem.index
     p, damping = start.copy(), 1e-3 if memory is None else 1e-6  # then it is near
     now = problem.residuals(p)
-    T = problem.memory(now.e) if memory is None else memory
+    # Far from the optimum all residuals are correlated: by their T they would count for nothing.
+    T = np.full(2, _SHORTEST_MEMORY) if memory is None else memory
     for count in range(1, iterations + 1):
         S2 = problem.scale(now.e)
         T = np.sqrt(T * problem.memory(now.e)) if count > 1 and memory is None else T
@@ -446,22 +447,24 @@ def around_beliefs(priors: Priors, p: Array) -> tuple[Array, Array]:
 
 
 def _softness(p: Array) -> tuple[Array, Array]:
-    """Return how far both axles are softer at zero than a tire can be, and its slopes over p (p,).
+    """Return how far the slope of both axles at zero is outside what a tire can have, and its
+    slopes over p (p,).
 
-    No tire has less than a quarter of C there: play in the steering looks so. (2,), in standard
-    deviations of a tenth of C, and (2, p); zero where the axle is as stiff.
+    No tire has less than a quarter of C there: play in the steering looks so. None has more: the
+    stiffness is C's to tell, else a gentle drive puts it into a unit of the residual that is over
+    before the corner. (2,), in standard deviations of a tenth of C, and (2, p); zero between.
     """
     found, slopes = np.zeros(2), np.zeros((2, p.size))
     for i, axle in enumerate("fr"):
         k = INDEX[f"ln_stiffness_{axle}"]
         q = [INDEX[f"residual{j}_{axle}"] for j in range(len(SLIPS))]
         C = float(np.exp(p[k]))
-        added = float(np.sum(p[q] / np.array(SLIPS)))
-        lacks = (_LEAST_STIFF - 1.0 - added / C) / _STIFF_SD
-        if lacks > 0.0:
-            found[i] = lacks
-            slopes[i, k] = added / C / _STIFF_SD
-            slopes[i, q] = -1.0 / (np.array(SLIPS) * C * _STIFF_SD)
+        added = float(np.sum(p[q] / np.array(SLIPS))) / C
+        outside = added - min(max(added, _LEAST_STIFF - 1.0), 0.0)
+        if outside:
+            found[i] = outside / _STIFF_SD
+            slopes[i, k] = -added / _STIFF_SD
+            slopes[i, q] = 1.0 / (np.array(SLIPS) * C * _STIFF_SD)
     return found, slopes
 
 

@@ -121,6 +121,13 @@ def test_a_steering_with_play_leaves_a_curve_that_rises(learnt):
 # A steering ratio that somebody typed is right to a few percent, or plainly wrong.
 
 
+def test_the_stiffness_of_a_gentle_drive_does_not_end_before_the_corner():
+    """It is that of the Magic Formula, not of units that are over at a degree."""
+    model = fit([driven(6, amplitude=0.015)], sedan()).model
+    C = np.exp([model["ln_stiffness_f"], model["ln_stiffness_r"]])
+    assert (model.slope_at(np.zeros((1, 2)))[0] < 1.05 * C).all()
+
+
 @pytest.mark.parametrize("ratio", [0.75, 1.4])
 def test_a_wrong_steering_ratio_does_not_reach_the_stiffness(ratio, car, drive):
     log = drive()
