@@ -33,6 +33,8 @@ _ENOUGH_MORE = 1.0  # [nats] of improvement by a later block, below which it end
 _LONG = 3600.0  # [s]: samples of longer logs are averaged
 _COARSE = 2.0  # times the usual interval, to which they are averaged
 _REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
+_NOTHING_FITS = 0.15  # share of the force that tires of several logs miss, from which zeros of
+_MUCH_LESS = 0.7  # each are tried, and times what they must miss then
 _ZEROS = [INDEX[name] for name in CHANGES]
 Days: TypeAlias = Literal["found", "one", "each"]
 _LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of its model are not
@@ -139,10 +141,26 @@ def fit(
         )
     alike = len({one.dt for one in measured}) == 1
     if days == "found" and alike and sum(len(_alone(one)) for one in measured) > 1:
-        whole = joined(measured)
-        if len(days_of(whole, vehicle, model.p, model.covariance)) > 1:
-            return fit(recordings, vehicle, priors, block=block, coarse=coarse, days="each")
+        apart = len(days_of(joined(measured), vehicle, model.p, model.covariance)) > 1
+        share = 0.0 if apart else _missed(measured, model)
+        if apart or share > _NOTHING_FITS:  # then tires tell no zeros apart
+            each = fit(recordings, vehicle, priors, block=block, coarse=coarse, days="each")
+            if apart or _missed(measured, each.model) < _MUCH_LESS * share:
+                return each
     return _Fit(model, found, parts)
+
+
+def _missed(recordings: Sequence[Recording], model: FittedModel) -> float:
+    """Return the share of the force in the motion that tires miss of the worst axle and log."""
+    shares = [0.0]
+    for one in (part for whole in recordings for part in _alone(whole)):
+        drive = Drive.of(one, model.vehicle)
+        e = simulate(drive, model.on(one).on(model.p), model.vehicle)["residual"][drive.counts]
+        v_x, r = drive.signals[drive.counts][:, [0, 2]].T
+        rms = float(np.sqrt(np.mean((v_x * r / GRAVITY) ** 2))) if v_x.size else 0.0
+        if rms > 0.0:
+            shares.append(float(np.sqrt(np.mean(e**2, axis=0)).max()) / rms)
+    return max(shares)
 
 
 def _alone(recording: Recording) -> list[Recording]:

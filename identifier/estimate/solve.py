@@ -34,14 +34,9 @@ _LEAST_STIFF = 0.25  # of C: slope at zero, which is at most C
 _STIFF_SD = 0.1  # of C: how firmly that is believed, chosen on random cars and CommonRoad's
 _ITERATIONS = 25  # of a descent, at most
 ENOUGH = 0.02  # [nats] of improvement, below which it ends
-_LASTING = 2.0  # [s]: memory from which an offset may hide
-_BRIEF = 0.5  # [s] of memory with which it does not,
-_LOOKED = 8  # iterations of that,
-_MOVED = 0.5  # and standard deviations of its prior that it must move
 _SETTLING = 60  # iterations at most where no drive is looked at
 _SETTLED = 1e-4  # [nats] of improvement, below which these end
 
-ZEROS = [INDEX[name] for name in ("steering_zero", "v_y_bias", "v_y_angle")]
 DELAYS = [INDEX[name] for name in ("v_y_delay", "r_delay", "steering_delay")]
 
 
@@ -280,25 +275,7 @@ def estimate(
     begins = starts(problem) if begin is None else [begin]
     begins = [np.concatenate([one[: len(NAMES)], np.zeros(problem.roads)]) for one in begins]
     found = [descend(problem, one, enough=enough) for one in begins]
-    best = min(found, key=lambda one: one.cost)
-    return best if begin is not None else _woken(problem, best, enough)
-
-
-def _woken(problem: Problem, best: Posterior, enough: float) -> Posterior:
-    """Return an optimum, or a better one beyond errors that last.
-
-    An offset that is not yet explained lasts, so that all of a drive counts as a few errors, and
-    beliefs hold the offset where it is. Asked as if errors were brief, it moves.
-    """
-    if best.memory.max() < _LASTING:
-        return best
-    p = np.concatenate([best.p, best.roads])
-    brief = descend(problem, p, np.full(2, _BRIEF), _LOOKED)
-    away = np.abs(brief.p - best.p)[ZEROS] * np.sqrt(np.diag(problem.priors.information)[ZEROS])
-    if not (away > _MOVED).any():
-        return best
-    again = descend(problem, np.concatenate([brief.p, brief.roads]), enough=enough)
-    return min(best, again, key=lambda one: one.cost)
+    return min(found, key=lambda one: one.cost)
 
 
 def starts(problem: Problem) -> list[Array]:
