@@ -30,7 +30,7 @@ NU = 4.0  # degrees of freedom of the loss: a tenth of the residuals may be far 
 _LEAST_SCALE = 0.25  # S: a model is never believed to be better than that
 _SHORTEST_MEMORY = 0.25  # least T [s]
 _LONGEST_MEMORY = 8.0  # largest T [s]
-_LEAST_STIFF = 0.25  # of C: slope at zero
+_LEAST_STIFF = 0.9  # of C: slope at zero; 0.25 leaves a third of a planted play to the curve
 _STIFF_SD = 0.1  # of C: how firmly that slope is believed
 _ITERATIONS = 25  # of a descent, at most
 ENOUGH = 0.02  # [nats] of improvement, below which it ends
@@ -411,22 +411,22 @@ def _trials(
 
 def beliefs_cost(priors: Priors, p: Array) -> float:
     """Return what the priors cost, and tires that are too soft about zero slip [nats]."""
-    soft, _ = _softness(p)
+    soft, _ = softness(p)
     return priors.cost(p) + 0.5 * float(soft @ soft)
 
 
 def around_beliefs(priors: Priors, p: Array) -> tuple[Array, Array]:
     """Return gradient (p,) and positive curvature (p, p) of `beliefs_cost`."""
     gradient, curvature = priors.around(p)
-    soft, slopes = _softness(p)
+    soft, slopes = softness(p)
     return gradient + soft @ slopes, curvature + slopes.T @ slopes
 
 
-def _softness(p: Array) -> tuple[Array, Array]:
+def softness(p: Array) -> tuple[Array, Array]:
     """Return how far both axles are softer at zero than a tire can be, and its slopes over p (p,).
 
-    No tire has less than a quarter of C there: play in the steering looks so. (2,), in standard
-    deviations of a tenth of C, and (2, p); zero where the axle is as stiff.
+    No tire has much less than C there: play of the steering looks so. (2,), in standard deviations
+    of a tenth of C, and (2, p); zero where the axle is as stiff.
     """
     found, slopes = np.zeros(2), np.zeros((2, p.size))
     for i, axle in enumerate("fr"):

@@ -255,9 +255,10 @@ def _no_tire(evaluated: _Evaluated) -> Iterator[Objection]:
     least, most = RULES.stiffness
     for axle, each, C in zip(AXLES, stiffness / loads, stiffness, strict=True):
         if not least <= each <= most:
+            soft = "play of the steering, " if axle == "front" and each < least else ""
             text = (
                 f"cornering stiffness {C / 1e3:.3g} kN/rad is {each:.2g} static loads per rad, "
-                f"tires have {least:g} to {most:g}: check signs, units and the vehicle file"
+                f"tires have {least:g} to {most:g}: check {soft}signs, units and the vehicle file"
             )
             yield Objection("no_tire", axle, text, True)
 

@@ -14,23 +14,23 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.axle.dynamics import series_compliance
 from identifier.axle.model import AxleModel
-from identifier.axle.slip import SHORTEST
+from identifier.axle.slip import SHORTEST, beyond_play
 from identifier.estimate.model import FittedModel
 from identifier.motion.model import carcass_curve
 from identifier.motion.parameters import curve_index
 from models.vehicle import load_ratio
 from mpc.tires.tire import DOUBT_STEP, N_DOUBTS, Pair, Point, PredictionTire, TireStructure
 
-_SENSORS, _BESIDE = 4, 4  # weights before those of the axles; of an axle before its curve
+_SENSORS, _BESIDE = 5, 4  # weights before those of the axles; of an axle before its curve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurveAxles(TireStructure):
-    """w = [δ_0, g, b, β], then of each axle F_z [N], κ [s²/m²], s [m], σ_0 [m], and its curve.
+    """w = [δ_0, g, b, β, p], then of each axle F_z [N], κ [s²/m²], s [m], σ_0 [m], and its curve.
 
     δ_0 [rad], g: zero and relative error of the steering. b [m/s], β [rad]: bias of v_y and
-    mounting angle of its sensor. They were learnt as errors of sensors, and the tracker reads the
-    same sensors.
+    mounting angle of its sensor, p [rad]: play of the steering to each side. They were learnt as
+    errors of sensors, and the tracker reads the same sensors.
     lagged : whether the slip lags; else s and σ_0 are there and do nothing.
     """
 
@@ -59,7 +59,8 @@ class CurveAxles(TireStructure):
         """Return the slip angles, errors of the sensors taken off [rad]."""
         v_y = at.v_y - at.w[2] - at.w[3] * at.v_x
         delta = (1 + at.w[1]) * at.delta + at.w[0]
-        return TireStructure.slip(self, at._replace(v_y=v_y, delta=delta))
+        front, rear = TireStructure.slip(self, at._replace(v_y=v_y, delta=delta))
+        return beyond_play(front, at.w[4]), rear
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body."""
@@ -148,7 +149,7 @@ def curve_weights(
     shortest: Any = 0.0,
 ) -> Array:
     """Return w of `CurveAxles`.
-    curves : numbers of front and rear, (2, n).   sensors : δ_0, g, b and β.
+    curves : numbers of front and rear, (2, n).   sensors : δ_0, g, b, β and p.
     loads, downforce, give, shortest : F_z, κ, s and σ_0 of both axles, or (2,).
     """
     beside = [np.broadcast_to(one, 2) for one in (loads, downforce, give, shortest)]
@@ -165,7 +166,7 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     scales = 1.0 / np.array(model.ladder)
     curves = np.hstack([np.tile(scales, (2, 1)), model.W])
     errors = model.sensors
-    sensors = (model.offset[0], errors.steering_gain, model.offset[1], errors.v_y_angle)
+    sensors = (model.offset[0], errors.steering_gain, model.offset[1], errors.v_y_angle, 0.0)
     give = series_compliance(model.compliance, model.sway_share, model.sway.frequency)
     return _tire(LadderAxles(units=scales.size), model, sensors, give, curves)
 
@@ -175,7 +176,7 @@ def fit_tire(model: FittedModel) -> PredictionTire:
     model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out: the
         tracker is told no a_x.
     """
-    names = ("steering_zero", "steering_gain", "v_y_bias", "v_y_angle")
+    names = ("steering_zero", "steering_gain", "v_y_bias", "v_y_angle", "steering_play")
     curves = np.stack([model.p[curve_index(axle)] for axle in "fr"])
     return _tire(FitAxles(), model, tuple(model[name] for name in names), model.give, curves)
 
