@@ -21,20 +21,21 @@ from identifier.motion.parameters import curve_index
 from models.vehicle import load_ratio
 from mpc.tires.tire import DOUBT_STEP, N_DOUBTS, Pair, Point, PredictionTire, TireStructure
 
-_SENSORS, _BESIDE = 5, 4  # weights before those of the axles; of an axle before its curve
+_BESIDE = 4  # weights of an axle before its curve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CurveAxles(TireStructure):
-    """w = [δ_0, g, b, β, p], then of each axle F_z [N], κ [s²/m²], s [m], σ_0 [m], and its curve.
+    """w = [δ_0, g, b, β], then of each axle F_z [N], κ [s²/m²], s [m], σ_0 [m], and its curve.
 
     δ_0 [rad], g: zero and relative error of the steering. b [m/s], β [rad]: bias of v_y and
-    mounting angle of its sensor, p [rad]: play of the steering to each side. They were learnt as
-    errors of sensors, and the tracker reads the same sensors.
+    mounting angle of its sensor. They were learnt as errors of sensors, and the tracker reads the
+    same sensors.
     lagged : whether the slip lags; else s and σ_0 are there and do nothing.
     """
 
     saturates = True
+    sensors = 4  # weights before those of the axles
 
     lagged: bool = True
 
@@ -53,14 +54,13 @@ class CurveAxles(TireStructure):
 
     @property
     def n_weights(self) -> int:
-        return _SENSORS + 2 * (_BESIDE + self.numbers)
+        return self.sensors + 2 * (_BESIDE + self.numbers)
 
     def slip(self, at: Point) -> Pair:
         """Return the slip angles, errors of the sensors taken off [rad]."""
         v_y = at.v_y - at.w[2] - at.w[3] * at.v_x
         delta = (1 + at.w[1]) * at.delta + at.w[0]
-        front, rear = TireStructure.slip(self, at._replace(v_y=v_y, delta=delta))
-        return beyond_play(front, at.w[4]), rear
+        return TireStructure.slip(self, at._replace(v_y=v_y, delta=delta))
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body."""
@@ -87,7 +87,7 @@ class CurveAxles(TireStructure):
     def at_friction(self, weights: Array, ratio: float) -> Array:
         """Return `weights` (n_weights,) of another friction."""
         w = weights.copy()
-        self.on_friction(w[_SENSORS:].reshape(2, -1)[:, _BESIDE:], ratio)
+        self.on_friction(w[self.sensors :].reshape(2, -1)[:, _BESIDE:], ratio)
         return w
 
     def similar(self, at: Point, ratio: Any) -> Point:
@@ -98,7 +98,7 @@ class CurveAxles(TireStructure):
     def _axles(self, w: Any) -> list[tuple[Any, ...]]:
         """Return F_z, κ, s, σ_0 and the numbers of the curve of each axle."""
         size = _BESIDE + self.numbers
-        axles = (w[_SENSORS + i * size : _SENSORS + (i + 1) * size] for i in range(2))
+        axles = (w[self.sensors + i * size :][:size] for i in range(2))
         return [(axle[0], axle[1], axle[2], axle[3], axle[_BESIDE:]) for axle in axles]
 
 
@@ -128,9 +128,18 @@ class LadderAxles(CurveAxles):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitAxles(CurveAxles):
-    """φ of `identifier.motion.model.carcass_curve`; numbers: ln C to ln m, as it reads them."""
+    """φ of `identifier.motion.model.carcass_curve`; numbers: ln C to ln m, as it reads them.
+
+    Behind β stands p [rad], the play of the steering to each side.
+    """
 
     numbers = 9
+    sensors = 5
+
+    def slip(self, at: Point) -> Pair:
+        """Return the slip angles, errors of the sensors and the play taken off [rad]."""
+        front, rear = CurveAxles.slip(self, at)
+        return beyond_play(front, at.w[4]), rear
 
     def curve(self, numbers: Any, slip: Any) -> tuple[Any, Any]:
         return carcass_curve(*ca.vertsplit(numbers), slip)
@@ -142,14 +151,14 @@ class FitAxles(CurveAxles):
 def curve_weights(
     curves: Array,
     *,
-    sensors: tuple[float, ...] = (0.0,) * _SENSORS,
+    sensors: tuple[float, ...] = (0.0,) * 4,
     loads: Any = 1.0,
     downforce: Any = 0.0,
     give: Any = 0.0,
     shortest: Any = 0.0,
 ) -> Array:
     """Return w of `CurveAxles`.
-    curves : numbers of front and rear, (2, n).   sensors : δ_0, g, b, β and p.
+    curves : numbers of front and rear, (2, n).   sensors : the weights before the axles.
     loads, downforce, give, shortest : F_z, κ, s and σ_0 of both axles, or (2,).
     """
     beside = [np.broadcast_to(one, 2) for one in (loads, downforce, give, shortest)]
@@ -166,7 +175,7 @@ def axle_tire(model: AxleModel) -> PredictionTire:
     scales = 1.0 / np.array(model.ladder)
     curves = np.hstack([np.tile(scales, (2, 1)), model.W])
     errors = model.sensors
-    sensors = (model.offset[0], errors.steering_gain, model.offset[1], errors.v_y_angle, 0.0)
+    sensors = (model.offset[0], errors.steering_gain, model.offset[1], errors.v_y_angle)
     give = series_compliance(model.compliance, model.sway_share, model.sway.frequency)
     return _tire(LadderAxles(units=scales.size), model, sensors, give, curves)
 

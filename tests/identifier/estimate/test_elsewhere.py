@@ -187,7 +187,11 @@ def test_a_tracker_takes_the_errors_of_the_sensors_off():
 @pytest.mark.parametrize("car", [CAR, PRESSED], ids=["plain", "pressed"])
 def test_a_tracker_of_a_fit_lags_and_pushes_as_the_fit_does(car):
     fit = believed(
-        steering_gain=0.03, v_y_bias=0.05, v_y_angle=0.01, residual1_r=0.03, ln_road=-0.1,
+        steering_gain=0.03,
+        v_y_bias=0.05,
+        v_y_angle=0.01,
+        residual1_r=0.03,
+        ln_road=-0.1,
         steering_play=0.015,
     )
     model = fit.mounted_on(car)
