@@ -53,6 +53,7 @@ class _Rules:
     stiffness : that tires have, over the static load [1/rad].
     beyond : share of the samples beyond the known slip, from which it is noted [-].
     side_slip : standard deviation of an estimated one, median [rad].
+    v_y : standard deviation of one that was brought on time, over what the rear axle slips [-].
     rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
     """
 
@@ -63,6 +64,7 @@ class _Rules:
     beyond: float = 0.01
     side_slip: float = 0.01
     rolling: tuple[float, float] = (0.85, 1.25)
+    v_y: float = 0.08
 
 
 RULES = _Rules()
@@ -175,7 +177,7 @@ def _road(recording: Recording, model: TireModel) -> Array | None:
 
 def _findings(evaluated: _Evaluated) -> list[Objection]:
     rules = (
-        _v_y_stuck, _no_force, _model_error, _left_out, _unsure, _no_tire, _beyond, _turning,
+        _v_y_stuck, _v_y_unsure, _no_force, _model_error, _left_out, _unsure, _no_tire, _beyond, _turning,
         _unobserved,
     )  # fmt: skip
     return [finding for rule in rules for finding in rule(evaluated)]
@@ -190,6 +192,22 @@ def _v_y_stuck(evaluated: _Evaluated) -> Iterator[Objection]:
     if turns and not float(np.ptp(v_y[brisk])) > 0.0:
         text = "v_y never changes while the car turns: it was not measured"
         yield Objection("v_y_stuck", None, text, True)
+
+
+def _v_y_unsure(evaluated: _Evaluated) -> Iterator[Objection]:
+    """Refuse a v_y of which too little is left after it was brought on time."""
+    recording, starts = evaluated.recording, evaluated.found.windows.starts
+    if not recording.v_y_sd > 0.0:
+        return
+    sideways = recording.needed("v_y") - evaluated.model.vehicle.l_r * recording.r
+    size = float(np.sqrt(np.mean(sideways[starts] ** 2)))
+    if recording.v_y_sd > RULES.v_y * size:
+        text = (
+            f"v_y is rare, noisy or late by an unknown time: ± {recording.v_y_sd:.2g} m/s of the "
+            f"{size:.2g} m/s by which the rear axle slips (limit {PERCENT * RULES.v_y:.0f} %); "
+            "align it, or leave it out: ay is there"
+        )
+        yield Objection("v_y_unsure", None, text, evaluated.taught)
 
 
 def _no_force(evaluated: _Evaluated) -> Iterator[Objection]:
