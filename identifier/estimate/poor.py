@@ -92,7 +92,7 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
     found.setflags(write=False)
     alone = recording.a_y is None
     by = "straight lines" if alone else "ay, vx and r"
-    sd = 0.0 if alone else float(np.hypot(sd, delay))
+    sd = 0.0 if alone else float(np.hypot(np.sqrt(np.mean(sd**2)), delay))
     note = (
         f"vy: a new value every {1e3 * sensor.interval:.0f} ms, {1e3 * sensor.late:.0f} ms late, "
         f"noise {sensor.noise:.2g} m/s: brought on time and smoothed by {by}"
@@ -206,24 +206,26 @@ class _Kinematics:
         count, steps = np.count_nonzero(there), np.count_nonzero(self.goes)
         logs = 2.0 * np.sum(np.log(factor[0])) + np.log(S) + count * np.log(s.noise**2)
         logs += steps * np.log(s.push * s.wanders)
-        at = np.linspace(0, n - 1, asked + 2).astype(np.intp)[1:-1]
-        units = np.zeros((2 * n, at.size))
-        units[2 * at, np.arange(at.size)] = 1.0
-        inverse = cho_solve_banded((factor, True), units, check_finite=False)
-        variance = inverse[2 * at, np.arange(at.size)] + X[2 * at] ** 2 / S
-        miss = np.where(there, residual, 0.0)
-        return _Solved(v, miss, 0.5 * float(squares + logs), float(np.sqrt(variance.mean())))
+        variance = np.zeros(0)
+        if asked:
+            at = np.linspace(0, n - 1, asked + 2).astype(np.intp)[1:-1]
+            units = np.zeros((2 * n, at.size))
+            units[2 * at, np.arange(at.size)] = 1.0
+            inverse = cho_solve_banded((factor, True), units, check_finite=False)
+            variance = inverse[2 * at, np.arange(at.size)] + X[2 * at] ** 2 / S
+        misses = np.where(there, residual, 0.0)
+        return _Solved(v, misses, 0.5 * float(squares + logs), np.sqrt(variance))
 
 
 class _Solved(NamedTuple):
     """v_y (n,) and what it misses of the values (m,) [m/s], -ln of the likelihood but for a
-    constant [nats], and the standard deviation of v_y [m/s], nan where not asked for.
+    constant [nats], and the standard deviation of v_y at the instants asked for (k,) [m/s].
     """
 
     v_y: Array
     misses: Array
     cost: float
-    sd: float
+    sd: Array
 
 
 def _doubt_of_delay(problem: _Kinematics, sensor: _Sensor) -> float:

@@ -64,7 +64,7 @@ class _Rules:
     beyond: float = 0.01
     side_slip: float = 0.01
     rolling: tuple[float, float] = (0.85, 1.25)
-    v_y: float = 0.08
+    v_y: float = 0.15
 
 
 RULES = _Rules()
