@@ -87,12 +87,12 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
         delay = _doubt_of_delay(problem, sensor)
     weights, whole = np.ones(len(new)), _Kinematics(recording, new)
     for _ in range(_AGAIN):
-        found, misses, _, sd = whole.solved(sensor, weights, asked=_ASKED)
+        found, misses, _, each = whole.solved(sensor, weights, asked=_ASKED)
         weights = np.minimum(1.0, _CLIP * sensor.noise / np.maximum(np.abs(misses), 1e-12))
     found.setflags(write=False)
     alone = recording.a_y is None
     by = "straight lines" if alone else "ay, vx and r"
-    sd = 0.0 if alone else float(np.hypot(np.sqrt(np.mean(sd**2)), delay))
+    sd = 0.0 if alone else float(np.hypot(np.sqrt(np.mean(each**2)), delay))
     note = (
         f"vy: a new value every {1e3 * sensor.interval:.0f} ms, {1e3 * sensor.late:.0f} ms late, "
         f"noise {sensor.noise:.2g} m/s: brought on time and smoothed by {by}"

@@ -53,7 +53,8 @@ class _Rules:
     stiffness : that tires have, over the static load [1/rad].
     beyond : share of the samples beyond the known slip, from which it is noted [-].
     side_slip : standard deviation of an estimated one, median [rad].
-    v_y : standard deviation of one that was brought on time, over what the rear axle slips [-].
+    v_y : standard deviation of one that was brought on time, over what the rear axle slips, from
+        which it is noted and from which refused [-].
     rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
     """
 
@@ -64,7 +65,7 @@ class _Rules:
     beyond: float = 0.01
     side_slip: float = 0.01
     rolling: tuple[float, float] = (0.85, 1.25)
-    v_y: float = 0.15
+    v_y: tuple[float, float] = (0.06, 0.15)
 
 
 RULES = _Rules()
@@ -177,8 +178,8 @@ def _road(recording: Recording, model: TireModel) -> Array | None:
 
 def _findings(evaluated: _Evaluated) -> list[Objection]:
     rules = (
-        _v_y_stuck, _v_y_unsure, _no_force, _model_error, _left_out, _unsure, _no_tire, _beyond, _turning,
-        _unobserved,
+        _v_y_stuck, _v_y_unsure, _no_force, _model_error, _left_out, _unsure, _no_tire, _beyond,
+        _turning, _unobserved,
     )  # fmt: skip
     return [finding for rule in rules for finding in rule(evaluated)]
 
@@ -201,13 +202,14 @@ def _v_y_unsure(evaluated: _Evaluated) -> Iterator[Objection]:
         return
     sideways = recording.needed("v_y") - evaluated.model.vehicle.l_r * recording.r
     size = float(np.sqrt(np.mean(sideways[starts] ** 2)))
-    if recording.v_y_sd > RULES.v_y * size:
+    noted, refused = (share * size for share in RULES.v_y)
+    if recording.v_y_sd > noted:
         text = (
             f"v_y is rare, noisy or late by an unknown time: ± {recording.v_y_sd:.2g} m/s of the "
-            f"{size:.2g} m/s by which the rear axle slips (limit {PERCENT * RULES.v_y:.0f} %); "
+            f"{size:.2g} m/s by which the rear axle slips (limit {PERCENT * RULES.v_y[1]:.0f} %); "
             "align it, or leave it out: ay is there"
         )
-        yield Objection("v_y_unsure", None, text, evaluated.taught)
+        yield Objection("v_y_unsure", None, text, evaluated.taught and recording.v_y_sd > refused)
 
 
 def _no_force(evaluated: _Evaluated) -> Iterator[Objection]:

@@ -18,7 +18,8 @@ SENSORS = {
     "r_delay": 0.01, "v_y_lag": 0.01, "steering_lag": 0.01, "r_lag": 0.005, "r_gain": 0.02,
     "downforce_f": 1e-5, "downforce_r": -2e-5, "v_x_factor": 0.02,
     "cg_shift": 0.05, "ln_inertia": 0.1, "bank": 0.01, "ln_road": -0.2,
-    "steering_play": 0.01, "compliance_f": 0.03, "compliance_r": 0.04, "residual1_f": 0.05, "residual3_r": -0.04,
+    "compliance_f": 0.03, "compliance_r": 0.04, "residual1_f": 0.05, "residual3_r": -0.04,
+    "steering_play": 0.01,
 }  # fmt: skip
 
 
