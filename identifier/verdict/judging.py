@@ -53,9 +53,9 @@ class _Rules:
     stiffness : that tires have, over the static load [1/rad].
     beyond : share of the samples beyond the known slip, from which it is noted [-].
     side_slip : standard deviation of an estimated one, median [rad].
+    rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
     v_y : standard deviation of one that was brought on time, over what the rear axle slips, from
         which it is noted and from which refused [-].
-    rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
     """
 
     model_error: float = LARGEST_MODEL_ERROR
