@@ -66,9 +66,10 @@ def require_alive(
     slope = (force[2] - force[1]) / (2.0 * PROBE)
     for axle, here, said in zip(("front", "rear"), slope, vehicle.bicycle[4:], strict=True):
         if not here >= DEAD * said:
+            play = "the steering for play, and " if axle == "front" else ""
             raise refusal(
                 f"the {axle} axle does not push: it has {here:.4g} N/rad, its vehicle {said:.4g}; "
-                "check the units of force and slip"
+                f"check {play}the units of force and slip"
             )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.axle.car import Car
 from identifier.axle.curve import Curve, curve, doublings
-from identifier.axle.slip import SHORTEST
+from identifier.axle.slip import SHORTEST, beyond_play
 from models.vehicle import GRAVITY, Vehicle, load_ratio
 
 
@@ -52,16 +52,19 @@ def lagged_force(
     delta: Any,
     v_x: Any,
     least_lag: Any,
+    play: float = 0.0,
 ) -> tuple[Any, Any]:
     """Return the axle forces (2,) [N] and dα'/dt (2,) [rad/s].
     at : force curve at the lagged slip.   compliance : of `series_compliance`.
     offset : zero of the front steering [rad] and bias of v_y [m/s], (2,).
     slip : lagged slip α' (2,) [rad].   x : [v_y, r] (2,).
     delta : angle of the front wheels [rad].   v_x : longitudinal speed [m/s], positive.
-    least_lag : time under which no lag falls [s].
+    least_lag : time under which no lag falls [s].   play : of the steering, to each side [rad].
     """
     sideways = x[0] - offset[1] + ca.DM(car.arm) * x[1]
     alpha = ca.vertcat(delta + offset[0], 0) - ca.atan(sideways / v_x)
+    if play:
+        alpha = ca.vertcat(beyond_play(alpha[0], play), alpha[1])
     sigma = ca.DM(compliance) * at.carcass_slope + SHORTEST * float(car.arm[0] - car.arm[1])
     cos_delta = ca.vertcat(1 - delta**2 / 2 + delta**4 / 24, 1)
     force = at.force * ca.DM(car.load) * cos_delta

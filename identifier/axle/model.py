@@ -24,7 +24,7 @@ from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.dynamics import curve_at_speed, lagged_force, series_compliance
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.prior import friction_direction
-from identifier.axle.slip import SHORTEST, Sensors, Sway, SwayState
+from identifier.axle.slip import SHORTEST, Sensors, Sway, SwayState, beyond_play
 from identifier.axle.step import FROZEN_CARRY, OVER, build_frozen
 from identifier.band import (
     LARGEST_SD,
@@ -534,8 +534,8 @@ LEAST_VARIANCE = 1e-10  # of weights, lag and zeros, so that no covariance is si
 def begun(model: TireModel, ladder: tuple[float, ...] = LADDER) -> TireModel:
     """Return what an identifier of curves begins with: of a fit its curves in hidden units.
 
-    Lag, sway and errors of the sensors are taken over; load transfer and ellipse are not. A model
-    of another kind is returned as it is.
+    Lag, sway and errors of the sensors are taken over, and a play of the steering as a flat of the
+    front curve; load transfer and ellipse are not. A model of another kind is returned as it is.
     ladder : slip scales of the units [rad].
     """
     if model.kind != "fit":
@@ -571,7 +571,8 @@ def _begun_axle(fit: Any, i: int, ladder: tuple[float, ...]) -> tuple[Array, Arr
     weight = np.where(slip <= reach, 1.0, BEYOND)
     units = np.vstack([unit_matrix(slip, ladder) * weight[:, None], 1e-4 * np.eye(n)])
     weights_of = np.linalg.pinv(units)[:, : slip.size] * weight
-    phi, _, J = fit.curve_at(np.column_stack([slip, slip]))
+    pushes = beyond_play(slip, fit["steering_play"]) if i == 0 else slip
+    phi, _, J = fit.curve_at(np.column_stack([pushes, pushes]))
     v_x = float(fit.reach.speeds.mean())
     zeros = {"steering_zero": 1.0} if i == 0 else {"v_y_bias": 1.0, "v_y_angle": v_x}
     names = (f"compliance_{axle}", f"sway_share_{axle}", *zeros)

@@ -72,7 +72,7 @@ UNEXPLAINED = (
     (
         "delta_f",
         "no tire explains the front axle, with any fault removed: a steering angle that was "
-        "commanded and not measured, play, or several faults at once",
+        "commanded and not measured, or several faults at once",
     ),
     (
         "",

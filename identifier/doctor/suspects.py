@@ -97,7 +97,7 @@ class Suspect(NamedTuple):
         """Return what takes a size out, None for what no repair does."""
         numbers: dict[str, Any] = {self.code: size}
         match self.code:
-            case "bank" | "downforce":
+            case "bank" | "downforce" | "play":
                 return None
             case "factor":
                 numbers = {"factor": {self.channel: 1.0 / size}}
@@ -115,7 +115,7 @@ class Suspect(NamedTuple):
     def plausible(self, size: float, vehicle: Vehicle) -> bool:
         """Return whether a device can have such a size, and the car without it be a car."""
         match self.code:
-            case "lag":
+            case "lag" | "play":
                 return size > 0.0
             case "center_of_gravity":
                 return _CENTER[0] < (vehicle.l_f - size) / vehicle.wheelbase < _CENTER[1]
@@ -187,6 +187,9 @@ def _of_channels() -> tuple[Suspect, ...]:
 
 SUSPECTS = (
     *_of_channels(),
+    Suspect("steering_play", "play", "delta_f", "rad", 0.02, 0.002, "",
+            "the steering has {size} of play to each side, which the estimate allows for", "°",
+            _DEGREES),
     Suspect("v_y_angle", "velocity_sensor_angle", "v_y", "rad", 0.03, 0.0012, "",
             "the velocity sensor is turned by {size} to the left", "°", _DEGREES),
     Suspect("v_y_lever", "velocity_sensor_x", "v_y", "m", 0.8, 0.04, "length",

@@ -78,6 +78,7 @@ class FitMethod(Method):
             )
         priors = Priors.of(vehicle)
         if start is not None:
+            priors = priors.with_play() if start["steering_play"] > 0.0 else priors
             priors = priors.known(start.p, start.covariance)
         return fit([recording], vehicle, priors, days=self.days, progress=progress).model
 

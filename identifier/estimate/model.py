@@ -138,6 +138,7 @@ class FittedModel(TireModel):
             delta=(1.0 + self["steering_gain"]) * delta + self["steering_zero"],
             v_x=v_x,
             least_lag=least_lag,
+            play=self["steering_play"],
         )
 
     @property

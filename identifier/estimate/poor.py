@@ -33,6 +33,7 @@ _OFF = 0.15  # [m/s²], b at first
 _WANDERS = 5e-3  # [(m/s²)²/s], variance of b' of a banked road
 _EQUAL = 1e-9  # of the largest change, below which two are one
 _CLIP = 3.0  # deviations from which a sample counts less
+_ASKED = 32  # instants of a log at which the doubt of v_y is asked for
 _AGAIN = 3  # times that samples are weighted anew
 _DELAY_HALVINGS = 5  # halvings of the step in which a delay is looked for
 
@@ -70,6 +71,7 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
     sensor = _Sensor(_interval(new) * recording.dt, noise=float(NOISE[0]) * scale)
     if len(new) < _FEWEST_VALUES or (recording.a_y is None and not rare):
         return recording
+    delay = 0.0
     if recording.a_y is None:
         sensor = sensor._replace(push=float(PUSHES[-1]))
     else:
@@ -82,17 +84,21 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
         sensor = _likeliest(problem, sensor._replace(noise=max(white, sensor.noise)), scale)
         if not rare and not sensor.push < PUSHES[-1]:
             return recording  # a_y does not show this motion
+        delay = _doubt_of_delay(problem, sensor)
     weights, whole = np.ones(len(new)), _Kinematics(recording, new)
     for _ in range(_AGAIN):
-        found, residual, _ = whole.solved(sensor, weights)
-        weights = np.minimum(1.0, _CLIP * sensor.noise / np.maximum(np.abs(residual), 1e-12))
+        found, misses, _, each = whole.solved(sensor, weights, asked=_ASKED)
+        weights = np.minimum(1.0, _CLIP * sensor.noise / np.maximum(np.abs(misses), 1e-12))
     found.setflags(write=False)
-    by = "straight lines" if recording.a_y is None else "ay, vx and r"
+    alone = recording.a_y is None
+    by = "straight lines" if alone else "ay, vx and r"
+    sd = 0.0 if alone else float(np.hypot(np.sqrt(np.mean(each**2)), delay))
     note = (
         f"vy: a new value every {1e3 * sensor.interval:.0f} ms, {1e3 * sensor.late:.0f} ms late, "
         f"noise {sensor.noise:.2g} m/s: brought on time and smoothed by {by}"
+        + ("" if alone else f", which leaves ± {sd:.2g} m/s")
     )
-    return replace(recording, v_y=found, notes=(*recording.notes, note))
+    return replace(recording, v_y=found, v_y_sd=sd, notes=(*recording.notes, note))
 
 
 def _new_values(signal: Array) -> NDArray[np.intp]:
@@ -143,12 +149,12 @@ class _Kinematics:
         return np.searchsorted(np.array(self.recording.breaks), np.arange(self.n), side="right")
 
     def solved(
-        self, s: _Sensor, weights: Array | float, late: float | None = None
-    ) -> tuple[Array, Array, float]:
-        """Return v_y (n,) and what it misses of the values (m,) [m/s], and -ln of the likelihood
-        but for a constant [nats].
+        self, s: _Sensor, weights: Array | float, late: float | None = None, asked: int = 0
+    ) -> "_Solved":
+        """Return v_y and how sure it is.
         weights : of the values, at most 1, (m,).
         late : delay up to which values must have a past to count [s]; None takes that of `s`.
+        asked : instants at which the standard deviation is asked for.
         """
         from scipy.linalg import cho_solve_banded, cholesky_banded  # takes long to import
 
@@ -200,14 +206,45 @@ class _Kinematics:
         count, steps = np.count_nonzero(there), np.count_nonzero(self.goes)
         logs = 2.0 * np.sum(np.log(factor[0])) + np.log(S) + count * np.log(s.noise**2)
         logs += steps * np.log(s.push * s.wanders)
-        return v, np.where(there, residual, 0.0), 0.5 * float(squares + logs)
+        variance = np.zeros(0)
+        if asked:
+            at = np.linspace(0, n - 1, asked + 2).astype(np.intp)[1:-1]
+            units = np.zeros((2 * n, at.size))
+            units[2 * at, np.arange(at.size)] = 1.0
+            inverse = cho_solve_banded((factor, True), units, check_finite=False)
+            variance = inverse[2 * at, np.arange(at.size)] + X[2 * at] ** 2 / S
+        misses = np.where(there, residual, 0.0)
+        return _Solved(v, misses, 0.5 * float(squares + logs), np.sqrt(variance))
+
+
+class _Solved(NamedTuple):
+    """v_y (n,) and what it misses of the values (m,) [m/s], -ln of the likelihood but for a
+    constant [nats], and the standard deviation of v_y at the instants asked for (k,) [m/s].
+    """
+
+    v_y: Array
+    misses: Array
+    cost: float
+    sd: Array
+
+
+def _doubt_of_delay(problem: _Kinematics, sensor: _Sensor) -> float:
+    """Return what v_y is unsure of by its delay [m/s], rms: each delay as likely as it is."""
+    found = problem.solved(sensor, 1.0).v_y
+    some = [
+        problem.solved(sensor._replace(late=float(one)), 1.0, float(DELAYS[-1])) for one in DELAYS
+    ]
+    cost = np.array([one.cost for one in some])
+    likely = np.exp(cost.min() - cost)
+    away = [float(np.mean((one.v_y - found) ** 2)) for one in some]
+    return float(np.sqrt(likely @ away / likely.sum()))
 
 
 def _likeliest(problem: _Kinematics, best: _Sensor, scale: float) -> _Sensor:
     """Return how v_y is shown, by the largest likelihood, from a beginning on."""
 
     def cost(sensor: _Sensor) -> float:  # the same values count for each delay
-        return problem.solved(sensor, 1.0, float(DELAYS[-1]))[2]
+        return problem.solved(sensor, 1.0, float(DELAYS[-1])).cost
 
     least = cost(best)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.estimate.information import Information
+from identifier.estimate.information import PLACE, Information
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import FULL_SIZE, Vehicle
 
@@ -32,6 +32,9 @@ _SHARED_ERROR = 0.5
 _LEFT_OUT = 0.1
 _LEFT_OUT_SMALL = 0.3  # the same of a model car
 ANOTHER_ROAD = 0.5  # standard deviation of ln of its friction over that of the first
+_PLAY = INDEX["steering_play"]
+_PLAY_SD = 0.02  # [rad] of a play that a log asks for: servos of 1:10 cars have 1 to 1.5 degrees
+_LARGEST_PLAY = 0.1  # [rad]
 _TAILS = 1.0  # degrees of freedom of their priors
 
 SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
@@ -112,6 +115,12 @@ class Priors:
         information[index], information[:, index] = 0.0, 0.0
         return replace(self, mean=mean, information=information, moves=moves)
 
+    def with_play(self) -> "Priors":
+        """Return the beliefs with a play of the steering, which else is held at zero."""
+        information, moves = self.information.copy(), self.moves.copy()
+        information[_PLAY, _PLAY], moves[_PLAY] = _PLAY_SD**-2.0, True
+        return replace(self, information=information, moves=moves)
+
     @classmethod
     def of(
         cls,
@@ -139,6 +148,9 @@ class Priors:
         if vehicle.inertia_is_estimate:
             small = vehicle.wheelbase < FULL_SIZE
             sd[INDEX["ln_inertia"]] = _LEFT_OUT_SMALL if small else _LEFT_OUT
+        low[_PLAY], high[_PLAY] = 0.0, _LARGEST_PLAY
+        if vehicle.wheelbase < FULL_SIZE:
+            sd[_PLAY] = _PLAY_SD
         for name, value in wide.items():
             sd[INDEX[name]] = value
         information = np.zeros((p, p))
@@ -220,8 +232,10 @@ class Priors:
         return replace(self, mean=p, information=information, typed=())
 
     def after(self, data: Information) -> "Priors":
-        """Return the beliefs with what drives add."""
-        return replace(self, data=data)
+        """Return the beliefs with what drives add, of a play where one of them had it."""
+        k = PLACE["steering_play"]
+        loose = data.matrix[k, k] > 0.0 and not self.moves[_PLAY]
+        return replace(self.with_play() if loose else self, data=data)
 
 
 def _declared(vehicle: Vehicle) -> dict[str, tuple[float, float]]:

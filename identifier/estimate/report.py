@@ -21,6 +21,8 @@ _SLOPE_STEP = 1e-4  # rad, over which a slope is taken
 _WIDE, _WIDENED = 0.2, 1.5  # sd of a stiffness, of it, that a free ratio leaves; over the plain one
 _SURELY = 3.0  # standard deviations of an error of the steering that is noted
 _NOTED_GAIN = 0.08  # least error of the steering that is noted [-]
+_NOTED_PLAY = 0.25  # [deg] of the steering, least play that is noted
+_ADDED = ("steering_play",)  # parameters that older files do not hold, 0 in them
 _LARGEST = 1e6  # of the numbers in a file
 
 BOUNDED = (("ln_stiffness", "cornering stiffness"), ("ln_grip", "grip"))
@@ -117,6 +119,16 @@ def notes(reach: Reach, p: Array, covariance: Array) -> tuple[tuple[str, str], .
                 "says: check the steering ratio; the curves allow for it",
             )
         )
+    k = INDEX["steering_play"]
+    play, sd = np.degrees([p[k], np.sqrt(covariance[k, k])])
+    if play > max(_SURELY * sd, _NOTED_PLAY):
+        listed.append(
+            (
+                "steering_play",
+                f"the steering has {play:.1f} ± {sd:.1f} deg of play to each side: the curves are "
+                "those of the tires without it, forces allow for it",
+            )
+        )
     if reach.a_y_late:
         listed.append(
             (
@@ -200,10 +212,14 @@ def read(table: Table) -> dict[str, Any]:
         table.number(key) if key in table else 0.0 for key in ("parted_rad", "a_y_late_s")
     )
     segments = table.tables("segments") if "segments" in table else []
+    held = [k for k, name in enumerate(NAMES) if name in parameters or name not in _ADDED]
+    p, covariance = np.zeros(len(NAMES)), np.zeros((len(NAMES), len(NAMES)))
+    p[held] = [parameters.table(NAMES[k]).number("value") for k in held]
+    covariance[np.ix_(held, held)] = array("covariance", (len(held), len(held)))
     return {
         "vehicle": vehicle_from(table.value("vehicle")),
-        "p": np.array([parameters.table(name).number("value") for name in NAMES]),
-        "covariance": array("covariance", (len(NAMES), len(NAMES))),
+        "p": p,
+        "covariance": covariance,
         "reach": Reach(
             slip=array("driven_slip_rad"),
             speeds=array("speeds_m_s"),

@@ -30,7 +30,7 @@ NU = 4.0  # degrees of freedom of the loss: a tenth of the residuals may be far 
 _LEAST_SCALE = 0.25  # S: a model is never believed to be better than that
 _SHORTEST_MEMORY = 0.25  # least T [s]
 _LONGEST_MEMORY = 8.0  # largest T [s]
-_LEAST_STIFF = 0.25  # of C: slope at zero, which is at most C
+_LEAST_STIFF = 0.9  # of C: slope at zero; 0.25 leaves a third of a planted play to the curve
 _STIFF_SD = 0.1  # of C: how firmly that is believed, chosen on random cars and CommonRoad's
 _ITERATIONS = 25  # of a descent, at most
 ENOUGH = 0.02  # [nats] of improvement, below which it ends
@@ -412,24 +412,25 @@ def _trials(
 
 def beliefs_cost(priors: Priors, p: Array) -> float:
     """Return what the priors cost, and tires that are too soft about zero slip [nats]."""
-    soft, _ = _softness(p)
+    soft, _ = softness(p)
     return priors.cost(p) + 0.5 * float(soft @ soft)
 
 
 def around_beliefs(priors: Priors, p: Array) -> tuple[Array, Array]:
     """Return gradient (p,) and positive curvature (p, p) of `beliefs_cost`."""
     gradient, curvature = priors.around(p)
-    soft, slopes = _softness(p)
+    soft, slopes = softness(p)
     return gradient + soft @ slopes, curvature + slopes.T @ slopes
 
 
-def _softness(p: Array) -> tuple[Array, Array]:
+def softness(p: Array) -> tuple[Array, Array]:
     """Return how far the slope of both axles at zero is outside what a tire can have, and its
     slopes over p (p,).
 
-    No tire has less than a quarter of C there: play in the steering looks so. None has more: the
-    stiffness is C's to tell, else a gentle drive puts it into a unit of the residual that is over
-    before the corner. (2,), in standard deviations of a tenth of C, and (2, p); zero between.
+    No tire has much less than C there: play of the steering looks so. None has more: the stiffness
+    is C's to tell, else a gentle drive puts it into a unit of the residual that is over before the
+    corner. (2,), in standard deviations of a tenth of C, negative where it is soft, and (2, p);
+    zero between.
     """
     found, slopes = np.zeros(2), np.zeros((2, p.size))
     for i, axle in enumerate("fr"):

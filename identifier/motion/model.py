@@ -4,6 +4,7 @@ Signals, after the sensors' errors are taken out:
 v_y = v_y,m(t + τ) - b - β v_x - x_s r,   δ = (1 + g) δ_m(t + τ_δ) + δ0,
 r = (1 + g_r) r_m(t + τ_r) - b_r,   v_x = (1 + g_x) v_x,m;  behind a low pass x = x_m + T x_m'.
 Slip, i = f, r:   α_i = δ_i - atan((v_y ± l_i r)/v_x) + k_i (-ρ'/(ω² v_x)),
+in front what is beyond the play p of the steering:  α + (sqrt((α-p)² + ε²) - sqrt((α+p)² + ε²))/2,
 sway:   ρ'' = ω² (a - ρ) - 2 ζ ω ρ',   a = g Σ share_i φ_i.
 Relaxation:   x_i' = (v_x/σ_i)(α_i - x_i),   σ_i = s_i max(φ_i'(x_i), 0.02 C_i) + 0.001 L, solved
 exactly for α linear over a step.
@@ -30,7 +31,7 @@ from codegen import Scan
 from codegen.compiler import FLAGS
 from identifier.axle.car import step_function, symbols
 from identifier.axle.gate import GateState, Plausibility, gate
-from identifier.axle.slip import SHORTEST
+from identifier.axle.slip import SHORTEST, beyond_play
 from identifier.motion.parameters import NAMES, SLIPS, curve_names
 from models.vehicle import GRAVITY, LIGHTEST
 
@@ -335,9 +336,10 @@ def _slip(
     """Return slip and lagged slip of an axle after the sample, and the latter by itself."""
     car, p = at.car, at.p
 
-    def slip(d: Any, vy: Any, vx: Any, yaw: Any, k: Any, s: Any, shift: Any) -> list[Any]:
+    def slip(d: Any, vy: Any, vx: Any, yaw: Any, k: Any, s: Any, shift: Any, *p: Any) -> list[Any]:
         arm = (car.l_f - shift) if axle == "f" else -(car.l_r + shift)
-        return [d - ca.atan((vy + arm * yaw) / vx) + k * s]
+        alpha = d - ca.atan((vy + arm * yaw) / vx) + k * s
+        return [beyond_play(alpha, *p) if p else alpha]
 
     def lagged(x0: Any, a0: Any, a1: Any, C: Any, give: Any, vx: Any) -> list[Any]:
         """Exact for α linear over the step."""
@@ -346,7 +348,9 @@ def _slip(
         x1 = e * x0 + (1 - e) * a0 + (1 - (1 - e) / h) * (a1 - a0)
         return [ca.if_else(at.first > 0, a1, x1)]
 
-    (alpha,) = _staged(slip, delta, v_y, v_x, r, p[f"sway_share_{axle}"], sway, p["cg_shift"])
+    play = [p["steering_play"]] if axle == "f" else []
+    share, shift = p[f"sway_share_{axle}"], p["cg_shift"]
+    (alpha,) = _staged(slip, delta, v_y, v_x, r, share, sway, shift, *play)
     last, was, slope = (at.before[f"{name}_{axle}"] for name in ("x", "alpha", "slope"))
     (x,) = _staged(lagged, last, was, alpha, slope, p[f"compliance_{axle}"], v_x)
     return {f"x_{axle}": x, f"alpha_{axle}": alpha}, x

@@ -17,7 +17,7 @@ import casadi as ca
 
 from codegen import Scan
 from identifier.axle.car import step_function, symbols
-from identifier.axle.slip import SHORTEST
+from identifier.axle.slip import SHORTEST, beyond_play
 from identifier.motion.model import (
     QUICK,
     CarNumbers,
@@ -122,10 +122,11 @@ class _Instant:
         """Slip angles of both axles."""
         omega = self.car.omega * ca.exp(self.p["ln_sway"])
         v_x, sway = self.given["v_x"], -self.given["rho_rate"] / (omega**2 * self.given["v_x"])
-        return [
+        front, rear = (
             delta - ca.atan((self.v_y + arm * self.r) / v_x) + self.p[f"sway_share_{axle}"] * sway
             for axle, delta, arm in zip("fr", self.delta, self.arms, strict=True)
-        ]
+        )
+        return [beyond_play(front, self.p["steering_play"]), rear]
 
     def curve(self, axle: str, x: Any) -> tuple[Any, Any]:
         """Return φ and the slope of the curve at a slip, at least what the carcass keeps."""

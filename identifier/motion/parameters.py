@@ -35,6 +35,7 @@ UNITS = {
     "v_y_lag": "s",  # low pass of first order that v_y is behind
     "steering_delay": "s",  # by which the steering angle is late
     "steering_lag": "s",  # low pass of first order that the steering angle is behind
+    "steering_play": "rad",  # p to each side, slip that turns loose front wheels and pushes nothing
     "r_bias": "rad/s",  # in the measured yaw rate
     "r_delay": "s",  # by which the yaw rate is late
     "r_lag": "s",  # low pass of first order that the yaw rate is behind

@@ -61,6 +61,8 @@ class _Rules:
     beyond : share of the samples beyond the known slip, from which it is noted [-].
     side_slip : standard deviation of an estimated one, median [rad].
     rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
+    v_y : standard deviation of one that was brought on time, over what the rear axle slips, from
+        which it is noted and from which refused [-].
     """
 
     model_error: float = LARGEST_MODEL_ERROR
@@ -70,6 +72,7 @@ class _Rules:
     beyond: float = 0.01
     side_slip: float = 0.01
     rolling: tuple[float, float] = (0.85, 1.25)
+    v_y: tuple[float, float] = (0.06, 0.15)
 
 
 RULES = _Rules()
@@ -180,8 +183,8 @@ def _evaluated(
 
 def _findings(evaluated: _Evaluated) -> list[Objection]:
     rules = (
-        _v_y_stuck, _no_force, _model_error, _left_out, _unsure, _no_tire, _beyond, _turning,
-        _unobserved, _sensors,
+        _v_y_stuck, _v_y_unsure, _no_force, _model_error, _left_out, _unsure, _no_tire, _beyond,
+        _turning, _unobserved, _sensors,
     )  # fmt: skip
     return [finding for rule in rules for finding in rule(evaluated)]
 
@@ -195,6 +198,23 @@ def _v_y_stuck(evaluated: _Evaluated) -> Iterator[Objection]:
     if turns and not float(np.ptp(v_y[brisk])) > 0.0:
         text = "v_y never changes while the car turns: it was not measured"
         yield Objection("v_y_stuck", None, text, True)
+
+
+def _v_y_unsure(evaluated: _Evaluated) -> Iterator[Objection]:
+    """Refuse a v_y of which too little is left after it was brought on time."""
+    recording, starts = evaluated.recording, evaluated.found.windows.starts
+    if not recording.v_y_sd > 0.0:
+        return
+    sideways = recording.needed("v_y") - evaluated.model.vehicle.l_r * recording.r
+    size = float(np.sqrt(np.mean(sideways[starts] ** 2)))
+    noted, refused = (share * size for share in RULES.v_y)
+    if recording.v_y_sd > noted:
+        text = (
+            f"v_y is rare, noisy or late by an unknown time: ± {recording.v_y_sd:.2g} m/s of the "
+            f"{size:.2g} m/s by which the rear axle slips (limit {PERCENT * RULES.v_y[1]:.0f} %); "
+            "align it, or leave it out: ay is there"
+        )
+        yield Objection("v_y_unsure", None, text, evaluated.taught and recording.v_y_sd > refused)
 
 
 def _no_force(evaluated: _Evaluated) -> Iterator[Objection]:
@@ -269,9 +289,10 @@ def _no_tire(evaluated: _Evaluated) -> Iterator[Objection]:
     least, most = RULES.stiffness
     for axle, each, C in zip(AXLES, stiffness / loads, stiffness, strict=True):
         if not least <= each <= most:
+            soft = "play of the steering, " if axle == "front" and each < least else ""
             text = (
                 f"cornering stiffness {C / 1e3:.3g} kN/rad is {each:.2g} static loads per rad, "
-                f"tires have {least:g} to {most:g}: check signs, units and the vehicle file"
+                f"tires have {least:g} to {most:g}: check {soft}signs, units and the vehicle file"
             )
             yield Objection("no_tire", axle, text, True)
 

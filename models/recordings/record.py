@@ -74,6 +74,7 @@ class Recording:
     breaks : index of the first sample of each segment but the first, rising.
     notes : what was taken or done in reading beyond the words of the file, one sentence each.
     estimated : signals that a method estimated, not a sensor: v_y only. No method gets them.
+    v_y_sd : standard deviation of a v_y that was brought on time and smoothed [m/s], else 0.
 
     Raises
     ------
@@ -95,6 +96,7 @@ class Recording:
     breaks: tuple[int, ...] = ()
     notes: tuple[str, ...] = ()
     estimated: tuple[str, ...] = ()
+    v_y_sd: float = 0.0
 
     def __post_init__(self) -> None:
         n = np.size(self.t)
@@ -400,6 +402,7 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
         breaks=tuple(breaks),
         notes=tuple(notes),
         estimated=tuple(sorted({signal for one in recordings for signal in one.estimated})),
+        v_y_sd=max(one.v_y_sd for one in recordings),
     )
 
 

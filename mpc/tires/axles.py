@@ -14,14 +14,14 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.axle.dynamics import series_compliance
 from identifier.axle.model import AxleModel
-from identifier.axle.slip import SHORTEST
+from identifier.axle.slip import SHORTEST, beyond_play
 from identifier.estimate.model import FittedModel
 from identifier.motion.model import carcass_curve
 from identifier.motion.parameters import curve_index
 from models.vehicle import load_ratio
 from mpc.tires.tire import DOUBT_STEP, N_DOUBTS, Pair, Point, PredictionTire, TireStructure
 
-_SENSORS, _BESIDE = 4, 4  # weights before those of the axles; of an axle before its curve
+_BESIDE = 4  # weights of an axle before its curve
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +35,7 @@ class CurveAxles(TireStructure):
     """
 
     saturates = True
+    sensors = 4  # weights before those of the axles
 
     lagged: bool = True
 
@@ -53,7 +54,7 @@ class CurveAxles(TireStructure):
 
     @property
     def n_weights(self) -> int:
-        return _SENSORS + 2 * (_BESIDE + self.numbers)
+        return self.sensors + 2 * (_BESIDE + self.numbers)
 
     def slip(self, at: Point) -> Pair:
         """Return the slip angles, errors of the sensors taken off [rad]."""
@@ -86,7 +87,7 @@ class CurveAxles(TireStructure):
     def at_friction(self, weights: Array, ratio: float) -> Array:
         """Return `weights` (n_weights,) of another friction."""
         w = weights.copy()
-        self.on_friction(w[_SENSORS:].reshape(2, -1)[:, _BESIDE:], ratio)
+        self.on_friction(w[self.sensors :].reshape(2, -1)[:, _BESIDE:], ratio)
         return w
 
     def similar(self, at: Point, ratio: Any) -> Point:
@@ -97,7 +98,7 @@ class CurveAxles(TireStructure):
     def _axles(self, w: Any) -> list[tuple[Any, ...]]:
         """Return F_z, κ, s, σ_0 and the numbers of the curve of each axle."""
         size = _BESIDE + self.numbers
-        axles = (w[_SENSORS + i * size : _SENSORS + (i + 1) * size] for i in range(2))
+        axles = (w[self.sensors + i * size :][:size] for i in range(2))
         return [(axle[0], axle[1], axle[2], axle[3], axle[_BESIDE:]) for axle in axles]
 
 
@@ -127,9 +128,18 @@ class LadderAxles(CurveAxles):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FitAxles(CurveAxles):
-    """φ of `identifier.motion.model.carcass_curve`; numbers: ln C to ln m, as it reads them."""
+    """φ of `identifier.motion.model.carcass_curve`; numbers: ln C to ln m, as it reads them.
+
+    Behind β stands p [rad], the play of the steering to each side.
+    """
 
     numbers = 9
+    sensors = 5
+
+    def slip(self, at: Point) -> Pair:
+        """Return the slip angles, errors of the sensors and the play taken off [rad]."""
+        front, rear = CurveAxles.slip(self, at)
+        return beyond_play(front, at.w[4]), rear
 
     def curve(self, numbers: Any, slip: Any) -> tuple[Any, Any]:
         return carcass_curve(*ca.vertsplit(numbers), slip)
@@ -141,14 +151,14 @@ class FitAxles(CurveAxles):
 def curve_weights(
     curves: Array,
     *,
-    sensors: tuple[float, ...] = (0.0,) * _SENSORS,
+    sensors: tuple[float, ...] = (0.0,) * 4,
     loads: Any = 1.0,
     downforce: Any = 0.0,
     give: Any = 0.0,
     shortest: Any = 0.0,
 ) -> Array:
     """Return w of `CurveAxles`.
-    curves : numbers of front and rear, (2, n).   sensors : δ_0, g, b and β.
+    curves : numbers of front and rear, (2, n).   sensors : the weights before the axles.
     loads, downforce, give, shortest : F_z, κ, s and σ_0 of both axles, or (2,).
     """
     beside = [np.broadcast_to(one, 2) for one in (loads, downforce, give, shortest)]
@@ -175,7 +185,7 @@ def fit_tire(model: FittedModel) -> PredictionTire:
     model : frozen; load transfer, ellipse and the place of the sensor of v_y are left out: the
         tracker is told no a_x.
     """
-    names = ("steering_zero", "steering_gain", "v_y_bias", "v_y_angle")
+    names = ("steering_zero", "steering_gain", "v_y_bias", "v_y_angle", "steering_play")
     curves = np.stack([model.p[curve_index(axle)] for axle in "fr"])
     return _tire(FitAxles(), model, tuple(model[name] for name in names), model.give, curves)
 

@@ -31,9 +31,10 @@ from identifier.motion.parameters import NAMES
 from models.extras import needs
 from models.vehicle import Vehicle, sedan
 
-VERSION = 4  # of rows
+VERSION = 5  # of rows
 BATCH = 512  # rows in memory at once
-_MOVING = [name for name, moves in zip(NAMES, Priors.of(sedan()).moves, strict=True) if moves]
+_MOVES = Priors.of(sedan()).with_play().moves
+_MOVING = [name for name, moves in zip(NAMES, _MOVES, strict=True) if moves]
 OBSERVABLE = np.array([*range(FORCES), *(PLACE[name] for name in _MOVING if name in PLACE)])  # of u
 _TRIANGLE = tuple(OBSERVABLE[np.array(np.triu_indices(len(OBSERVABLE)))])
 

@@ -167,7 +167,8 @@ def test_a_network_file_tells_curves_and_band_of_a_fit(fitted):
 
 
 def test_a_tracker_takes_the_errors_of_the_sensors_off():
-    model = believed(v_y_bias=0.05, v_y_angle=-0.02, steering_zero=0.004, steering_gain=0.03)
+    numbers = {"v_y_bias": 0.05, "v_y_angle": -0.02, "steering_zero": 0.004, "steering_gain": 0.03}
+    model = believed(**numbers, steering_play=0.005)
     tire = prediction_tire(model)
     v_y, r, delta, v_x = 0.6, 0.3, 0.07, 25.0
     at = Point(v_y, r, delta, v_x, Car(*tire.car), tire.weights)
@@ -176,7 +177,9 @@ def test_a_tracker_takes_the_errors_of_the_sensors_off():
         1.03 * delta + 0.004 - np.arctan((true + CAR.l_f * r) / v_x),
         -np.arctan((true - CAR.l_r * r) / v_x),
     )
-    np.testing.assert_allclose([float(x) for x in tire.structure.slip(at)], expected)
+    front, rear = (float(x) for x in tire.structure.slip(at))
+    np.testing.assert_allclose(front, expected[0] - 0.005, atol=1e-4)
+    np.testing.assert_allclose(rear, expected[1])
     slips = DOUBT_STEP * np.arange(26)
     np.testing.assert_allclose(tire.doubt.T, model.band.half(slips))
 
@@ -184,7 +187,12 @@ def test_a_tracker_takes_the_errors_of_the_sensors_off():
 @pytest.mark.parametrize("car", [CAR, PRESSED], ids=["plain", "pressed"])
 def test_a_tracker_of_a_fit_lags_and_pushes_as_the_fit_does(car):
     fit = believed(
-        steering_gain=0.03, v_y_bias=0.05, v_y_angle=0.01, residual1_r=0.03, ln_road=-0.1
+        steering_gain=0.03,
+        v_y_bias=0.05,
+        v_y_angle=0.01,
+        residual1_r=0.03,
+        ln_road=-0.1,
+        steering_play=0.015,
     )
     model = fit.mounted_on(car)
     motion, tire = model.casadi_function().dynamics, prediction_tire(model)

@@ -1,17 +1,26 @@
 """The estimate finds what was planted, from one log or several, whatever stiffness is told."""
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
+import casadi as ca
 import numpy as np
 import pytest
 
+from benchmarks.random_cars import random_car, random_drive
+from identifier.doctor.faults import examine
+from identifier.estimate.drive import Drive
 from identifier.estimate.fit import fit
 from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
+from identifier.estimate.solve import estimate
 from identifier.motion.parameters import INDEX, NAMES
 from identifier.verdict import judge_identification
-from models.vehicle import estimate, sedan
-from tests.identifier.estimate.conftest import DROP, driven
+from models.maneuvers import RandomSteer
+from models.plant import Plant
+from models.tires import Tire
+from models.vehicle import estimate as estimated
+from models.vehicle import sedan
+from tests.identifier.estimate.conftest import DROP, NOISE, driven
 from tireid.driving.learn import sample_recording
 
 GRID = np.linspace(0.005, 0.06, 12)
@@ -108,14 +117,50 @@ def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
     assert judged.valid and not wet.drives.road_differs(judged.forces.t - 0.15).any()
 
 
-def test_a_steering_with_play_leaves_a_curve_that_rises(learnt):
-    """What a dead zone would have the curve do, fall at zero slip, no tire does."""
-    log = driven(3)
-    play = replace(log, delta_f=log.delta_f + 0.03 * np.tanh(log.delta_f / 0.001))
-    model = fit([play], sedan()).model
-    assert (model.force(np.array([0.001, 0.02])) > 0.0).all()
-    stiffness = learnt.model.stiffness
-    np.testing.assert_allclose(model.stiffness, stiffness, rtol=0.5)
+PLAY = 0.02  # rad
+
+
+@dataclass(frozen=True)
+class Loose:
+    """A tire whose wheel turns freely until a play is used up: none of it makes a force."""
+
+    tire: Tire
+
+    def forces(self, alpha, *of):
+        return self.tire.forces(alpha - ca.fmax(-PLAY, ca.fmin(PLAY, alpha)), *of)
+
+    def __getattr__(self, name):
+        return getattr(self.tire, name)
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_play_of_the_steering_is_found_and_its_curve_is_the_tires(seed):
+    rng = np.random.default_rng(seed)
+    car = random_car("tenth", rng)
+    loose = replace(car, tires=(Loose(car.tires[0]), car.tires[1]))
+    log, other = (random_drive(loose, rng).log(rng) for _ in range(2))
+    model = fit([log], car.told).model
+    assert model["steering_play"] == pytest.approx(PLAY, rel=0.2)
+    without = Priors.of(car.told).without(["steering_play"])
+    firm = replace(model, p=estimate([Drive.of(log, car.told)], car.told, without).p)
+    assert (share_missed(model, other) < [0.05, 0.05]).all()
+    assert share_missed(model, other)[0] < 0.7 * share_missed(firm, other)[0]
+    (note,) = (text for code, text in model.drives.notes if code == "steering_play")
+    assert "deg of play" in note
+    (found,) = (one for one in examine(log, car.told).findings)
+    assert found.code == "play" and found.size == pytest.approx(PLAY, rel=0.2)
+
+
+def test_a_full_size_car_has_a_play_where_its_curve_asks_for_one(learnt):
+    assert learnt.model["steering_play"] == 0.0 == learnt.posterior.sd("steering_play")
+    tire = Plant(sedan()).tire
+    steering = RandomSteer(
+        amplitude=0.09, frequency=0.6, seed=3, onset=1.0, rate_limit=1.0, duration=20.0
+    )
+    run = Plant(sedan(), Loose(tire), rear_tire=tire).simulate(steering, speed=17.0)
+    found = fit([NOISE.apply(run.recording(), np.random.default_rng(3))], sedan()).model
+    assert found["steering_play"] == pytest.approx(PLAY, rel=0.25)
+    np.testing.assert_allclose(found.stiffness, learnt.model.stiffness, rtol=0.2)
 
 
 # A steering ratio that somebody typed is right to a few percent, or plainly wrong.
@@ -141,7 +186,7 @@ def test_a_wrong_steering_ratio_does_not_reach_the_stiffness(ratio, car, drive):
 def test_a_yaw_inertia_that_nobody_measured_does_not_become_a_steering_ratio():
     """m l_f l_r is 7 % above that of the sedan; given as measured, the ratio takes the error."""
     car, log = sedan(), sample_recording(sedan())
-    guess = estimate(car.mass, car.l_f, car.l_r)["yaw_inertia"]
+    guess = estimated(car.mass, car.l_f, car.l_r)["yaw_inertia"]
     left_out = replace(car, yaw_inertia=guess)
     assert left_out.inertia_is_estimate and not car.inertia_is_estimate
     model = fit([log], left_out).model

@@ -29,6 +29,17 @@ def test_a_saved_model_is_the_same(learnt, tmp_path):
     np.testing.assert_array_equal(loaded.band.over(drive), model.band.over(drive))
 
 
+def test_a_file_of_before_has_no_play(learnt):
+    data = json.loads(json.dumps(learnt.model.to_dict()))
+    k = list(data["parameters"]).index("steering_play")
+    del data["parameters"]["steering_play"], data["covariance"][k]
+    for row in data["covariance"]:
+        del row[k]
+    read = FittedModel.from_dict(data, "tires.json")
+    np.testing.assert_array_equal(read.p, learnt.model.p)
+    np.testing.assert_array_equal(read.covariance, learnt.model.covariance)
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [

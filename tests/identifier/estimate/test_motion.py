@@ -19,6 +19,7 @@ SENSORS = {
     "downforce_f": 1e-5, "downforce_r": -2e-5, "v_x_factor": 0.02,
     "cg_shift": 0.05, "ln_inertia": 0.1, "bank": 0.01, "ln_road": -0.2,
     "compliance_f": 0.03, "compliance_r": 0.04, "residual1_f": 0.05, "residual3_r": -0.04,
+    "steering_play": 0.01,
 }  # fmt: skip
 
 
@@ -78,6 +79,7 @@ def of(drive, p, car):
         if x is None:
             x, rho, rate = slip, v_x[j] * r[j], 0.0
         slip = slip - k * rate / (omega**2 * v_x[j])
+        slip[0] -= np.clip(slip[0], -one["steering_play"], one["steering_play"])
         phi, slope = curve(x)
         f = a_x[j] / GRAVITY
         press = np.array([one["downforce_f"], one["downforce_r"]]) * v_x[j] ** 2

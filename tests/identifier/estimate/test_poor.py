@@ -99,3 +99,14 @@ def test_a_user_learns_from_a_receiver_nearly_as_well(log, caplog):
     assert share_missed(fit([poor], CAR).model, other) > 3.0 * best  # as it is
     prediction = ti.replay(received(other), run.freeze())
     assert prediction.verdict.valid
+
+
+def test_what_noise_and_delay_leave_of_v_y_is_known_and_refused_where_it_is_too_much(log):
+    rng = np.random.default_rng(2)
+    for sd, code, valid in ((0.1, False, True), (1.5, True, False)):
+        noisy = received(replace(log, v_y=log.v_y + sd * rng.standard_normal(len(log))))
+        run = ti.identify(noisy, CAR, check=False)
+        assert 0.4 < off(run.recording, log) / run.recording.v_y_sd < 2.5
+        codes = [one.code for one in run.verdict.findings]
+        assert ("v_y_unsure" in codes, run.verdict.valid) == (code, valid)
+    assert ti.identify(log, CAR, check=False).recording.v_y_sd == 0.0
