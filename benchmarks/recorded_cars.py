@@ -55,6 +55,16 @@ FERRARI = Vehicle(
     cornering_stiffness_front=66e3,
     cornering_stiffness_rear=105e3,
 )
+GTI = Vehicle(
+    name="VW GTI",
+    mass=1926.2,
+    yaw_inertia=2763.49,
+    l_f=1.264,
+    l_r=1.367,
+    cornering_stiffness_front=120e3,
+    cornering_stiffness_rear=150e3,
+)
+GTI_RUNS = ("exp8", "exp12")  # on track; on a skidpad, another day
 CARMAKER_RUNS = ("slalom1_14_5ms", "experiment2_40kmh")
 TASKS = {
     "hard": (CARMAKER, "carmaker.csv.gz", "slalom1_14_5ms", "experiment2_40kmh"),
