@@ -527,7 +527,7 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
         return _Latent(Nodes.of(piece, vehicle, part, a_y_late=late), vehicle, beliefs)
 
     on_time = problem(0.0, priors)
-    z, p, least = on_time.descend(*on_time.settled(), on_time.R, _FEW)
+    z, p, least = on_time.descend(*on_time.settled(), on_time.R)
     late = 0.0
     for _ in range(_LOOKS):
         z, p, _ = problem(late, open_).descend(z, p, on_time.R, _FEW)
@@ -537,7 +537,7 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
             break
     if abs(late) < _SMALL_DELAY * scale:
         return 0.0
-    found = problem(late, priors).descend(z, p, on_time.R, _FEW)[2]
+    found = problem(late, priors).descend(z, p, on_time.R)[2]
     count = max(on_time.nodes.counts.sum(), 1)
     enough = _GAINED * max(1.0, 2.0 * found / count / TRUST.usual)
     if least - found < enough:
