@@ -124,14 +124,14 @@ def fit(
     for blind in (one for one in recordings if one.logged_v_y is None):
         try:
             late = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
-            nodes = Nodes.of(blind, vehicle, hardest(blind, _BLIND), a_y_late=late)
+            nodes = Nodes.of(blind, vehicle, hardest(blind, _BLIND), a_y_late=max(late, 0.0))
         except TooShortError:
             if len(recordings) == 1:
                 raise
             continue
         reach = reach.with_(Reach(a_y_late=late))
         if nodes.counts.any():
-            learnt = learn_latent(nodes, vehicle, beliefs, late=late != 0.0)
+            learnt = learn_latent(nodes, vehicle, beliefs, late=late > 0.0)
             found, reach = learnt.posterior, reach.with_(_reach_of_states(learnt))
             beliefs = _after(beliefs, found)
         went_on(blind.duration)

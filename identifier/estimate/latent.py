@@ -40,6 +40,7 @@ _MOST_LATE = 0.3  # [s] of a sedan, the largest delay
 _SMALL_DELAY = 0.003  # [s] of a sedan, a delay that does not matter
 _LOOKS = 4  # at a delay
 _LEFT_LATE = 0.01  # [s] of a sedan, sd of what is left of a delay that was taken out
+_SURELY_LATE = 3.0  # sd of a delay, above which it is taken out; a single step tells none
 _GAINED = 8.0  # nats that a delay gains, more where more is left (`Trust.usual`)
 _ALIKE = 1e-4  # probability from which another start's end counts
 _STARTS = (-0.4, 0.4)  # of ln C: soft and stiff
@@ -53,7 +54,7 @@ _SHORTEST = 50  # nodes from which noise is learnt
 N, P = len(STATES), len(NAMES)
 OF_V_Y = ("v_y_bias", "v_y_angle", "v_y_lever")
 FELT = {"a_y_bias": 0.015, "roll": 0.04, "a_y_delay": 0.0007, "a_y_lever": 0.01}  # sd; lever in L
-AGAIN = ("r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")  # another in each log
+AGAIN = ("steering_zero", "r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")  # of each log
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -508,7 +509,8 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
 
     It is the delay with which the minute of hardest cornering is explained best, found as a
     parameter that is hardly believed, and taken out until nothing is left of it. 0 where it gains
-    too little.
+    too little or is hardly known. Negative where a_y would have to be earlier, which no filter
+    makes it: that is an error of the model, to be noted and never taken out.
     priors : as of `_Latent`.
     """
     part = hardest(recording, _LATE_SPAN)
@@ -525,7 +527,7 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
         return _Latent(Nodes.of(piece, vehicle, part, a_y_late=late), vehicle, beliefs)
 
     on_time = problem(0.0, priors)
-    z, p, least = on_time.descend(*on_time.settled(), on_time.R, _FEW)
+    z, p, least = on_time.descend(*on_time.settled(), on_time.R)
     late = 0.0
     for _ in range(_LOOKS):
         z, p, _ = problem(late, open_).descend(z, p, on_time.R, _FEW)
@@ -535,10 +537,14 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
             break
     if abs(late) < _SMALL_DELAY * scale:
         return 0.0
-    found = problem(late, priors).descend(z, p, on_time.R, _FEW)[2]
+    found = problem(late, priors).descend(z, p, on_time.R)[2]
     count = max(on_time.nodes.counts.sum(), 1)
     enough = _GAINED * max(1.0, 2.0 * found / count / TRUST.usual)
-    return late if least - found > enough else 0.0
+    if least - found < enough:
+        return 0.0
+    then = problem(late, open_)
+    variance = np.diag(then.spread(z, p, on_time.R)[1])[then.index[then.free] == delay]
+    return late if late < 0.0 or late > _SURELY_LATE * np.sqrt(variance[0]) else 0.0
 
 
 def estimate_v_y(
@@ -549,9 +555,10 @@ def estimate_v_y(
     """
     again = np.array([LATENT_NAMES.index(name) for name in AGAIN])
     moves = np.isin(np.arange(len(LATENT_NAMES)), again)
+    mean = np.where(moves[:P], 0.0, p)
 
     def fixed(late: bool) -> Priors:
-        believed = latent_priors(vehicle, replace(Priors.of(vehicle), mean=p), late)
+        believed = latent_priors(vehicle, replace(Priors.of(vehicle), mean=mean), late)
         information = np.zeros_like(believed.information)
         information[again, again] = believed.information[again, again]
         return replace(believed, moves=moves, information=information)
@@ -565,10 +572,10 @@ def estimate_v_y(
     )
     late = lateness(recording, vehicle, fixed(late=False))
     for outer, inner in _blocks(recording):
-        nodes = Nodes.of(recording, vehicle, outer, a_y_late=late)
+        nodes = Nodes.of(recording, vehicle, outer, a_y_late=max(late, 0.0))
         if not nodes.counts.any():
             continue
-        problem = _Latent(nodes, vehicle, fixed(late != 0.0), columns)
+        problem = _Latent(nodes, vehicle, fixed(late > 0.0), columns)
         found = problem.smoothed(*problem.begin(), rounds=1)
         known = np.flatnonzero(~moves[columns])
         tires, free = found.slopes[:, known], found.slopes[:, problem.free]

@@ -60,7 +60,8 @@ class Reach(NamedTuple):
     segments : on another road.
     parted : of drives without v_y, side slip by which soft and stiff tires that explain them alike
         part, rms [rad].
-    a_y_late : of such drives, by which a_y was later than the yaw rate [s].
+    a_y_late : of such drives, by which a_y was later than the yaw rate [s]; negative where it
+        would have to be earlier, which is not believed.
     """
 
     slip: Array = np.zeros(2)

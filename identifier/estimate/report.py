@@ -129,12 +129,21 @@ def notes(reach: Reach, p: Array, covariance: Array) -> tuple[tuple[str, str], .
                 "those of the tires without it, forces allow for it",
             )
         )
-    if reach.a_y_late:
+    if reach.a_y_late > 0.0:
         listed.append(
             (
                 "a_y_late",
                 f"a_y is {1e3 * reach.a_y_late:.0f} ms late against the yaw rate, as behind a "
                 "filter: it is read so much earlier; log it without the filter",
+            )
+        )
+    if reach.a_y_late < 0.0:
+        listed.append(
+            (
+                "a_y_early",
+                f"an a_y that is {-1e3 * reach.a_y_late:.0f} ms earlier would explain the drive "
+                "better, which no filter makes it: side slip and tires are doubtful; log v_y, or "
+                "check steering and yaw rate for a delay",
             )
         )
     if reach.parted > TRUST.parted:

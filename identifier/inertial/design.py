@@ -131,7 +131,7 @@ class InertialIdentifier(Method):
             prior=replace(usual.prior, sway_share=share),
             roll_frequency=tires.sway.frequency * vehicle.froude_time,
             doubt=(float(model.band.error_floor[1]), float(model.band.error_share[1])),
-            a_y_late=model.reach.a_y_late,
+            a_y_late=max(model.reach.a_y_late, 0.0),
             along=Along(
                 load_f=-model["load_transfer"] * vehicle.wheelbase / vehicle.l_r,
                 load_r=model["load_transfer"] * vehicle.wheelbase / vehicle.l_f,

@@ -19,6 +19,7 @@ from identifier.estimate.latent import (
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes
 from identifier.estimate.priors import Priors
+from identifier.inertial import InertialIdentifier
 from identifier.motion.nodes import LATENT_NAMES
 from identifier.verdict import judge_prediction
 from models.recordings import Recording, RecordingError
@@ -154,6 +155,44 @@ def test_an_accelerometer_behind_a_causal_filter_is_late(exact, hertz, late):
         log = replace(log, a_y=lfilter(*butter(2, 2.0 * hertz * log.dt), log.a_y))
     found = lateness(log, CAR, latent_priors(CAR, Priors.of(CAR)))
     assert found == pytest.approx(late, abs=0.02)
+
+
+def test_an_a_y_that_was_computed_from_the_motion_is_on_time(exact):
+    log = blind(exact)
+    log = replace(log, a_y=np.gradient(exact.v_y, exact.dt) + exact.v_x * exact.r)
+    assert abs(lateness(log, CAR, latent_priors(CAR, Priors.of(CAR)))) < 0.003
+
+
+def test_an_a_y_that_is_too_early_is_noted_and_stays(exact):
+    """As where the yaw rate is behind a filter: which of both is wrong cannot be told."""
+    log = blind(exact)
+    early = replace(log, a_y=np.interp(log.t + 0.06, log.t, log.a_y))
+    model = fit([early], CAR).model
+    assert model.reach.a_y_late == pytest.approx(-0.06, abs=0.02)
+    assert [code for code, _ in model.drives.notes if code.startswith("a_y")] == ["a_y_early"]
+    assert InertialIdentifier.holding(model, CAR).a_y_late == 0.0
+
+
+def test_a_delay_that_is_hardly_known_is_not_believed(exact, monkeypatch):
+    """As after a single step of the steering."""
+    log = blind(exact)
+    log = replace(log, a_y=lfilter(*butter(2, 10.0 * log.dt), log.a_y))
+    told = _Latent.spread
+
+    def doubtful(*given):
+        covariance, P, slopes, shows = told(*given)
+        return covariance, 400.0 * P, slopes, shows
+
+    monkeypatch.setattr(_Latent, "spread", doubtful)
+    assert lateness(log, CAR, latent_priors(CAR, Priors.of(CAR))) == 0.0
+
+
+def test_the_zero_of_the_steering_is_another_in_each_log(learnt):
+    other = driven(9)
+    turned = replace(other, delta_f=other.delta_f + np.radians(1.0))
+    told = learnt.estimated_v_y(blind(turned, seed=4))
+    away = np.degrees((told.v_y - other.v_y) / other.v_x)
+    assert np.sqrt(np.mean(away**2)) < 0.12
 
 
 def test_a_model_keeps_what_it_says_of_its_log(learnt, tmp_path):
