@@ -68,11 +68,9 @@ def cases(*, quick: bool) -> Iterator[Case]:
         halves.append((run.between(run.t[0], middle), run.between(middle, run.t[-1])))
     for a, b in ((0, 1), (1, 0)):
         yield Case("carmaker", CARMAKER, [one[a] for one in halves], [one[b] for one in halves])
-    for place, car, drives in (
-        ("carmaker", CARMAKER, runs),
-        ("gti", GTI, read("gti.csv.gz", GTI_RUNS)),
-    ):
-        for log, other in permutations(drives):
+    days = read("gti.csv.gz", GTI_RUNS)
+    for place, car, pair in (("carmaker", CARMAKER, runs), ("gti", GTI, days)):
+        for log, other in permutations(pair):
             yield Case(place, car, [log], [other])
     whole = read_recording(DATA / "ferrari.csv.gz")
     edges = np.linspace(float(whole.t[0]), float(whole.t[-1]), 6)

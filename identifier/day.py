@@ -67,6 +67,14 @@ class Day:
         moved[WHERE] = self.value
         return moved
 
+    def steered(self, zero: float, sd: float) -> "Day":
+        """Return it with a zero of the steering that was found with the v_y of a log [rad]."""
+        k = NUMBERS.index("steering_zero")
+        value, covariance = self.value.copy(), self.covariance.copy()
+        value[k], covariance[k], covariance[:, k] = zero, 0.0, 0.0
+        covariance[k, k] = sd**2
+        return replace(self, value=value, covariance=covariance, anew=True)
+
     def corrected(self, recording: Recording) -> Recording:
         """Return the log without the errors."""
         return corrected(recording, self.value)

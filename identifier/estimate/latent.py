@@ -22,7 +22,7 @@ from codegen.arrays import Array
 from identifier.estimate.drive import hardest
 from identifier.estimate.nodes import JERKS, Nodes, low_passed
 from identifier.estimate.posterior import Posterior
-from identifier.estimate.priors import SEDAN, Priors
+from identifier.estimate.priors import OF_CAR, SEDAN, Priors
 from identifier.estimate.solve import around_beliefs, beliefs_cost, bounded_step, car_numbers
 from identifier.motion.nodes import LATENT_NAMES, MEASURED, STATES, node_scan
 from identifier.motion.parameters import INDEX, NAMES
@@ -104,12 +104,14 @@ TRUST = _Trust()
 class LateralVelocity(NamedTuple):
     """v_y at each sample and its standard deviation [m/s], whether it is known, and what the
     accelerometer shows beside forces of tires [weights], (n,).
+    steering_zero : found with it, and its standard deviation [rad], (2,).
     """
 
     v_y: Array
     sd: Array
     observable: NDArray[np.bool_]
     beside: Array
+    steering_zero: Array
 
 
 class _Around(NamedTuple):
@@ -569,7 +571,9 @@ def estimate_v_y(
         TRUST.side_slip * np.maximum(recording.v_x, vehicle.lowest_speed),
         np.zeros(len(recording), dtype=bool),
         np.zeros(len(recording)),
+        np.array([0.0, OF_CAR["steering_zero"].sd]),
     )
+    longest, zero = 0, INDEX["steering_zero"]
     late = lateness(recording, vehicle, fixed(late=False))
     for outer, inner in _blocks(recording):
         nodes = Nodes.of(recording, vehicle, outer, a_y_late=max(late, 0.0))
@@ -583,6 +587,12 @@ def estimate_v_y(
         doubt = covariance[np.ix_(index, index)]
         variance = found.covariance[:, 0, 0] + np.einsum("ni,ij,nj->n", tires, doubt, tires)
         variance += np.einsum("ni,ij,nj->n", free, found.P, free)
+        if nodes.counts.sum() > longest:
+            longest, k = (
+                nodes.counts.sum(),
+                int(np.flatnonzero(problem.index[problem.free] == zero)[0]),
+            )
+            found_v_y.steering_zero[:] = found.p[zero], np.sqrt(found.P[k, k])
         bias, roll = (found.p[LATENT_NAMES.index(name)] for name in ("a_y_bias", "roll"))
         beside = bias + roll / GRAVITY * nodes.given[:, 5]
         _fill(found_v_y, recording, inner, nodes, found.z[:, 0], np.sqrt(variance), beside)

@@ -172,7 +172,12 @@ class FittedModel(TireModel):
 
     def on(self, recording: Recording) -> Day:
         """Return the errors of a log's sensors, found from its motion with the tires held."""
-        return self.day or self._known(recording, day_of)
+        if self.day is not None:
+            return self.day
+        day = self._known(recording, day_of)
+        if recording.logged_v_y is not None or recording.a_y is None:
+            return day
+        return day.steered(*self.estimated_v_y(recording.as_logged()).steering_zero)
 
     def _days(self, recording: Recording) -> list[tuple[int, Day]]:
         if self.day is not None or not recording.breaks:

@@ -24,6 +24,10 @@ def of_another_day(drive, sign=1.0):
     return replace(drive, delta_f=drive.delta_f - sign * ZERO, v_y=drive.v_y + sign * BIAS)
 
 
+def smooth(signal):
+    return np.convolve(signal, np.full(15, 1.0 / 15.0), mode="same")
+
+
 @pytest.fixture(scope="module")
 def tire(learnt):
     return learnt.model
@@ -69,12 +73,14 @@ def test_logs_of_different_days_have_zeros_of_their_own():
     assert (error < 0.08 * np.sqrt(np.mean(together.axle_force**2, axis=0))).all()
 
 
-def test_a_v_y_that_was_estimated_has_no_errors_of_a_sensor(tire):
-    taught = tire.of_day(replace(tire.on(driven(5)), value=np.array([0.0, 0.2, 0.0, 0.0, 0.0])))
-    model = replace(taught, day=None)
-    blind = replace(driven(5), estimated=("v_y",))
-    assert model["v_y_bias"] == 0.2
-    assert model.on(blind)["v_y_bias"] == 0.0
+def test_without_v_y_a_zero_of_the_steering_is_found_and_no_error_of_v_y_is_taken_off(tire):
+    model = replace(tire, p=replace(tire.on(driven(5)), value=np.full(5, 0.01)).on(tire.p))
+    shown = driven(5)
+    a_y = np.gradient(shown.v_y, shown.dt) + shown.v_x * shown.r
+    blind = replace(of_another_day(shown), v_y=None, a_y=smooth(a_y), axle_force=None)
+    day = model.on(replace(blind, v_y=model.estimated_v_y(blind).v_y, estimated=("v_y",)))
+    assert day["v_y_bias"] == day["v_y_angle"] == day["v_y_lever"] == 0.0
+    assert day["steering_zero"] == pytest.approx(ZERO, abs=0.006)
 
 
 def test_the_tracker_reads_the_sensors_of_a_day(tire):
