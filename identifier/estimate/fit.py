@@ -124,7 +124,13 @@ def fit(
     for blind in (one for one in recordings if one.logged_v_y is None):
         try:
             late = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
-            nodes = Nodes.of(blind, vehicle, hardest(blind, _BLIND), a_y_late=max(late, 0.0))
+            nodes = Nodes.of(
+                blind,
+                vehicle,
+                hardest(blind, _BLIND),
+                a_y_late=max(late, 0.0),
+                ln_sway=float(beliefs.mean[INDEX["ln_sway"]]),
+            )
         except TooShortError:
             if len(recordings) == 1:
                 raise

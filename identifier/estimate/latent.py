@@ -151,7 +151,6 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Prio
     fixed = [INDEX[name] for name in ("ln_sway", *OF_V_Y)]
     information[fixed], information[:, fixed], moves[fixed] = 0.0, 0.0, False
     mean, bias, inertia = beliefs.mean.copy(), INDEX["r_bias"], INDEX["ln_inertia"]
-    mean[INDEX["ln_sway"]] = 0.0  # as the sway that the nodes are given
     information[bias], information[:, bias], mean[bias] = 0.0, 0.0, 0.0  # another in each log
     information[bias, bias], moves[bias] = (_GYRO / scale) ** -2, True
     if not moves[inertia]:
@@ -526,7 +525,9 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
     open_ = replace(priors, information=information)
 
     def problem(late: float, beliefs: Priors) -> _Latent:
-        return _Latent(Nodes.of(piece, vehicle, part, a_y_late=late), vehicle, beliefs)
+        sway = float(priors.mean[INDEX["ln_sway"]])
+        nodes = Nodes.of(piece, vehicle, part, a_y_late=late, ln_sway=sway)
+        return _Latent(nodes, vehicle, beliefs)
 
     on_time = problem(0.0, priors)
     z, p, least = on_time.descend(*on_time.settled(), on_time.R)
@@ -576,7 +577,8 @@ def estimate_v_y(
     longest, zero = 0, INDEX["steering_zero"]
     late = lateness(recording, vehicle, fixed(late=False))
     for outer, inner in _blocks(recording):
-        nodes = Nodes.of(recording, vehicle, outer, a_y_late=max(late, 0.0))
+        sway = float(p[INDEX["ln_sway"]])
+        nodes = Nodes.of(recording, vehicle, outer, a_y_late=max(late, 0.0), ln_sway=sway)
         if not nodes.counts.any():
             continue
         problem = _Latent(nodes, vehicle, fixed(late > 0.0), columns)

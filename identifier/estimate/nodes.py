@@ -62,9 +62,10 @@ class Nodes:
         vehicle: Vehicle,
         part: slice = ALL,
         a_y_late: float = 0.0,
+        ln_sway: float = 0.0,
     ) -> "Nodes":
         """Return the nodes of a recording.
-        a_y_late : by which a_y is late [s].
+        a_y_late : by which a_y is late [s].   ln_sway : as of `motion.parameters`.
 
         Raises
         ------
@@ -82,7 +83,7 @@ class Nodes:
             if count >= _FEWEST_NODES:
                 some = slice(first, first + count * every)
                 felt = _earlier(a_y[first:last], a_y_late / recording.dt)[: count * every]
-                pieces.append(_piece(recording, some, vehicle, every, felt))
+                pieces.append(_piece(recording, some, vehicle, every, felt, ln_sway))
         if not pieces:
             raise TooShortError(f"{recording.name}: too short to learn from without v_y")
         t, given, measured, counts, goes = (
@@ -107,7 +108,7 @@ def _earlier(signal: Array, samples: float) -> Array:
 
 
 def _piece(
-    recording: Recording, some: slice, vehicle: Vehicle, every: int, a_y: Array
+    recording: Recording, some: slice, vehicle: Vehicle, every: int, a_y: Array, ln_sway: float
 ) -> tuple[Array, Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return t, given, measured, counts and goes of a segment."""
     dt, scale = recording.dt, float(np.sqrt(vehicle.wheelbase / SEDAN))
@@ -126,7 +127,7 @@ def _piece(
         if slope_on(motion, felt, on, dt, ALONG) is not None:
             a_x, turning = felt, 0.0
     a_x = np.where(on, np.clip(a_x, -MOST_A_X, MOST_A_X), 0.0)
-    omega = Sway.for_vehicle(vehicle).frequency
+    omega = Sway.for_vehicle(vehicle).frequency * float(np.exp(ln_sway))
     rho, rate = _rolled(low_passed(a_y, _ROLLS / scale, dt), omega, dt)
     jerk = gradient(low_passed(a_y, JERKS / scale, dt), dt)
     speed = mean(v_x)
