@@ -22,7 +22,7 @@ from codegen.arrays import Array
 from identifier.estimate.drive import hardest
 from identifier.estimate.nodes import JERKS, Nodes, low_passed
 from identifier.estimate.posterior import Posterior
-from identifier.estimate.priors import OF_CAR, SEDAN, Priors
+from identifier.estimate.priors import OF_AXLES, OF_CAR, SEDAN, Priors
 from identifier.estimate.solve import around_beliefs, beliefs_cost, bounded_step, car_numbers
 from identifier.motion.nodes import LATENT_NAMES, MEASURED, STATES, node_scan
 from identifier.motion.parameters import INDEX, NAMES
@@ -31,6 +31,7 @@ from models.vehicle import GRAVITY, Vehicle
 
 _ROLL = 0.06  # by which a_y is larger in a car whose body rolls
 _GYRO = 0.002  # sd of the bias of r of a sedan [rad/s]
+_SWAY = 0.3  # sd of the share of the sway
 _INERTIA = 0.007  # sd of ln I_z
 _BLOCK = 600.0  # [s] that are smoothed at once
 _BESIDE = 5.0  # [s] beside them that are smoothed, too
@@ -150,6 +151,9 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Prio
     information, moves = beliefs.information.copy(), beliefs.moves.copy()
     fixed = [INDEX[name] for name in ("ln_sway", *OF_V_Y)]
     information[fixed], information[:, fixed], moves[fixed] = 0.0, 0.0, False
+    for axle in "fr":  # without v_y a sway at the usual frequency is all that is modeled
+        k = INDEX[f"sway_share_{axle}"]
+        information[k, k] += (_SWAY**-2 - OF_AXLES["sway_share"].sd ** -2) * moves[k]
     mean, bias, inertia = beliefs.mean.copy(), INDEX["r_bias"], INDEX["ln_inertia"]
     information[bias], information[:, bias], mean[bias] = 0.0, 0.0, 0.0  # another in each log
     information[bias, bias], moves[bias] = (_GYRO / scale) ** -2, True
