@@ -107,14 +107,20 @@ class FittedBand(Band):
     @property
     def error_share(self) -> Array:
         """Standard deviation of the model's own error, the part that goes with the force, (2,)."""
-        error = _ELSEWHERE * ERROR_SIZE[1] * self.model.reach.unexplained
-        return np.hypot(self.load_doubt, error if self.here is None else self.here.share)
+        return np.hypot(self.load_doubt, self._missed[1])
 
     @property
     def error_floor(self) -> Array:
         """The part of it that is there without a force [static loads], (2,)."""
-        error: Array = _ELSEWHERE * ERROR_SIZE[0] * self.model.reach.unexplained
-        return error if self.here is None else self.here.floor
+        return self._missed[0]
+
+    @property
+    def _missed(self) -> tuple[Array, Array]:
+        """Return what is missed without a force [static loads], and over the force, (2,) each."""
+        if self.here is not None:
+            return self.here.floor, self.here.share
+        floor, share = (_ELSEWHERE * size * self.model.reach.unexplained for size in ERROR_SIZE)
+        return floor, share
 
     def on(self, recording: Recording) -> "FittedBand":
         """Return the band on a log: by the doubt of its sensors, and by what is missed of it."""
@@ -122,7 +128,7 @@ class FittedBand(Band):
         zeros = day.covariance[:3, :3]
         found = evidence(self.model, part, road_push(part, self.model))
         if found is None or not (found.peak > 0.0).all():
-            return replace(self, here=_Here(zeros, self.error_floor, self.error_share))
+            return replace(self, here=_Here(zeros, *self._missed))
         error = _HERE * found.model_error
         return replace(self, here=_Here(zeros, _STILL * error * found.force, _WITH_FORCE * error))
 
