@@ -10,7 +10,7 @@ from benchmarks.doctor_cases import planted
 from benchmarks.everyday_drives import drawn_everyday
 from benchmarks.faults import Late, Misaligned
 from identifier.doctor import Finding, diagnose, examine
-from identifier.doctor.faults import Candidate, Search, prepared
+from identifier.doctor.faults import RULES, Candidate, Search, prepared
 from identifier.doctor.suspects import NOTES, SUSPECTS
 from identifier.estimate.drive import Drive
 from identifier.estimate.solve import descend
@@ -30,6 +30,10 @@ SIZED = {
 def found_in(log, car):
     """Findings of a log."""
     return examine(log, car).findings
+
+
+def suspect_of(code, channel):
+    return next(one for one in SUSPECTS if (one.code, one.channel) == (code, channel))
 
 
 @pytest.fixture(scope="module")
@@ -147,14 +151,14 @@ def test_swapped_lengths_are_a_note_that_names_the_swap():
     (found, *_) = found_in(replace(log, axle_force=None), swapped)
     assert found.code == "center_of_gravity" and found.note and not found.matters
     assert "as if they were swapped" in found.text
-    shift = next(one for one in SUSPECTS if one.code == "center_of_gravity")
+    shift = suspect_of("center_of_gravity", "")
     assert "swapped" not in shift.words(2.0 * (car.l_f - car.l_r), 0.05, car)
 
 
 def test_a_move_to_where_a_y_fits_stays_within_bounds(driven):
     car, log, _ = driven
     search = prepared(Late(channels=("v_y",), delay=0.1).apply(log), car)
-    wide = next(one for one in SUSPECTS if one.parameter == "v_y_delay")
+    wide = suspect_of("delay", "v_y")
     problem = search.problem.under(search.priors(search.widened(wide)))
     post = descend(problem, search.nominal().p, iterations=2)
     along = post.covariance.copy()
@@ -255,10 +259,50 @@ def test_a_finding_that_is_sure_has_a_repair():
 def test_a_sensor_that_no_car_carries_is_never_sure(driven, ahead, sure):
     car, log, _ = driven
     search = prepared(log, car)
-    assert search is not None
-    suspect = next(one for one in SUSPECTS if one.parameter == "v_y_lever")
+    suspect = suspect_of("velocity_sensor_x", "v_y")
     one = Candidate(suspect, ahead, 0.1, 50.0, 50.0, 0.0, None)
     assert search.finding(one, (0.9, 0.9), (), sure=True).sure is sure
+    doubtful = one._replace(value=search.deviation(one))  # of a Gaussian 68 % lie within one
+    found = search.finding(doubtful, (0.9, 0.5), (one,), sure=False)
+    assert (found.confidence, found.group) == pytest.approx((0.6827 * 0.9, 0.6827 * 0.5), abs=1e-3)
+    assert found.text.endswith("on this drive it looks like: velocity sensor x v_y")
+
+
+# How well the accelerometer alone says where to begin; of what it says nothing the search begins
+# at zero.
+BEGIN = {"bank": 0.003, "delay v_y": 0.02, "factor v_x": 0.01, "offset v_y": None}
+
+
+@pytest.mark.parametrize("kind", BEGIN)
+def test_a_step_of_all_ranks_the_fault_first_and_begins_where_a_y_asks(driven, kind):
+    car, log, _ = driven
+    fault = planted(kind, car, np.random.default_rng(5))
+    search = prepared(fault.case.log(log), car)
+    gain, suspect, begin = search.promised(search.nominal())[0]
+    assert (suspect.code, suspect.channel) == (fault.code, fault.channel)
+    assert gain > RULES.gain
+    if BEGIN[kind] is None:
+        assert begin == 0.0
+    else:
+        assert suspect.size(begin) == pytest.approx(fault.size, abs=BEGIN[kind])
+
+
+def test_a_clean_drive_promises_no_gain_and_a_fault_without_its_number_is_missed(driven):
+    car, log, _ = driven
+    search = prepared(log, car)
+    assert all(gain < RULES.gain for gain, *_ in search.promised(search.nominal()))
+    fault = planted("offset v_y", car, np.random.default_rng(5))
+    search, suspect = prepared(fault.case.log(log), car), suspect_of("offset", "v_y")
+    wide, parts = search.widened(suspect), search.problem.halves()
+    post = descend(search.problem.under(search.priors(wide)), search.nominal().p)
+    assert post["v_y_bias"] == pytest.approx(fault.size, abs=0.01)
+    told = search.left_out(post, wide, parts)
+    without = search.left_out(post, wide, parts, zero=suspect)
+    assert (told < without).all()
+    p = post.p.copy()
+    p[INDEX["v_y_bias"]] = 0.0  # fixed there it is zero from wherever the step began
+    at_zero = search.left_out(replace(post, p=p), wide, parts, zero=suspect)
+    np.testing.assert_allclose(without, at_zero, rtol=0.3)
 
 
 OF_A_Y = {
@@ -272,7 +316,7 @@ def test_an_accelerometer_tells_its_faults_without_a_fit(driven, kind):
     car, log, _ = driven
     fault = planted(kind, car, np.random.default_rng(5))
     search = prepared(fault.case.log(log), car)
-    suspect = next(one for one in SUSPECTS if (one.code, one.channel) == fault[1:3])
+    suspect = suspect_of(fault.code, fault.channel)
     line = search.line(search.problem.priors.mean, search.widened(suspect))
     value, deviation = line.of(suspect.parameter)
     assert suspect.size(value) == pytest.approx(fault.size, abs=OF_A_Y[kind])

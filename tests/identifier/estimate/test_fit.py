@@ -82,8 +82,10 @@ def test_two_logs_tell_more_than_one(learnt):
 
 
 def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt):
-    found = fit([driven(3)], sedan(), block=8.0)
-    assert len(found.parts) > 1
+    done = []
+    found = fit([driven(3)], sedan(), block=8.0, progress=done.append)
+    assert len(found.parts) == len(done) > 1
+    assert done == sorted(done) and 0.2 < done[0] < 0.7 and done[-1] > 0.95
     blocks = found.model
     np.testing.assert_allclose(blocks.force(GRID), learnt.model.force(GRID), rtol=0.05)
     np.testing.assert_allclose(

@@ -71,6 +71,15 @@ def test_a_good_v_y_stays_as_it_is(log):
     assert on_time(with_a_lateness, CAR) is with_a_lateness  # it is the doctor's
 
 
+def test_noise_of_a_sensor_that_is_fast_enough_is_smoothed_with_all_of_its_samples(log):
+    noisy = replace(log, v_y=log.v_y + 0.15 * np.random.default_rng(4).standard_normal(len(log)))
+    held = replace(noisy, v_y=noisy.v_y[np.arange(len(log)) // 2 * 2])
+    for one in (noisy, held):
+        found = on_time(one, CAR)
+        assert off(found, log) < 0.5 * off(one, log)
+        assert "every 10 ms" in found.notes[-1]
+
+
 def test_a_single_wrong_value_does_not_move_it(log):
     shown = received(log)
     v_y = shown.v_y.copy()
