@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from identifier.estimate import solve
+from identifier.estimate import report, solve
 from identifier.estimate.drive import Drive, box, slope_on, thinned
+from identifier.estimate.information import SIZE, Information
+from identifier.estimate.latent import TRUST
+from identifier.estimate.posterior import Reach, Segment
 from identifier.estimate.priors import Priors
 from identifier.estimate.roads import _cheapest, _ranked
 from identifier.estimate.solve import (
@@ -25,7 +28,7 @@ from identifier.estimate.solve import (
     settled,
     starts,
 )
-from identifier.motion.parameters import INDEX
+from identifier.motion.parameters import INDEX, NAMES
 from models.recordings import Recording
 from models.vehicle import GRAVITY, sedan
 from tests.identifier.estimate.conftest import driven
@@ -206,6 +209,105 @@ def test_an_error_that_lasts_is_asked_again_as_if_it_were_brief(problem, monkeyp
     assert asked[0].tolist() == [0.5, 0.5] and asked[1] is None
     moved.p[INDEX["v_y_bias"]] = known.p[INDEX["v_y_bias"]]
     assert solve._woken(problem, known, 0.1) is known and len(asked) == 3
+
+
+# What is believed, and what drives reached.
+
+
+def test_beliefs_are_gaussians_with_couples_and_a_tail_where_somebody_typed(rng):
+    p, n = PRIORS.mean.copy(), len(NAMES)
+    p[PRIORS.moves] += 0.5 * PRIORS.sd[PRIORS.moves] * rng.standard_normal(PRIORS.moves.sum())
+    M = rng.standard_normal((SIZE, SIZE))
+    data = Information(matrix=M @ M.T / SIZE, vector=rng.standard_normal(SIZE), seconds=1.0)
+    for priors in (PRIORS, PRIORS.after(data)):
+        gradient, curvature = priors.around(p)
+        for k in np.flatnonzero(PRIORS.moves)[::3]:
+            step = 1e-5 * PRIORS.sd[k] * np.eye(n)[k]
+            slope = (priors.cost(p + step) - priors.cost(p - step)) / (2.0 * step[k])
+            assert slope == pytest.approx(gradient[k], rel=1e-3, abs=1e-3)
+        inside = np.ix_(PRIORS.moves, PRIORS.moves)
+        assert np.linalg.eigvalsh(curvature[inside]).min() > 0.0
+    k = INDEX["steering_gain"]
+    far = PRIORS.mean + 5.0 * PRIORS.sd * (np.arange(n) == k)
+    assert PRIORS.cost(far) == pytest.approx(np.log1p(25.0 / 2.0))
+    f, r = INDEX["ln_grip_f"], INDEX["ln_grip_r"]
+    unlike = PRIORS.mean + 0.15 * (np.arange(n) == f) - 0.15 * (np.arange(n) == r)
+    assert PRIORS.cost(unlike) == pytest.approx((0.15 / 0.25) ** 2 + 0.5 * 2.0**2)
+    b, angle = INDEX["v_y_bias"], INDEX["v_y_angle"]
+    apart = Priors.of(CAR, apart=True, wide={"v_y_bias": 0.4})
+    assert apart.information[b, angle] == 0.0 and apart.sd[b] == pytest.approx(0.4)
+    assert PRIORS.information[b, angle] < 0.0
+    for one in (PRIORS, apart):
+        held = one.moves
+        np.testing.assert_allclose(
+            one.covariance[np.ix_(held, held)] @ one.information[np.ix_(held, held)],
+            np.eye(held.sum()), atol=1e-8,
+        )  # fmt: skip
+        assert (one.covariance[~held] == 0.0).all() and (one.sd[~held] == 0.0).all()
+
+
+def test_beliefs_are_held_widened_by_roads_and_replaced_by_a_fit():
+    names = ("v_y_bias", "ln_grip_f")
+    held = PRIORS.without(names)
+    where = [INDEX[name] for name in names]
+    assert not held.moves[where].any() and (held.mean[where] == 0.0).all()
+    assert (held.information[where] == 0.0).all() and (held.information[:, where] == 0.0).all()
+    assert held.moves.sum() == PRIORS.moves.sum() - 2 and PRIORS.moves[where].all()
+    roads, n = PRIORS.with_roads(2), len(NAMES)
+    assert roads.mean.size == n + 2 and roads.moves[n:].all()
+    assert roads.cost(np.append(PRIORS.mean, [0.5, -0.5])) == pytest.approx(1.0)
+    np.testing.assert_allclose(np.exp(roads.low[n:]), 0.2)
+    np.testing.assert_allclose(np.exp(roads.high[n:]), 2.2)
+    covariance = 0.04 * PRIORS.covariance
+    known = PRIORS.known(PRIORS.mean + 1.0, covariance)
+    np.testing.assert_allclose(known.covariance, covariance, rtol=1e-3, atol=1e-8)
+    assert (known.mean == PRIORS.mean + 1.0).all() and known.typed == ()
+    small = replace(CAR, l_f=0.1, l_r=0.1, yaw_inertia=15.0, estimated=("yaw_inertia",))
+    k = INDEX["ln_inertia"]
+    assert Priors.of(small).sd[k] == pytest.approx(0.3)
+    assert Priors.of(replace(CAR, estimated=("yaw_inertia",))).sd[k] == pytest.approx(0.1)
+    assert PRIORS.sd[k] == 0.0
+
+
+def test_what_drives_reached_adds_up():
+    pair = np.array
+    one = Reach(pair([0.1, 0.02]), pair([5.0, 9.0]), pair([-3.0, 1.0]), pair([4.0, 8.0]), 2.0,
+                (Segment(0.0, 1.0, 0.5, 0.1),), 0.1, -0.3)  # fmt: skip
+    other = Reach(pair([0.05, 0.03]), pair([4.0, 8.0]), pair([-2.0, 2.0]), pair([4.0, -9.0]), 2.0,
+                  (Segment(3.0, 4.0, 0.7, 0.1),), 0.2, 0.1)  # fmt: skip
+    both = one.with_(other)
+    told = [both.slip, both.speeds, both.a_x, both.alike]
+    assert [x.tolist() for x in told] == [[0.1, 0.03], [4.0, 9.0], [-3.0, 2.0], [8.0, -1.0]]
+    assert [x.begin for x in both.segments] == [0.0, 3.0]
+    assert (both.pairs, both.parted, both.a_y_late) == (4.0, 0.2, -0.3)
+    assert both.unexplained.tolist() == [np.sqrt(2.0), 0.0]
+
+
+@pytest.mark.parametrize(
+    ("gain", "sd", "told"), [(0.1, 0.02, True), (-0.1, 0.04, False), (0.07, 0.01, False)]
+)
+def test_a_fit_notes_what_its_drives_had_beside_tires(gain, sd, told):
+    p, covariance, k = PRIORS.mean.copy(), np.zeros((len(NAMES),) * 2), INDEX["steering_gain"]
+    p[k], covariance[k, k] = gain, sd**2
+    reach = Reach(segments=(Segment(3.0, 8.0, 0.5, 0.04),), parted=TRUST.parted, a_y_late=0.05)
+    listed = dict(report.notes(reach, p, covariance))
+    assert set(listed) == {"another_road", "a_y_late"} | ({"steering_gain"} if told else set())
+    assert "from 3 to 8 s the friction was 0.50 ± 0.04 times" in listed["another_road"]
+    assert "50 ms late" in listed["a_y_late"]
+    if told:
+        assert "turn 1.10 ± 0.02 times as far" in listed["steering_gain"]
+    assert "not_observable" in dict(report.notes(reach._replace(parted=0.01), p, covariance))
+
+
+def test_numbers_of_tires_at_their_bounds_are_told_by_axle():
+    assert report.at_bounds(CAR, PRIORS.mean) == ()
+    p = PRIORS.mean.copy()
+    p[INDEX["ln_stiffness_r"]] = PRIORS.high[INDEX["ln_stiffness_r"]]
+    p[INDEX["ln_grip_f"]] = PRIORS.low[INDEX["ln_grip_f"]]
+    front, rear = report.at_bounds(CAR, p)
+    assert (front.axle, front.title, front.unit) == ("front", "grip", "static loads")
+    assert (rear.axle, rear.title) == ("rear", "cornering stiffness") and rear.refuses
+    assert (front.value, rear.value) == pytest.approx((0.1, 60.0))
 
 
 # Roads.
