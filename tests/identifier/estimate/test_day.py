@@ -200,7 +200,7 @@ def test_at_one_speed_bias_and_angle_are_one_error_and_told_apart_where_they_dif
     assert "bias of v_y" in unclear.notes[0][1]
     worse = replace(unclear, value=np.array([0, 0.5, 0, 0, 0]), usual=0.8 * usual)
     assert "one speed cannot tell" in worse.notes[0][1]
-    of_two = np.array([[0.04, -0.0019], [-0.0019, 1e-4]])  # bias and angle make up for each other
+    of_two = np.array([[0.04, -0.00199], [-0.00199, 1e-4]])  # bias and angle make up for each other
     assert sideways(np.array([0.2, 0.0]), of_two, 20.0)
     assert not sideways(np.array([0.2, 0.0]), np.diag(np.diag(of_two)), 20.0)
     assert of_day(*np.zeros((4, 5)), np.array([1.0, 30.0, 20.0]), anew=True).speed == 20.0

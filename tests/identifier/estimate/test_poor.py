@@ -7,7 +7,7 @@ import pytest
 
 import tireid as ti
 from identifier.estimate.fit import fit
-from identifier.estimate.poor import _new_values, on_time
+from identifier.estimate.poor import _Kinematics, _new_values, _Sensor, on_time
 from models.recordings.record import joined
 
 from .conftest import driven
@@ -108,3 +108,50 @@ def test_a_user_learns_from_a_receiver_nearly_as_well(log, caplog):
     assert share_missed(fit([poor], CAR).model, other) > 3.0 * best  # as it is
     prediction = ti.replay(received(other), run.freeze())
     assert prediction.verdict.valid
+
+
+def test_the_motion_between_values_is_that_of_dense_least_squares(log):
+    """Of two segments: v_y, what it misses of values, and the likelihood up to a constant."""
+    short = joined([log.between(3.0, 3.4), log.between(6.0, 6.3)])
+    n, dt, new = len(short), short.dt, np.arange(0, len(short), 3)
+    s = _Sensor(0.03, late=0.013, noise=0.02, push=0.01, wanders=0.005)
+    v, residual, cost = _Kinematics(short, new).solved(s, 1.0)
+    (edge,) = short.breaks
+    goes = [k for k in range(n - 1) if k + 1 != edge]
+    felt, turned = short.a_y, short.a_y - short.v_x * short.r
+    rows, right, kept = [], [], []  # unknowns: v (n), b (n), ρ
+
+    def add(size, value, **at):
+        row = np.zeros(2 * n + 1)
+        for name, (place, factor) in at.items():
+            row[place + (n if name.startswith("b") else 0)] += factor
+        rows.append(row / size)
+        right.append(value / size)
+
+    for k in goes:
+        half = 0.5 * dt
+        add(np.sqrt(s.push * dt), half * (turned[k] + turned[k + 1]),
+            v0=(k, -1.0), v1=(k + 1, 1.0), b0=(k, half), b1=(k + 1, half),
+            roll=(2 * n, half * (felt[k] + felt[k + 1])))  # fmt: skip
+        add(np.sqrt(s.wanders * dt), 0.0, b0=(k, -1.0), b1=(k + 1, 1.0))
+    for k in (0, edge):
+        add(100.0, 0.0, v0=(k, 1.0))
+        add(0.15, 0.0, b0=(k, 1.0))
+    add(0.04, 0.05, roll=(2 * n, 1.0))
+    for j, k in enumerate(new):
+        at = k - s.late / dt
+        i, first = int(np.floor(at)), 0 if k < edge else edge
+        if k * dt >= s.late and i >= first:
+            kept.append(j)
+            share = at - i
+            add(s.noise, short.v_y[k], v0=(i, 1.0 - share), v1=(i + 1, share))
+    A, b = np.array(rows), np.array(right)
+    x = np.linalg.lstsq(A, b, rcond=None)[0]
+    np.testing.assert_allclose(v, x[:n], atol=1e-6)
+    missed = np.zeros(len(new))
+    missed[kept] = s.noise * (A @ x - b)[-len(kept) :]
+    np.testing.assert_allclose(residual, missed, atol=1e-6)
+    squares = np.sum((A @ x - b) ** 2) - np.sum((x[[0, edge]] / 100.0) ** 2)
+    logs = np.linalg.slogdet(A.T @ A)[1] + len(kept) * np.log(s.noise**2)
+    logs += len(goes) * np.log(s.push * s.wanders)
+    assert cost == pytest.approx(0.5 * (squares + logs), rel=1e-6)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from identifier.estimate import report, solve
+from identifier.estimate import report, roads, solve
 from identifier.estimate.drive import Drive, box, slope_on, thinned
 from identifier.estimate.information import SIZE, Information
 from identifier.estimate.latent import TRUST
@@ -30,7 +30,7 @@ from identifier.estimate.solve import (
 )
 from identifier.motion.parameters import INDEX, NAMES
 from models.recordings import Recording
-from models.vehicle import GRAVITY, sedan
+from models.vehicle import GRAVITY, estimate, sedan
 from tests.identifier.estimate.conftest import driven
 
 CAR = sedan()
@@ -262,10 +262,11 @@ def test_beliefs_are_held_widened_by_roads_and_replaced_by_a_fit():
     known = PRIORS.known(PRIORS.mean + 1.0, covariance)
     np.testing.assert_allclose(known.covariance, covariance, rtol=1e-3, atol=1e-8)
     assert (known.mean == PRIORS.mean + 1.0).all() and known.typed == ()
-    small = replace(CAR, l_f=0.1, l_r=0.1, yaw_inertia=15.0, estimated=("yaw_inertia",))
     k = INDEX["ln_inertia"]
-    assert Priors.of(small).sd[k] == pytest.approx(0.3)
-    assert Priors.of(replace(CAR, estimated=("yaw_inertia",))).sd[k] == pytest.approx(0.1)
+    for size, sd in ((1.0, 0.1), (0.1, 0.3)):
+        lengths = {"l_f": size * CAR.l_f, "l_r": size * CAR.l_r}
+        guessed = replace(CAR, **lengths, yaw_inertia=estimate(CAR.mass, **lengths)["yaw_inertia"])
+        assert Priors.of(guessed).sd[k] == pytest.approx(sd)
     assert PRIORS.sd[k] == 0.0
 
 
@@ -322,6 +323,29 @@ def test_the_cheapest_path_is_the_best_of_all(rng):
             for path in paths
         ]
         assert tuple(_cheapest(loss, price)) == paths[int(np.argmin(costs))]
+
+
+def test_a_segment_is_as_likely_as_the_misfit_of_its_friction(problem, optimum, monkeypatch):
+    """Of all drives; a path over steps of half a second becomes labels of samples."""
+    losses = []
+
+    def path(loss, price):
+        losses.append(loss)
+        assert price == roads.PRICE
+        return np.where(np.arange(loss.shape[1]) < 6, 3, 9)
+
+    monkeypatch.setattr(roads, "_cheapest", path)
+    drives = problem.drives * 2
+    (one, other) = roads._segments(drives, CAR, PRIORS, optimum)
+    both, (loss,) = Problem(drives, CAR, PRIORS), losses
+    S2, memory = np.minimum(optimum.scale, 1.5) ** 2, np.minimum(optimum.memory, 4.0)
+    for k in (0, 5, 13):
+        e = both.residual_on(optimum.p, float(roads.GRID[k]))
+        assert loss[k].sum() == pytest.approx(both.misfit(e, S2, memory))
+    assert loss.shape == (14, -(-both.weight.size // 10))
+    begins = np.flatnonzero(np.diff(one)) + 1  # the shorter road is the first
+    assert one[0] == 1 and one[-1] == 0 and (other == 0).all()
+    assert begins.tolist() == [both.places(0)[60]]
 
 
 def test_roads_count_from_the_longest_and_near_ones_are_one():
