@@ -10,11 +10,13 @@ from benchmarks.doctor_cases import planted
 from benchmarks.everyday_drives import drawn_everyday
 from benchmarks.faults import Late, Misaligned
 from identifier.doctor import Finding, diagnose, examine
-from identifier.doctor.faults import RULES, Candidate, Search, prepared
+from identifier.doctor.accelerometer import descended
+from identifier.doctor.faults import RULES, Candidate, Search, _of_one_device, prepared
 from identifier.doctor.suspects import NOTES, SUSPECTS
 from identifier.estimate.drive import Drive
 from identifier.estimate.solve import descend
 from identifier.motion.parameters import INDEX
+from models.recordings import Repair
 from models.vehicle import GRAVITY
 from tests.identifier.conftest import areas_of, pressed
 
@@ -322,3 +324,45 @@ def test_an_accelerometer_tells_its_faults_without_a_fit(driven, kind):
     assert suspect.size(value) == pytest.approx(fault.size, abs=OF_A_Y[kind])
     assert 0.0 < deviation < OF_A_Y[kind]
     assert line.cost < search.line(search.problem.priors.mean, {}).cost - 10.0
+
+
+def test_a_valley_of_one_number_is_found_within_steps_of_three_widths():
+    for at, width in ((0.02, 0.01), (-0.5, 0.4)):
+        for sharp in (0.1 * width, width):
+
+            def cost(x, at=at, sharp=sharp, width=width):
+                return 7.0 + 0.5 * (x / width) ** 2 + 0.5 * ((x - at) / sharp) ** 2
+
+            curvature = width**-2 + sharp**-2
+            best = at / sharp**2 / curvature
+            found = descended(cost, width)
+            assert found == pytest.approx((best, curvature, cost(best)), rel=1e-3)
+        for sign in (-1.0, 1.0):
+            far, curvature, _ = descended(lambda x, s=sign: -1e9 * s * x, width)
+            assert (far, curvature) == pytest.approx((sign * 12.0 * width, width**-2))
+    assert descended(lambda x: abs(x), 1.0)[0] == 0.0, "what is least at once stays"
+
+
+@pytest.mark.parametrize(("names", "sign"), [(("r", "a_y"), 1.0), (("v_y", "delta_f"), -1.0)])
+def test_two_channels_that_are_late_alike_are_one_device(names, sign):
+    """Where v_y and the steering are early by as much, the others are late."""
+    car = drawn_everyday("sedan", "slalom", 1).car.told
+
+    def late(channel, size, **other):
+        return Finding(code="delay", channel=channel, size=size, deviation=0.002, **other)
+
+    repair = Repair(delay={names[0]: 0.05})
+    first = late(names[0], 0.05, confidence=0.9, group=0.5, repair=repair, sure=True)
+    beside = Finding(code="offset", channel="r", size=0.1)
+    for size, sure in ((0.06, True), (0.06, False)):
+        second = late(names[1], size, confidence=0.8, group=0.7, repair=repair, sure=sure)
+        both, left = _of_one_device([first, beside, second], car)
+        assert left is beside and (both.channel, both.sure) == ("r+a_y", sure)
+        assert (both.size, both.confidence, both.group) == (sign * 0.055, 0.8, 0.7)
+        assert both.repair.delay == {"r": both.size, "a_y": both.size}
+        words = "late against" if sign > 0.0 else "early against"
+        assert both.text.startswith("the yaw rate and the lateral acceleration, of one device")
+        assert "55" in both.text and words in both.text
+    apart = late(names[1], 0.08, confidence=0.8, repair=repair)
+    listed = [first, apart]
+    assert _of_one_device(listed, car) is listed and _of_one_device([first], car) == [first]

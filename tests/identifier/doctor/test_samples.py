@@ -175,7 +175,8 @@ def test_a_clock_that_jumps_is_told_where_and_by_how_much(smooth, noisy):
         **{name: getattr(noisy, name)[again] for name in names},
     )
     (found,) = [one for one in sample_findings(twice) if one.code == "clock"]
-    assert found.size == pytest.approx(-0.5) and found.confidence == CERTAIN
+    assert (found.size, found.deviation) == pytest.approx((-0.5, 0.0))
+    assert found.confidence == CERTAIN
     assert "0.5 s before 15 s are logged twice" in found.text
 
 

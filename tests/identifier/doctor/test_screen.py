@@ -440,6 +440,7 @@ def test_a_channel_that_rests_for_a_while_is_told_and_the_rest_is_asked(long):
     assert (first.code, first.channel) == ("unit", "r")
     assert (frozen.code, frozen.channel) == ("frozen", "v_y")
     assert frozen.size == pytest.approx(np.ptp(log.t[log.segments[0]]), abs=0.05)
+    assert "v_y does not change from 0 s on for" in frozen.text
     assert not found.blind
 
 
