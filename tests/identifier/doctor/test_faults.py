@@ -270,6 +270,24 @@ def test_a_sensor_that_no_car_carries_is_never_sure(driven, ahead, sure):
     assert found.text.endswith("on this drive it looks like: velocity sensor x v_y")
 
 
+def test_a_size_is_believed_that_stands_out_and_that_devices_have(driven):
+    """Of a delay: beyond 2.5 deviations, within 3.5 widths, not against the accelerometer."""
+    car, log, _ = driven
+    search = prepared(log, car)
+    delay, lag = suspect_of("delay", "v_y"), suspect_of("lag", "v_y")
+
+    def fitted(value, suspect=delay, felt=0.0, sd=0.003):  # with the least size 0.005
+        return Candidate(suspect, value, sd, 20.0, 20.0, felt, None)
+
+    assert search.deviation(fitted(0.1)) == pytest.approx(0.005)
+    for value, told in ((0.012, False), (0.013, True), (-0.013, True), (0.41, True), (0.43, False)):
+        assert search.believed(fitted(value)) is told
+    assert search.believed(fitted(0.1, felt=-3.9)) and not search.believed(fitted(0.1, felt=-4.1))
+    assert search.believed(fitted(0.1, lag)) and not search.believed(fitted(-0.1, lag))
+    assert fitted(0.1).is_late_as(fitted(0.1, lag)) and not fitted(0.1).is_late_as(fitted(0.2))
+    assert not fitted(0.1).is_late_as(fitted(0.1, suspect_of("lag", "r")))
+
+
 # How well the accelerometer alone says where to begin; of what it says nothing the search begins
 # at zero.
 BEGIN = {"bank": 0.003, "delay v_y": 0.02, "factor v_x": 0.01, "offset v_y": None}

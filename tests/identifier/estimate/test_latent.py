@@ -126,6 +126,23 @@ def test_parameters_that_are_held_leave_their_doubt(problem, place):
     np.testing.assert_allclose(told, free, rtol=1e-3)
 
 
+@pytest.mark.parametrize("size", [1.0, 0.1])
+def test_without_v_y_the_accelerometer_is_believed_by_the_size_of_the_car(size):
+    lengths = {"l_f": size * CAR.l_f, "l_r": size * CAR.l_r}
+    car = replace(CAR, **lengths, yaw_inertia=size**2 * CAR.yaw_inertia)
+    scale, beliefs = np.sqrt(car.wheelbase / 2.7), Priors.of(car)
+    for late, left in ((False, 0.0007), (True, 0.01 * scale)):
+        found = latent_priors(car, beliefs, late)
+        sd = dict(zip(LATENT_NAMES, np.diag(found.covariance) ** 0.5, strict=True))
+        told = [sd[name] for name in ("r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")]
+        expected = [0.002 / scale, 0.015, 0.04, left, 0.01 * car.wheelbase]
+        assert told == pytest.approx(expected)
+        assert found.mean[LATENT_NAMES.index("roll")] == pytest.approx(0.06)
+    held = {LATENT_NAMES[k] for k in np.flatnonzero(beliefs.moves) if not found.moves[k]}
+    assert held == {"ln_sway", "v_y_bias", "v_y_angle", "v_y_lever"}
+    assert sd["ln_inertia"] == pytest.approx(0.007)
+
+
 def test_it_begins_without_slip_at_the_rear_and_with_what_steering_leaves_at_the_front(problem):
     z, p = problem.begin(stiffer=0.4)
     v_x, delta, rear = *problem.nodes.given[:, :2].T, z[:, 0] - CAR.l_r * z[:, 1]

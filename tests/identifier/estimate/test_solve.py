@@ -187,7 +187,7 @@ def test_straights_show_where_to_begin():
     assert [angle[INDEX[name]] for name in names] == pytest.approx([-0.02, 0.0, 0.02])
     right = replace(drive, v_y=-r, delta_f=0.1 * r)
     assert len(starts(Problem([Drive.of(right, CAR)], CAR, PRIORS))) == 1
-    turning = replace(drive, r=np.full(t.size, 0.3))
+    turning = replace(drive, r=np.full(t.size, 0.04 * GRAVITY / 20.0))
     assert len(starts(Problem([Drive.of(turning, CAR)], CAR, PRIORS))) == 1
 
 
