@@ -384,3 +384,5 @@ def test_two_channels_that_are_late_alike_are_one_device(names, sign):
     apart = late(names[1], 0.08, confidence=0.8, repair=repair)
     listed = [first, apart]
     assert _of_one_device(listed, car) is listed and _of_one_device([first], car) == [first]
+    all_four = [late("r", 0.1), late("a_y", 0.2), late("v_y", 0.05), late("delta_f", 0.05)]
+    assert [one.channel for one in _of_one_device(all_four, car)] == ["r", "a_y", "r+a_y"]

@@ -31,7 +31,7 @@ from identifier.doctor.readings import (
     unexplained,
 )
 from identifier.doctor.samples import sample_findings
-from identifier.doctor.screen import screen, steering_finding
+from identifier.doctor.screen import _unlike, screen, steering_finding
 from models.faults import SensorFault
 from models.maneuvers import RandomSteer, SampledSteer
 from models.plant import Plant
@@ -195,9 +195,14 @@ def test_another_car_and_its_size_are_told(driven):
 
 def test_an_inertia_that_no_car_has_is_told_without_a_log(one):
     car, log = one
-    for factor in (0.3, 4.0):
+    for factor, told in ((0.49, True), (0.51, False), (1.59, False), (1.61, True)):
         wrong = replace(car, yaw_inertia=factor * car.mass * car.l_f * car.l_r)
-        assert "yaw_inertia" in named(log, wrong)
+        found = _unlike(wrong)
+        assert len(found) == told
+        for one in found:
+            assert one.size == pytest.approx(factor) and f"is {factor:.2g} times" in one.text
+            assert one.repair.on(wrong).yaw_inertia == pytest.approx(wrong.yaw_inertia / factor)
+    assert "yaw_inertia" in named(log, replace(car, yaw_inertia=4.0 * car.yaw_inertia))
 
 
 def test_a_factor_of_the_steering_is_what_it_most_likely_is():
@@ -210,6 +215,14 @@ def test_a_factor_of_the_steering_is_what_it_most_likely_is():
     assert (wheel.code, wheel.size) == ("steering_ratio", pytest.approx(14.6))
     assert wheel.deviation == pytest.approx(0.146)
     assert "degrees" in wheel.text
+    for size, code in (
+        (4.8, "factor"),
+        (5.2, "steering_ratio"),
+        (29.0, "steering_ratio"),
+        (31.0, "factor"),
+    ):
+        assert steering_finding(1.0 / size, 1.0).code == code
+        assert steering_finding(-1.0 / (size * DEGREES), 1.0).code == code
     other = steering_finding(0.5, 1.0)
     assert (other.code, other.sure) == ("factor", False)
 

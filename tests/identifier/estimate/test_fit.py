@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from identifier.estimate.fit import _after, _blocks, _lasting, fit
+from identifier.estimate.method import FitMethod
 from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
 from identifier.motion.parameters import INDEX, NAMES
 from identifier.verdict import judge_identification
@@ -179,3 +180,11 @@ def test_the_reach_of_a_drive_is_what_lasts_of_its_slip_and_speed(learnt):
     np.testing.assert_allclose(reach.slip, np.abs(truth).max(axis=0), rtol=0.25)
     assert reach.pairs > 1000 and (reach.unexplained < 1.5).all()
     assert reach.a_x[0] < -1.0 < 1.0 < reach.a_x[1]
+
+
+def test_a_log_that_teaches_nothing_is_refused():
+    drive = driven(3)
+    with pytest.raises(ValueError, match="no sample is fast enough"):
+        fit([replace(drive, v_x=0.05 * drive.v_x)], sedan())
+    with pytest.raises(ValueError, match="days must be one of"):
+        FitMethod(min_speed=3.0, days="many")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from codegen.arrays import blocks
+from identifier.axle.gate import Plausibility
 from identifier.estimate import report
 from identifier.estimate.model import FittedModel
 from identifier.motion.parameters import INDEX
@@ -35,6 +36,7 @@ def test_a_saved_model_is_the_same(learnt, tmp_path):
         (lambda d: d["parameters"].pop("ln_grip_f"), "ln_grip_f"),
         (lambda d: d["parameters"]["ln_stiffness_r"].update(value=9.0), "must be within"),
         (lambda d: d["covariance"][0].__setitem__(1, 9.0), "covariance must be symmetric"),
+        (lambda d: d["covariance"][0].__setitem__(0, -1.0), "no negative variance"),
         (lambda d: d.update(speeds_m_s=[1.0, float("inf")]), "speeds_m_s"),
         (lambda d: d.update(driven_slip_rad=[0.1]), "driven"),
         (lambda d: d["vehicle"].update(mass=-1.0), "mass"),
@@ -54,6 +56,7 @@ def test_sample_by_sample_it_says_what_it_says_of_the_drive(learnt):
     size = np.sqrt(np.mean(drive.axle_force**2, axis=0))
     away = np.sqrt(np.mean((step - model.predict(drive)) ** 2, axis=0))
     assert (away < 0.03 * size).all()
+    assert model.setup(0.02).ends_run == Plausibility.for_vehicle(model.vehicle).rest(0.02) > 2
 
 
 def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):

@@ -64,6 +64,13 @@ def test_rare_and_late_values_are_found_and_brought_on_time(log, how):
     assert "every 100 ms" in found.notes[-1] and "ay" in found.notes[-1]
 
 
+@pytest.mark.parametrize("late", [0.063, 0.137])
+def test_the_delay_of_rare_values_is_found_to_milliseconds(log, late):
+    note = on_time(received(log, late=late), CAR).notes[-1]
+    found = float(note.split("ms, ")[1].split(" ms late")[0])
+    assert found == pytest.approx(1e3 * late, abs=4.0)
+
+
 def test_a_good_v_y_stays_as_it_is(log):
     for one in (log, replace(log, a_y=None), replace(log, v_y=None)):
         assert on_time(one, CAR) is one
