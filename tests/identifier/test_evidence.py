@@ -158,6 +158,10 @@ def test_a_road_pushes_by_what_the_accelerometer_does_not_show():
         0.08, abs=0.01
     )
     assert road_push(replace(driven, a_y=None), model) is None
+    blind = replace(driven, v_y=None)
+    for told in (None, SimpleNamespace(beside=fall)):
+        tires = SimpleNamespace(vehicle=CAR, estimated_v_y=lambda log, told=told: told)
+        assert road_push(blind, tires) is (None if told is None else fall)
 
 
 def test_what_forces_miss_of_a_motion_is_told_of_both_balances(rng):

@@ -185,6 +185,8 @@ def test_what_is_far_from_what_is_usual_is_noted():
     assert a_day([0.05, 0, 0, 0, 0], [0.014, 0, 0, 0, 0]).notes == (), "within its own doubt"
     assert a_day([0, 0, 0, 0.05, 0], expected=np.array([0, 0, 0, 0.04, 0])).notes == ()
     (zero, lever) = (text for _, text in a_day([0.05, 0, 0, 0.05, 0]).notes)
+    assert with_doubt(np.degrees(0.05), np.degrees(1e-4)) in zero
+    assert a_day([0.05, 0, 0, 0, 0], usual=np.zeros(5)).notes == (), "nothing is believed of it"
     assert "from that of a good sensor" in zero and "of the identification drive" in lever
 
 
