@@ -8,8 +8,8 @@ import pytest
 from benchmarks.faults import Together, WrongUnit
 from benchmarks.random_cars import random_car, random_drive
 from identifier.axle import AxleIdentifier
-from identifier.doctor import Finding, diagnose
-from identifier.doctor.diagnosis import Diagnosis
+from identifier.doctor import Finding, diagnose, diagnosis
+from identifier.doctor.diagnosis import Diagnosis, _contradictions
 from identifier.doctor.finding import first_of_each
 from identifier.doctor.screen import combined
 from identifier.run import identify
@@ -156,3 +156,13 @@ def test_a_log_without_v_y_or_in_a_fixed_frame_is_not_asked_for_sizes(driven):
     assert [(one.code, one.channel) for one in frozen.findings] == [("frozen", "r")]
     slow = diagnose(replace(log, v_y=None, t=1000.0 * log.t), car)
     assert "clock_unit" in [one.code for one in slow.findings]
+
+
+def test_a_law_that_is_broken_is_a_finding_that_matters(driven, monkeypatch):
+    car, log = driven
+    assert _contradictions(log, car) == []
+    monkeypatch.setattr(diagnosis, "physics_contradiction", lambda _: None)
+    monkeypatch.setattr(diagnosis, "vehicle_contradiction", lambda *_: "a law is broken")
+    (found,) = _contradictions(log, car)
+    assert (found.code, found.text, found.confidence) == ("contradiction", "a law is broken", 0.9)
+    assert found.matters and not found.sure

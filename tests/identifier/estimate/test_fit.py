@@ -182,9 +182,11 @@ def test_the_reach_of_a_drive_is_what_lasts_of_its_slip_and_speed(learnt):
     assert reach.a_x[0] < -1.0 < 1.0 < reach.a_x[1]
 
 
-def test_a_log_that_teaches_nothing_is_refused():
+def test_a_log_that_teaches_nothing_is_refused_alone():
     drive = driven(3)
+    slow = replace(drive, v_x=0.05 * drive.v_x)
     with pytest.raises(ValueError, match="no sample is fast enough"):
-        fit([replace(drive, v_x=0.05 * drive.v_x)], sedan())
+        fit([slow], sedan())
+    assert len(fit([slow, drive], sedan(), block=20.5).parts) == 1, "what follows teaches"
     with pytest.raises(ValueError, match="days must be one of"):
         FitMethod(min_speed=3.0, days="many")

@@ -132,3 +132,15 @@ def test_grip_is_the_top_of_the_curve_and_known_slip_ends_where_a_drive_decides_
     values, sd = np.array([value for value, _ in found]), np.array([sd for _, sd in found])
     assert (np.abs(values - values[1]) < 2.0 * sd).all()
     assert (sd[:2] < 0.12).all() and (sd[2] > sd[:2]).all()
+
+
+def test_samples_of_a_fit_spread_by_its_covariance_and_its_own_error(learnt):
+    """Grip by ln: the variance of the fit, and of the share of the force that the fit misses."""
+    model, n = learnt.model, 400
+    drawn = np.array([one.p for one in model.band._samples(n, np.random.default_rng(1))])
+    own = model.band._error_at(0.5)
+    for i, axle in enumerate("fr"):
+        k = INDEX[f"ln_grip_{axle}"]
+        expected = np.hypot(np.sqrt(model.covariance[k, k]), own[i])
+        assert np.std(drawn[:, k]) == pytest.approx(expected, rel=0.15)
+        assert np.mean(drawn[:, k]) == pytest.approx(model.p[k], abs=4.0 * expected / np.sqrt(n))

@@ -121,7 +121,7 @@ def test_a_user_learns_from_a_receiver_nearly_as_well(log, caplog):
 def test_the_motion_between_values_is_that_of_dense_least_squares(log, late):
     """Of two segments: v_y, what it misses of values, and the likelihood up to a constant."""
     short = joined([log.between(3.0, 3.4), log.between(6.0, 6.3)])
-    n, dt, new = len(short), short.dt, np.arange(0, len(short), 3)
+    n, dt, new = len(short), short.dt, np.append(np.arange(0, len(short) - 1, 3), len(short) - 1)
     s = _Sensor(0.03, late=late, noise=0.02, push=0.01, wanders=0.005)
     v, residual, cost = _Kinematics(short, new).solved(s, 1.0)
     (edge,) = short.breaks
