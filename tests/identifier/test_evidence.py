@@ -10,6 +10,7 @@ from identifier.evidence import (
     Evidence,
     brisk_windows,
     clean_rms,
+    evidence,
     impulse_signals,
     lateral_noise,
     measured_force,
@@ -145,6 +146,17 @@ def test_one_segment_that_is_missed_is_left_out_where_the_rest_is_explained(
     assert some[0] <= first and last <= some[1] and some[1] - some[0] == 18
     assert len(rest.windows) == 42 and rest.model_error == pytest.approx(2 * [elsewhere / 0.5])
     assert of(measured, measured - 0.01).but_a_segment()[1] is None
+    missed[:, 1] = elsewhere  # a segment that the front alone misses
+    assert of(measured, measured - missed).but_a_segment()[1] is not None
+
+
+@pytest.mark.parametrize("count", [7, 8])
+def test_eight_windows_are_evidence(count):
+    n = 15 * (count - 1) + 31
+    driven = recording()[0.0 : T[n - 1]]
+    model = SimpleNamespace(vehicle=CAR, min_speed=3.0, predict=lambda log: np.zeros((len(log), 2)))
+    found = evidence(model, driven)
+    assert (found is None) == (count < 8) and (found is None or len(found.windows) == 8)
 
 
 def test_a_road_pushes_by_what_the_accelerometer_does_not_show():

@@ -23,6 +23,7 @@ from identifier.estimate.priors import Priors
 from identifier.motion.model import DAMPING
 from identifier.motion.nodes import LATENT_NAMES
 from identifier.verdict import judge_prediction
+from identifier.verdict.verdict import WITHOUT_V_Y
 from models.recordings import Recording, RecordingError
 from models.recordings.record import joined
 from tests.identifier.conftest import steered
@@ -284,8 +285,9 @@ def test_a_side_slip_that_is_hardly_known_judges_no_model(learnt, wider, refused
     doubtful = replace(learnt, covariance=wider * learnt.covariance)
     log = blind(driven(9), seed=4)
     shown = replace(log, v_y=doubtful.estimated_v_y(log).v_y, estimated=("v_y",))
-    codes = [one.code for one in judge_prediction(doubtful, shown).findings]
-    assert ("side_slip_unknown" in codes) == refused
+    verdict = judge_prediction(doubtful, shown)
+    assert ("side_slip_unknown" in [one.code for one in verdict.findings]) == refused
+    assert refused or verdict.blind == WITHOUT_V_Y
 
 
 def test_of_a_long_log_the_hardest_part_teaches():
