@@ -27,7 +27,7 @@ _OPPOSITES = {  # of what a size says, where it is negative
     " ahead of ": " behind ",
     " to the left": " to the right",
     "too far back": "too far forward",
-    "push more at speed, as by a downforce": "push less at speed, as by a lift",
+    "grow with speed, as by a downforce": "shrink with speed, as by a lift",
 }
 _POWERS: Mapping[str, float] = {"": 0.0, "length": 1.0, "speed": 0.5, "rate": -0.5}
 NOTES = ("center_of_gravity", "yaw_inertia", "downforce")  # of the car: never an alarm, never sure

@@ -1,5 +1,8 @@
 """Means over windows, what they measure and what is missed of it: by hand."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -7,10 +10,13 @@ from identifier.evidence import (
     Evidence,
     brisk_windows,
     clean_rms,
+    evidence,
     impulse_signals,
     lateral_noise,
     measured_force,
+    motion_error,
     noise_variance,
+    road_push,
 )
 from models.recordings import Recording
 from models.recordings.evidence import Windows
@@ -100,3 +106,88 @@ def test_what_is_missed_is_a_share_of_the_force_with_the_noise_taken_off():
     nothing = np.zeros((9, 2))
     assert of(nothing, nothing).model_error.tolist() == [1.0, 1.0]
     assert clean_rms(nothing, np.ones(2)).tolist() == [0.0, 0.0]
+
+
+def test_some_windows_are_those_of_all_that_is_known(rng):
+    measured, modelled = rng.standard_normal((2, 60, 2))
+    found, kept = of(measured, modelled, noise=(0.1, 0.2)), rng.random(60) < 0.5
+    some = found.where(kept)
+    np.testing.assert_array_equal(some.windows.starts, found.windows.starts[kept])
+    np.testing.assert_array_equal(some.measured, measured[kept])
+    np.testing.assert_array_equal(some.modelled, modelled[kept])
+    assert some.noise is found.noise
+
+
+def test_the_worst_part_is_that_which_misses_most(rng):
+    measured = np.tile([0.5, 0.4], (60, 1))
+    missed = np.zeros((60, 2))
+    missed[20:30] = [0.1, 0.2]
+    found = of(measured, measured - missed, noise=(0.0001, 0.0))
+    assert found.worst(10) == pytest.approx([np.sqrt(0.0099) / 0.5, 0.5])
+    assert found.worst(20) == pytest.approx([np.sqrt(0.0049) / 0.5, 0.5 / np.sqrt(2.0)])
+    assert found.worst(1000) == pytest.approx(found.model_error)
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "elsewhere", "left_out"),
+    [(0, 15, 0.0, True), (30, 45, 0.02, True), (10, 40, 0.0, False), (0, 15, 0.08, False)],
+)
+def test_one_segment_that_is_missed_is_left_out_where_the_rest_is_explained(
+    first, last, elsewhere, left_out
+):
+    measured = np.tile([0.5, 0.5], (60, 1))
+    missed = np.full((60, 2), elsewhere)
+    missed[first:last] += 0.3
+    found = of(measured, measured - missed)
+    rest, some = found.but_a_segment()
+    if not left_out:
+        assert some is None and rest is found
+        return
+    assert some[0] <= first and last <= some[1] and some[1] - some[0] == 18
+    assert len(rest.windows) == 42 and rest.model_error == pytest.approx(2 * [elsewhere / 0.5])
+    assert of(measured, measured - 0.01).but_a_segment()[1] is None
+    missed[:, 1] = elsewhere  # a segment that the front alone misses
+    assert of(measured, measured - missed).but_a_segment()[1] is not None
+
+
+@pytest.mark.parametrize("count", [7, 8])
+def test_eight_windows_are_evidence(count):
+    n = 15 * (count - 1) + 31
+    driven = recording()[0.0 : T[n - 1]]
+    model = SimpleNamespace(vehicle=CAR, min_speed=3.0, predict=lambda log: np.zeros((len(log), 2)))
+    found = evidence(model, driven)
+    assert (found is None) == (count < 8) and (found is None or len(found.windows) == 8)
+
+
+def test_a_road_pushes_by_what_the_accelerometer_does_not_show():
+    r, n = 0.1 * np.sin(2.0 * T), T.size
+    fall = np.full(n, 0.0)
+    fall[n // 2 :] = 0.08
+    driven = recording(r=r, a_y=15.0 * r - GRAVITY * fall)
+    model = SimpleNamespace(vehicle=CAR)
+    push = road_push(driven, model)
+    assert np.median(push[n // 2 + 200 :] - np.median(push[: n // 2 - 200])) == pytest.approx(
+        0.08, abs=0.01
+    )
+    assert road_push(replace(driven, a_y=None), model) is None
+    blind = replace(driven, v_y=None)
+    for told in (None, SimpleNamespace(beside=fall)):
+        tires = SimpleNamespace(vehicle=CAR, estimated_v_y=lambda log, told=told: told)
+        assert road_push(blind, tires) is (None if told is None else fall)
+
+
+def test_what_forces_miss_of_a_motion_is_told_of_both_balances(rng):
+    force = rng.standard_normal((T.size, 2)) * 1e-9 + [3000.0, 1000.0]
+    yaw = (CAR.l_f * 3000.0 - CAR.l_r * 1000.0) / CAR.yaw_inertia
+    driven = recording(r=yaw * T, v_y=(4000.0 / CAR.mass + 0.5) * T - 15.0 * yaw * T**2 / 2.0)
+    counted = np.ones(T.size, dtype=bool)
+    found = motion_error(force, driven, CAR, counted)
+    assert (found.lateral, found.yaw) == pytest.approx((0.5, 0.0), abs=1e-3)
+    assert found.lateral_rms == pytest.approx(4000.0 / CAR.mass + 0.5, abs=1e-3)
+    assert found.explained[0] == pytest.approx(1.0 - (0.5 / found.lateral_rms) ** 2, abs=1e-3)
+    assert found.yaw_rms == pytest.approx(abs(yaw)) and found.explained[1] == pytest.approx(1.0)
+    blind = replace(driven, v_y=None, a_y=np.full(T.size, 4000.0 / CAR.mass))
+    assert motion_error(force, blind, CAR, counted).lateral == pytest.approx(0.0, abs=1e-6)
+    assert motion_error(force, driven, CAR, ~counted) is None
+    still = motion_error(0.0 * force, recording(), CAR, counted)
+    assert still.explained == (None, None)

@@ -8,8 +8,9 @@ import pytest
 from benchmarks.faults import Together, WrongUnit
 from benchmarks.random_cars import random_car, random_drive
 from identifier.axle import AxleIdentifier
-from identifier.doctor import Finding, diagnose
-from identifier.doctor.diagnosis import Diagnosis
+from identifier.doctor import Finding, diagnose, diagnosis
+from identifier.doctor.diagnosis import Diagnosis, _contradictions
+from identifier.doctor.finding import first_of_each
 from identifier.doctor.screen import combined
 from identifier.run import identify
 from models.faults import SensorFault
@@ -118,3 +119,50 @@ def test_nothing_is_looked_for_where_nothing_was_driven(driven):
     found = diagnose(standing, sedan())
     assert not found.healthy
     assert any(line.startswith("offsets, delays") for line in found.unobservable)
+
+
+def test_a_diagnosis_is_told_in_lines_and_numbers():
+    repair = Repair(offset={"r": 0.1})
+    listed = (
+        Finding(code="offset", channel="r", size=0.1, unit="rad/s", confidence=0.999, text="one",
+                repair=repair, sure=True),
+        Finding(code="delay", channel="v_y", confidence=0.4, text="two", repair=repair),
+        Finding(code="yaw_inertia", confidence=0.9, text="three", note=True),
+    )  # fmt: skip
+    told = Diagnosis(name="log", findings=listed, unobservable=("mass",))
+    lines = ["one (sure)", "two (confidence 40 %)", "three (note, confidence 90 %)"]
+    assert told.lines(unobservable=False) == lines
+    assert told.summary().split("\n") == ["log:", *lines, "not observable: mass"]
+    assert not told.healthy and told.repair == repair
+    numbers = told.to_dict()
+    assert numbers["recording"] == "log" and numbers["not_observable"] == ["mass"]
+    assert numbers["repair"] == {"offset": {"r": 0.1}} and not numbers["healthy"]
+    first = numbers["findings"][0]
+    assert first["size"] == 0.1 and first["deviation"] is None and first["unit"] == "rad/s"
+    assert first["repair"] == {"offset": {"r": 0.1}} and numbers["findings"][2]["repair"] is None
+    assert repr(told) == "<Diagnosis of 'log': offset r, delay v_y, yaw_inertia>"
+    assert listed[0].percent == "99 %" and not listed[2].matters
+    again = replace(listed[1], channel="r")
+    assert first_of_each([*listed, again, listed[1]]) == [*listed, again]
+
+
+def test_a_log_without_v_y_or_in_a_fixed_frame_is_not_asked_for_sizes(driven):
+    car, log = driven
+    blind = diagnose(replace(log, v_y=None), car)
+    assert blind.healthy and any("no lateral velocity" in line for line in blind.unobservable)
+    still = log.r.copy()
+    still[300:400] = still[300]
+    frozen = diagnose(replace(log, v_y=None, r=still), car)
+    assert [(one.code, one.channel) for one in frozen.findings] == [("frozen", "r")]
+    slow = diagnose(replace(log, v_y=None, t=1000.0 * log.t), car)
+    assert "clock_unit" in [one.code for one in slow.findings]
+
+
+def test_a_law_that_is_broken_is_a_finding_that_matters(driven, monkeypatch):
+    car, log = driven
+    assert _contradictions(log, car) == []
+    monkeypatch.setattr(diagnosis, "physics_contradiction", lambda _: None)
+    monkeypatch.setattr(diagnosis, "vehicle_contradiction", lambda *_: "a law is broken")
+    (found,) = _contradictions(log, car)
+    assert (found.code, found.text, found.confidence) == ("contradiction", "a law is broken", 0.9)
+    assert found.matters and not found.sure

@@ -62,13 +62,16 @@ def test_a_log_without_a_fault_has_none(smooth, noisy):
 
 
 @pytest.mark.parametrize("name", ["v_y", "r", "a_y", "delta_f"])
-def test_a_channel_that_stops_for_a_while_is_frozen_there_for_so_long(noisy, name):
+def test_a_channel_that_stops_for_a_while_is_frozen_there_for_so_long(smooth, noisy, name):
     still = changed(noisy, name, slice(1200, 1280), getattr(noisy, name)[1200])
     found = only(still)
     assert (found.code, found.channel, found.unit) == ("frozen", name, "s")
     assert found.size == pytest.approx(0.8)
     assert "from 12 s on for 0.8 s" in found.text
     assert sample_findings(changed(noisy, name, slice(1200, 1225), 0.01)) == [], "not for 0.3 s"
+    exact = sample_findings(changed(smooth, name, slice(1200, 1280), getattr(smooth, name)[1200]))
+    servo = name == "delta_f"  # which may stand still
+    assert [one.code for one in exact] == ["frozen"] * (not servo)
 
 
 def test_a_channel_that_stops_while_the_car_stands_is_not_frozen(noisy):
@@ -172,7 +175,8 @@ def test_a_clock_that_jumps_is_told_where_and_by_how_much(smooth, noisy):
         **{name: getattr(noisy, name)[again] for name in names},
     )
     (found,) = [one for one in sample_findings(twice) if one.code == "clock"]
-    assert found.size == pytest.approx(-0.5) and found.confidence == CERTAIN
+    assert (found.size, found.deviation) == pytest.approx((-0.5, 0.0))
+    assert found.confidence == CERTAIN
     assert "0.5 s before 15 s are logged twice" in found.text
 
 

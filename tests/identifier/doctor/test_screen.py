@@ -1,6 +1,7 @@
 """The screen rings on each gross fault that is planted, and is silent on what is right."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,9 +19,19 @@ from benchmarks.random_cars import CLASSES, good_sensors, random_car, random_dri
 from benchmarks.recorded_cars import CARMAKER, DART
 from identifier.doctor import diagnose
 from identifier.doctor.pieces import PIECE, PIECES, looked_at
-from identifier.doctor.readings import Motion, Reading, unexplained
+from identifier.doctor.readings import (
+    CHANGES,
+    Change,
+    Motion,
+    Read,
+    Reading,
+    _Explanation,
+    _least,
+    forces_and_slips,
+    unexplained,
+)
 from identifier.doctor.samples import sample_findings
-from identifier.doctor.screen import screen, steering_finding
+from identifier.doctor.screen import _unlike, screen, steering_finding
 from models.faults import SensorFault
 from models.maneuvers import RandomSteer, SampledSteer
 from models.plant import Plant
@@ -184,9 +195,14 @@ def test_another_car_and_its_size_are_told(driven):
 
 def test_an_inertia_that_no_car_has_is_told_without_a_log(one):
     car, log = one
-    for factor in (0.3, 4.0):
+    for factor, told in ((0.49, True), (0.51, False), (1.59, False), (1.61, True)):
         wrong = replace(car, yaw_inertia=factor * car.mass * car.l_f * car.l_r)
-        assert "yaw_inertia" in named(log, wrong)
+        found = _unlike(wrong)
+        assert len(found) == told
+        for one in found:
+            assert one.size == pytest.approx(factor) and f"is {factor:.2g} times" in one.text
+            assert one.repair.on(wrong).yaw_inertia == pytest.approx(wrong.yaw_inertia / factor)
+    assert "yaw_inertia" in named(log, replace(car, yaw_inertia=4.0 * car.yaw_inertia))
 
 
 def test_a_factor_of_the_steering_is_what_it_most_likely_is():
@@ -199,6 +215,14 @@ def test_a_factor_of_the_steering_is_what_it_most_likely_is():
     assert (wheel.code, wheel.size) == ("steering_ratio", pytest.approx(14.6))
     assert wheel.deviation == pytest.approx(0.146)
     assert "degrees" in wheel.text
+    for size, code in (
+        (4.8, "factor"),
+        (5.2, "steering_ratio"),
+        (29.0, "steering_ratio"),
+        (31.0, "factor"),
+    ):
+        assert steering_finding(1.0 / size, 1.0).code == code
+        assert steering_finding(-1.0 / (size * DEGREES), 1.0).code == code
     other = steering_finding(0.5, 1.0)
     assert (other.code, other.sure) == ("factor", False)
 
@@ -316,6 +340,85 @@ def test_the_right_reading_leaves_least_and_a_standing_car_is_no_motion(one):
     assert Motion.of(replace(log, v_x=np.zeros(len(log)))) is None
 
 
+READINGS = {
+    "speeds in km/h": ({"v_x": 3.6, "v_y": 3.6}, Reading(v_x=1.0 / 3.6, v_y=1.0 / 3.6)),
+    "v_x in km/h": ({"v_x": 3.6}, Reading(v_x=1.0 / 3.6)),
+    "r turned, in degrees": ({"r": -DEGREES}, Reading(r=-1.0 / DEGREES)),
+    "a steering wheel": ({"delta_f": 15.0}, Reading(delta=1.0 / 15.0)),
+    "all of them": (
+        {"v_x": 3.6, "v_y": 2.0, "r": 5.0, "delta_f": -3.0},
+        Reading(v_x=1.0 / 3.6, v_y=0.5, r=0.2, delta=-1.0 / 3.0),
+    ),
+}
+
+
+def same_motion(logged, told, reading, right, car):
+    """Forces and slips of a log as it is read are those of the right log."""
+    found, expected = (
+        forces_and_slips(Motion.of(log), each, one)
+        for log, each, one in ((logged, told, reading), (right, car, Reading()))
+    )
+    for one, other in zip(found, expected, strict=True):
+        np.testing.assert_allclose(one, other, atol=0.01 * np.abs(other).max())
+
+
+@pytest.mark.parametrize("case", READINGS)
+def test_a_reading_takes_out_what_was_planted(one, case):
+    car, log = one
+    factors, reading = READINGS[case]
+    logged = replace(log, **{name: k * getattr(log, name) for name, k in factors.items()})
+    same_motion(logged, car, reading, log, car)
+
+
+def test_a_reading_of_angles_places_and_sizes_is_that_of_the_right_log_and_car(one):
+    car, log = one
+    for per_rad in (1.0, DEGREES):
+        angle = replace(log, v_y=per_rad * log.v_y / log.v_x)
+        same_motion(angle, car, Reading(sideslip=True, v_y=1.0 / per_rad), log, car)
+    ahead = SensorElsewhere(sensor="velocity", x=1.2).apply(log)
+    same_motion(ahead, car, Reading(arm=1.2), log, car)
+    half = replace(car, l_f=0.5 * car.l_f, l_r=0.5 * car.l_r, yaw_inertia=0.25 * car.yaw_inertia)
+    same_motion(log, half, Reading(size=2.0), log, car)
+    light = replace(half, yaw_inertia=0.125 * car.yaw_inertia)
+    same_motion(log, light, Reading(size=2.0, inertia=2.0), log, car)
+
+
+def test_changes_say_the_same_within_a_small_factor_and_exclude_one_another():
+    wheel = Change(code="steering", channels=("delta_f",), factors=(("delta", 0.1),))
+    other, turned = (replace(wheel, factors=(("delta", k),)) for k in (0.11, -0.1))
+    far = replace(wheel, factors=(("delta", 0.12),))
+    assert wheel.is_like(other) and not wheel.is_like(far) and not wheel.is_like(turned)
+    sign = next(one for one in CHANGES if (one.code, one.channels) == ("sign", ("delta_f",)))
+    assert turned.turned == sign and turned.is_like(sign) and not wheel.is_like(sign)
+    assert wheel.turned is wheel
+    unit = next(one for one in CHANGES if (one.unit, one.channels) == ("deg", ("delta_f",)))
+    both = unit.on(wheel.on(Reading(delta=2.0)))
+    assert both.delta == pytest.approx(0.2 / DEGREES)
+    assert not unit.fields & wheel.fields and not unit.is_like(wheel)
+    assert unit.by_channel == {"delta_f": pytest.approx(1.0 / DEGREES)}
+    speeds = next(one for one in CHANGES if one.channels == ("v_x", "v_y") and one.unit == "km/h")
+    alone = next(one for one in CHANGES if one.channels == ("v_y",) and one.unit == "km/h")
+    assert speeds.fields & alone.fields and alone.price > speeds.price
+    motion = SimpleNamespace(hidden=frozenset({"v_y"}))
+    assert speeds.shows_in(motion) and not alone.shows_in(motion)
+
+
+def test_a_price_and_confidence_come_from_what_is_left():
+    change = CHANGES[0]
+    free = Change(code="yaw_inertia", factors=(("inertia", 3.0),))
+    plain, one, two = (
+        _Explanation(changes=changes, reading=Reading(), left=-2.0)
+        for changes in ((), (change,), (change, free))
+    )
+    assert [x.cost for x in (plain, one, two)] == pytest.approx([-2.0, -0.9, 0.7])
+    sure = Read(best=plain, other=one).confidence
+    assert sure == pytest.approx(1.0 / (1.0 + np.exp(-3.3)))
+    assert Read(best=plain, other=plain).confidence == 0.5
+    arm = Change(code="velocity_sensor_x", channels=("v_y",), arm=1.0)
+    assert replace(two, changes=(arm, change)).gross == (change,)
+    assert _least(lambda x: (x - 0.3) ** 2, -1.0, 1.0, 20) == pytest.approx(0.3, abs=1e-3)
+
+
 @pytest.mark.parametrize("axle", ["front", "rear"])
 def test_a_stiffness_that_is_not_the_told_one_costs_on_either_side(one, axle):
     car, log = one
@@ -350,6 +453,7 @@ def test_a_channel_that_rests_for_a_while_is_told_and_the_rest_is_asked(long):
     assert (first.code, first.channel) == ("unit", "r")
     assert (frozen.code, frozen.channel) == ("frozen", "v_y")
     assert frozen.size == pytest.approx(np.ptp(log.t[log.segments[0]]), abs=0.05)
+    assert "v_y does not change from 0 s on for" in frozen.text
     assert not found.blind
 
 

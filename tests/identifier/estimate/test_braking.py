@@ -7,6 +7,7 @@ import pytest
 
 from codegen.arrays import Array
 from identifier.estimate.drive import Drive
+from identifier.estimate.nodes import Nodes
 from identifier.estimate.priors import OF_CAR, Priors
 from identifier.estimate.solve import simulate
 from identifier.motion.model import SIGNALS
@@ -42,6 +43,35 @@ def test_an_accelerometer_that_follows_the_speed_is_taken_on_a_slope_too() -> No
 @pytest.mark.parametrize("felt", [-PULL, PULL / GRAVITY, 2.0 * PULL, np.cos(40.0 * T), 0.0 * T])
 def test_a_channel_that_does_not_follow_the_speed_is_left_aside(felt: Array) -> None:
     np.testing.assert_array_equal(a_x_of(felt), a_x_of(None))
+
+
+def test_of_speed_alone_it_is_the_change_of_a_mean_over_a_longer_mean() -> None:
+    """Of a wave the means of 0.15 s and 0.31 s, of the drive's smoothing before, keep a share."""
+    omega = 8.0
+    wave = np.sin(omega * T)
+    bends = {"v_y": 0.0 * T, "r": 0.01 * T / T[-1], "delta_f": 0.0 * T, "delta_r": 0.0 * T}
+    drive = Recording(name="wave", t=T, v_x=20.0 + wave, a_y=0.0 * T, **bends)
+    shares = [np.sin(x) / x for x in 0.5 * omega * np.array([0.15, 0.31])]
+    smoothed = np.sin(0.5 * omega * 0.07) / (0.5 * omega * 0.07)
+    found = Drive.of(drive, CAR).signals[200:-200, SIGNALS.index("a_x")]
+    assert np.std(found) * np.sqrt(2.0) == pytest.approx(
+        omega * np.prod(shares) * smoothed, rel=0.02
+    )
+    nodes = Nodes.of(drive, CAR).given[60:-60, 3]
+    assert np.std(nodes) * np.sqrt(2.0) == pytest.approx(omega * np.prod(shares), rel=0.03)
+
+
+@pytest.mark.parametrize("turn", [0.0, 1.9])
+def test_without_v_y_an_accelerometer_ahead_of_a_rear_that_swings_out_is_taken(turn: float) -> None:
+    """v_y is l_r r there: what is felt is less than the speed gains, by l_r r²."""
+    r = turn * np.sin(1.4 * T)
+    drive = Recording(
+        name="swings", t=T, v_x=SPEED, v_y=None, r=r, delta_f=0.1 * r, delta_r=0.0 * T,
+        a_y=SPEED * r, a_x=PULL - CAR.l_r * r**2,
+    )  # fmt: skip
+    given = Nodes.of(drive, CAR).given
+    assert (given[:, 4] == 0.0).all()
+    assert (Nodes.of(replace(drive, a_x=None), CAR).given[:, 4] == 1.0).all()
 
 
 def test_height_and_shares_move_what_is_believed() -> None:

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from identifier.compare.zeros import replayed, zeros
+from identifier.day import NUMBERS, Day, of_day, sideways
 from identifier.doctor import diagnose
 from identifier.estimate.fit import fit
+from identifier.measured import with_doubt
 from identifier.methods import make_method
+from identifier.motion.parameters import INDEX, NAMES
 from identifier.prediction import predict
 from identifier.run import identify
 from models.recordings import joined
@@ -128,3 +131,85 @@ def test_a_fit_is_mounted_on_a_model_car(tire):
         cornering_stiffness_rear=30.0,
     )  # fmt: skip
     assert np.isfinite(tire.mounted_on(small).stiffness).all()
+
+
+# A day in numbers and words.
+
+TITLES = (
+    "zero of the steering",
+    "bias of v_y",
+    "mounting angle of the v_y sensor",
+    "place of the v_y sensor ahead of the center of gravity",
+    "steering angle, relative error",
+)
+
+
+def a_day(value, sd=1e-4, **other):
+    """A day at 20 m/s, of sensors of which 1 is usual."""
+    given = {"expected": np.zeros(5), "usual": np.full(5, 0.01), "speed": 20.0, "anew": True}
+    covariance = np.diag(np.broadcast_to(sd, 5) ** 2)
+    return Day(value=np.array(value), covariance=covariance, **given | other)
+
+
+def test_the_errors_of_a_day_are_taken_out_of_a_log():
+    clean = driven(5)
+    value = np.array([0.01, 0.2, -0.02, 0.3, 0.1])
+    zero, bias, angle, lever, gain = value
+    logged = replace(
+        clean,
+        delta_f=(clean.delta_f - zero) / (1.0 + gain),
+        v_y=clean.v_y + bias + angle * clean.v_x + lever * clean.r,
+    )
+    back = a_day(value).corrected(logged)
+    np.testing.assert_allclose(back.v_y, clean.v_y, atol=1e-12)
+    np.testing.assert_allclose(back.delta_f, clean.delta_f, atol=1e-12)
+    assert a_day(value).corrected(replace(logged, v_y=None)).v_y is None
+    p = a_day(value).on(np.full(len(NAMES), 7.0))
+    assert [p[INDEX[name]] for name in NUMBERS] == value.tolist() and (p == 7.0).sum() == p.size - 5
+
+
+def test_the_numbers_of_a_day_are_told_in_units_that_people_read():
+    day = a_day([np.radians(2.0), 0.3, np.radians(-1.0), 0.5, 0.1], [1e-3, 0.01, 1e-3, 0.02, 0.0])
+    units = ("°", " m/s", "°", " m", " %")
+    factors = (np.degrees(1.0), 1.0, np.degrees(1.0), 1.0, 100.0)
+    words = {
+        title: f"{with_doubt(k * value, k * sd)}{unit}"
+        for title, value, sd, unit, k in zip(TITLES, day.value, day.sd, units, factors, strict=True)
+        if sd > 0.0
+    }
+    assert day.words == words and len(words) == 4
+    assert day.line == ", ".join(f"{title} {said}" for title, said in words.items())
+    assert replace(day, anew=False).line.endswith("(of the identification drive)")
+    told = day.to_dict()
+    assert told["anew"] and told["v_y_bias"] == {"value": 0.3, "sd": pytest.approx(0.01)}
+
+
+def test_what_is_far_from_what_is_usual_is_noted():
+    codes = [[code for code, _ in a_day([x, 0, 0, 0.05, 0]).notes] for x in (0.029, 0.031, -0.031)]
+    assert codes == [["v_y_lever"], ["steering_zero", "v_y_lever"], ["steering_zero", "v_y_lever"]]
+    assert a_day([0.05, 0.3, 0, 0, 0], anew=False).notes == ()
+    assert a_day([0.05, 0, 0, 0, 0], [0.014, 0, 0, 0, 0]).notes == (), "within its own doubt"
+    assert a_day([0, 0, 0, 0.05, 0], expected=np.array([0, 0, 0, 0.04, 0])).notes == ()
+    (zero, lever) = (text for _, text in a_day([0.05, 0, 0, 0.05, 0]).notes)
+    assert with_doubt(np.degrees(0.05), np.degrees(1e-4)) in zero
+    assert a_day([0.05, 0, 0, 0, 0], usual=np.zeros(5)).notes == (), "nothing is believed of it"
+    assert "from that of a good sensor" in zero and "of the identification drive" in lever
+
+
+def test_at_one_speed_bias_and_angle_are_one_error_and_told_apart_where_they_differ():
+    usual = np.array([0.01, 0.1, 0.01, 0.01, 0.01])
+    for value in ([0, 0.2, 0, 0, 0], [0, 0, 0.01, 0, 0], [0, 0.4, -0.01, 0, 0]):
+        ((code, text),) = a_day(value, usual=usual).notes
+        assert code == "v_y_reads" and "0.20" in text and "too much at 20 m/s" in text
+        assert "bias of v_y" in text and "the forces allow for it" in text
+    assert "too little" in a_day([0, -0.2, 0, 0, 0], usual=usual).notes[0][1]
+    assert a_day([0, 0.25, -0.0125, 0, 0], usual=usual).notes == ()
+    unclear = a_day([0, 0.4, 0, 0, 0], [1e-4, 0.065, 1e-4, 1e-4, 1e-4], usual=usual)
+    assert "bias of v_y" in unclear.notes[0][1]
+    worse = replace(unclear, value=np.array([0, 0.5, 0, 0, 0]), usual=0.8 * usual)
+    assert "one speed cannot tell" in worse.notes[0][1]
+    of_two = np.array([[0.04, -0.00199], [-0.00199, 1e-4]])  # bias and angle make up for each other
+    assert sideways(np.array([0.2, 0.0]), of_two, 20.0)
+    assert not sideways(np.array([0.2, 0.0]), np.diag(np.diag(of_two)), 20.0)
+    assert of_day(*np.zeros((4, 5)), np.array([1.0, 30.0, 20.0]), anew=True).speed == 20.0
+    assert of_day(*np.zeros((4, 5)), np.zeros(0), anew=True).speed == 1.0

@@ -10,7 +10,8 @@ import pytest
 from benchmarks.random_cars import random_car, random_drive
 from identifier.doctor.faults import examine
 from identifier.estimate.drive import Drive
-from identifier.estimate.fit import fit
+from identifier.estimate.fit import _after, _blocks, _lasting, fit
+from identifier.estimate.method import FitMethod
 from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
 from identifier.estimate.solve import estimate
 from identifier.motion.parameters import INDEX, NAMES
@@ -91,8 +92,10 @@ def test_two_logs_tell_more_than_one(learnt):
 
 
 def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt):
-    found = fit([driven(3)], sedan(), block=8.0)
-    assert len(found.parts) > 1
+    done = []
+    found = fit([driven(3)], sedan(), block=8.0, progress=done.append)
+    assert len(found.parts) == len(done) > 1
+    assert done == sorted(done) and 0.2 < done[0] < 0.7 and done[-1] > 0.95
     blocks = found.model
     np.testing.assert_allclose(blocks.force(GRID), learnt.model.force(GRID), rtol=0.05)
     np.testing.assert_allclose(
@@ -194,3 +197,48 @@ def test_a_yaw_inertia_that_nobody_measured_does_not_become_a_steering_ratio():
     assert model["ln_inertia"] == pytest.approx(math.log(car.yaw_inertia / guess), abs=0.08)
     measured = Priors.of(left_out).without(["ln_inertia"])
     assert fit([log], left_out, measured).model["steering_gain"] > 0.08
+
+
+def test_blocks_are_no_longer_than_asked_and_days_stand_alone():
+    logs = [driven(3), driven(5), driven(3)[0.0:5.0]]
+    lasts = [
+        [len(one.counts) * one.dt for one in group]
+        for group in _blocks(logs, sedan(), 26.0, coarse=False)
+    ]
+    assert [[round(x) for x in group] for group in lasts] == [[20], [20, 5]]
+    alone = list(_blocks(logs, sedan(), 8.0, coarse=False, alone=True))
+    assert [len(group) for group in alone] == [1] * 7
+    (coarse,) = _blocks(logs[:1], sedan(), 26.0, coarse=True)
+    assert coarse[0].dt == pytest.approx(0.02)
+
+
+def test_what_a_block_left_is_believed_and_what_it_does_not_tell_stays(learnt):
+    before, found = Priors.of(sedan()), learnt.posterior
+    after = _after(before, found)
+    moved = np.diag(found.covariance) > 0.0
+    np.testing.assert_allclose(
+        after.covariance[np.ix_(moved, moved)], found.covariance[np.ix_(moved, moved)], rtol=1e-6,
+        atol=1e-12,
+    )  # fmt: skip
+    assert (after.mean == found.p).all() and after.typed == () and after.moves[moved].all()
+
+
+def test_the_reach_of_a_drive_is_what_lasts_of_its_slip_and_speed(learnt):
+    slip = np.column_stack([np.repeat([0.01, 0.05, 0.2], [40, 24, 3]), np.full(67, 0.03)])
+    np.testing.assert_allclose(_lasting(slip, 0.01), [0.05, 0.03])
+    reach, drive = learnt.model.reach, driven(3)
+    v_x, truth = drive.v_x[drive.v_x > 5.0], drive.alpha(sedan().l_f, sedan().l_r)
+    np.testing.assert_allclose(reach.speeds, np.quantile(v_x, [0.005, 0.995]), atol=0.1)
+    np.testing.assert_allclose(reach.slip, np.abs(truth).max(axis=0), rtol=0.25)
+    assert reach.pairs > 1000 and (reach.unexplained < 1.5).all()
+    assert reach.a_x[0] < -1.0 < 1.0 < reach.a_x[1]
+
+
+def test_a_log_that_teaches_nothing_is_refused_alone():
+    drive = driven(3)
+    slow = replace(drive, v_x=0.05 * drive.v_x)
+    with pytest.raises(ValueError, match="no sample is fast enough"):
+        fit([slow], sedan())
+    assert len(fit([slow, drive], sedan(), block=20.5).parts) == 1, "what follows teaches"
+    with pytest.raises(ValueError, match="days must be one of"):
+        FitMethod(min_speed=3.0, days="many")

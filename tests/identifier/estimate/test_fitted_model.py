@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from codegen.arrays import blocks
+from identifier.axle.gate import Plausibility
 from identifier.estimate import report
 from identifier.estimate.model import FittedModel
 from identifier.motion.parameters import INDEX
@@ -46,6 +47,7 @@ def test_a_file_of_before_has_no_play(learnt):
         (lambda d: d["parameters"].pop("ln_grip_f"), "ln_grip_f"),
         (lambda d: d["parameters"]["ln_stiffness_r"].update(value=9.0), "must be within"),
         (lambda d: d["covariance"][0].__setitem__(1, 9.0), "covariance must be symmetric"),
+        (lambda d: d["covariance"][0].__setitem__(0, -1.0), "no negative variance"),
         (lambda d: d.update(speeds_m_s=[1.0, float("inf")]), "speeds_m_s"),
         (lambda d: d.update(driven_slip_rad=[0.1]), "driven"),
         (lambda d: d["vehicle"].update(mass=-1.0), "mass"),
@@ -65,6 +67,7 @@ def test_sample_by_sample_it_says_what_it_says_of_the_drive(learnt):
     size = np.sqrt(np.mean(drive.axle_force**2, axis=0))
     away = np.sqrt(np.mean((step - model.predict(drive)) ** 2, axis=0))
     assert (away < 0.03 * size).all()
+    assert model.setup(0.02).ends_run == Plausibility.for_vehicle(model.vehicle).rest(0.02) > 2
 
 
 def test_on_another_road_its_band_opens_by_what_friction_may_do(learnt):
@@ -140,3 +143,15 @@ def test_grip_is_the_top_of_the_curve_and_known_slip_ends_where_a_drive_decides_
     values, sd = np.array([value for value, _ in found]), np.array([sd for _, sd in found])
     assert (np.abs(values - values[1]) < 2.0 * sd).all()
     assert (sd[:2] < 0.12).all() and (sd[2] > sd[:2]).all()
+
+
+def test_samples_of_a_fit_spread_by_its_covariance_and_its_own_error(learnt):
+    """Grip by ln: the variance of the fit, and of the share of the force that the fit misses."""
+    model, n = learnt.model, 400
+    drawn = np.array([one.p for one in model.band._samples(n, np.random.default_rng(1))])
+    own = model.band._error_at(0.5)
+    for i, axle in enumerate("fr"):
+        k = INDEX[f"ln_grip_{axle}"]
+        expected = np.hypot(np.sqrt(model.covariance[k, k]), own[i])
+        assert np.std(drawn[:, k]) == pytest.approx(expected, rel=0.15)
+        assert np.mean(drawn[:, k]) == pytest.approx(model.p[k], abs=4.0 * expected / np.sqrt(n))

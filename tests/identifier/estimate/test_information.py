@@ -83,3 +83,18 @@ def test_errors_of_a_drives_own_are_marginal(told):
     there = np.linalg.solve(whole + held, vector)[:SIZE]
     again = np.linalg.solve(found.matrix + held[:SIZE, :SIZE], found.vector)
     assert again == pytest.approx(there, rel=1e-3, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"matrix": np.zeros((3, 3))}, "matrix must have shape"),
+        ({"vector": np.zeros(3)}, "vector must have shape"),
+        ({"vector": np.full(SIZE, np.nan)}, "not finite"),
+        ({"seconds": -1.0}, "must not be negative"),
+        ({"seconds": np.inf}, "must not be negative"),
+    ],
+)
+def test_what_is_no_information_is_refused(wrong, said):
+    with pytest.raises(ValueError, match=said):
+        replace(Information.nothing(), **wrong)

@@ -1,5 +1,6 @@
 """The estimate without v_y, by other roads: finite differences, dense algebra, planted truth."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -17,11 +18,13 @@ from identifier.estimate.latent import (
     learn_latent,
 )
 from identifier.estimate.model import FittedModel
-from identifier.estimate.nodes import Nodes
+from identifier.estimate.nodes import Nodes, _rolled, low_passed
 from identifier.estimate.priors import Priors
 from identifier.inertial import InertialIdentifier
+from identifier.motion.model import DAMPING
 from identifier.motion.nodes import LATENT_NAMES
 from identifier.verdict import judge_prediction
+from identifier.verdict.verdict import WITHOUT_V_Y
 from models.recordings import Recording, RecordingError
 from models.recordings.record import joined
 from tests.identifier.conftest import steered
@@ -123,6 +126,83 @@ def test_parameters_that_are_held_leave_their_doubt(problem, place):
         "ni,ij,nj->n", slopes_held[:, known], P[np.ix_(known, known)], slopes_held[:, known]
     ) + np.einsum("ni,ij,nj->n", slopes_held[:, held.free], P_held, slopes_held[:, held.free])
     np.testing.assert_allclose(told, free, rtol=1e-3)
+
+
+@pytest.mark.parametrize("size", [1.0, 0.1])
+def test_without_v_y_the_accelerometer_is_believed_by_the_size_of_the_car(size):
+    lengths = {"l_f": size * CAR.l_f, "l_r": size * CAR.l_r}
+    car = replace(CAR, **lengths, yaw_inertia=size**2 * CAR.yaw_inertia)
+    scale, beliefs = np.sqrt(car.wheelbase / 2.7), Priors.of(car)
+    for late, left in ((False, 0.0007), (True, 0.01 * scale)):
+        found = latent_priors(car, beliefs, late)
+        sd = dict(zip(LATENT_NAMES, np.diag(found.covariance) ** 0.5, strict=True))
+        told = [sd[name] for name in ("r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")]
+        expected = [0.002 / scale, 0.015, 0.04, left, 0.01 * car.wheelbase]
+        assert told == pytest.approx(expected)
+        assert found.mean[LATENT_NAMES.index("roll")] == pytest.approx(0.06)
+    held = {LATENT_NAMES[k] for k in np.flatnonzero(beliefs.moves) if not found.moves[k]}
+    assert held == {"ln_sway", "v_y_bias", "v_y_angle", "v_y_lever"}
+    assert sd["ln_inertia"] == pytest.approx(0.007)
+
+
+def test_it_begins_without_slip_at_the_rear_and_with_what_steering_leaves_at_the_front(problem):
+    z, p = problem.begin(stiffer=0.4)
+    v_x, delta, rear = *problem.nodes.given[:, :2].T, z[:, 0] - CAR.l_r * z[:, 1]
+    front = delta - np.arctan((z[:, 0] + CAR.l_f * z[:, 1]) / v_x)
+    np.testing.assert_allclose(rear, 0.0, atol=1e-12)
+    np.testing.assert_allclose(z[:, 2], front, atol=1e-12)
+    moved = p - problem.priors.mean
+    assert {LATENT_NAMES[k] for k in np.flatnonzero(moved)} == {"ln_stiffness_f", "ln_stiffness_r"}
+    assert moved.max() == pytest.approx(0.4)
+
+
+def test_noise_is_the_density_of_what_is_left_with_the_doubt_of_the_states(problem, place):
+    z, p, _ = place
+    shows = problem._run(problem._plain, z, p, {})["shows"]
+    nothing, rng = np.zeros((len(z), 8, 8)), np.random.default_rng(3)
+    slopes, R = np.ones((len(z), 2, 8)), problem.R
+    white = rng.standard_normal(shows.shape) * [0.02, 1.0]
+
+    def learnt(e, covariance=nothing):
+        other = copy(problem)
+        other.nodes = replace(problem.nodes, measured=shows + e)
+        return other.noise(z, p, covariance, slopes, R)
+
+    found = learnt(white)
+    np.testing.assert_allclose(found, [0.02**2, 1.0], rtol=0.6)
+    doubtful = nothing.copy()
+    doubtful[:, 0, 0] = 2.0
+    assert learnt(white, doubtful)[1] > found[1] + 1.5
+    slow = np.repeat(white[::6], 6, axis=0)[: len(white)]
+    assert learnt(slow)[1] > 2.0 * found[1], "what lasts is more than its variance"
+    np.testing.assert_allclose(learnt(1e-6 * white), 1e-10)
+
+
+def test_optima_are_compared_by_hubers_loss(problem, place):
+    z, p, _ = place
+    out, clip = problem._run(problem._plain, z, p, {}), TRUST.clip
+    off = np.abs(problem.nodes.measured - out["shows"]) / np.sqrt(problem.variance(problem.R))
+    assert (off > clip).any() and (off < clip).any()
+    huber = np.where(off > clip, clip * off - 0.5 * clip**2, 0.5 * off**2)
+    weights = problem.weights(z, p, problem.R)
+    rest = problem.cost(z, p, {**weights, "of_shows": np.zeros_like(off)})
+    on = problem.nodes.counts
+    assert problem.value(z, p, problem.R) == pytest.approx(rest + huber[on].sum())
+
+
+def test_a_low_pass_is_of_second_order_twice_and_a_body_sways_behind_a_y():
+    t = 0.01 * np.arange(4000)
+    for hertz, gain in ((1.0, 0.998), (5.0, 0.5), (10.0, 0.055)):  # of Butterworth's, squared
+        wave = np.sin(2.0 * np.pi * hertz * t)
+        passed = low_passed(wave, 5.0, 0.01)
+        assert np.std(passed[500:-500]) / np.std(wave) == pytest.approx(gain, abs=0.02)
+    omega = 9.0
+    rho, rate = _rolled(np.where(t > 1.0, 2.0, 0.0), omega, 0.01)
+    assert rho[99] == rate[99] == 0.0
+    assert rho[-1] == pytest.approx(2.0) and rho.max() == pytest.approx(2.7, abs=0.15)
+    np.testing.assert_allclose(rate[1:], np.diff(rho) / 0.01)
+    peak = t[np.argmax(rho)] - 1.0
+    assert peak == pytest.approx(np.pi / (omega * np.sqrt(1.0 - DAMPING**2)), abs=0.02)
 
 
 @pytest.fixture(scope="module")
@@ -234,6 +314,9 @@ def test_starts_part_only_where_both_explain_the_drive(problem, monkeypatch, wor
     monkeypatch.setattr(_Latent, "descend", lambda *given: (moved, p, best.cost + worse))
     found = learn_latent(problem.nodes, CAR, Priors.of(CAR))
     assert (found.parted > TRUST.parted) == parted
+    told = found.posterior
+    assert told.seconds == pytest.approx(problem.nodes.counts.sum() * problem.nodes.dt)
+    assert told.scale.tolist() == [1.0, 1.0] and told.cost == best.cost
 
 
 @pytest.mark.parametrize(("wider", "refused"), [(1.0, False), (400.0, True)])
@@ -241,8 +324,9 @@ def test_a_side_slip_that_is_hardly_known_judges_no_model(learnt, wider, refused
     doubtful = replace(learnt, covariance=wider * learnt.covariance)
     log = blind(driven(9), seed=4)
     shown = replace(log, v_y=doubtful.estimated_v_y(log).v_y, estimated=("v_y",))
-    codes = [one.code for one in judge_prediction(doubtful, shown).findings]
-    assert ("side_slip_unknown" in codes) == refused
+    verdict = judge_prediction(doubtful, shown)
+    assert ("side_slip_unknown" in [one.code for one in verdict.findings]) == refused
+    assert refused or verdict.blind == WITHOUT_V_Y
 
 
 def test_of_a_long_log_the_hardest_part_teaches():

@@ -9,6 +9,7 @@ from identifier.axle import AxleIdentifier
 from identifier.prediction import predict
 from identifier.run import identify
 from identifier.verdict import calibrated, judge_prediction, road_friction
+from identifier.verdict.friction import _mixed, filtered
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
 from models.plant import Plant
@@ -108,3 +109,73 @@ def test_the_verdict_of_a_prediction_names_the_road(tires, wetter, same):
     assert {one.code for one in slippery.findings if one.refuses} == {"force_missed"}
     assert "another_road" in [one.code for one in slippery.findings]
     assert "another_road" not in [one.code for one in judge_prediction(tires, same).findings]
+
+
+# The filter alone, on windows of a tire that is known.
+
+GRID = np.linspace(-0.9, 0.6, 16)
+GRID[np.argmin(np.abs(GRID))] = 0.0
+WINDOWS = 0.3 * np.arange(1, 61)
+SLIP = 0.1 * np.sin(1.3 * WINDOWS)
+
+
+def curve(slip, ln):
+    return np.exp(ln) * np.tanh(10.0 * slip / np.exp(ln))
+
+
+def told(ln, zero=0.0, noise=0.02, variance=None):
+    """What windows tell of a road of some friction, the slip of both axles off by a zero."""
+    rng = np.random.default_rng(1)
+    true = curve(SLIP, ln) + noise * rng.standard_normal(SLIP.size)
+    away = np.array([true - curve(SLIP - zero, each) for each in GRID])
+    slope = np.array([10.0 / np.cosh(10.0 * (SLIP - zero) / np.exp(each)) ** 2 for each in GRID])
+    both = [np.repeat(one[..., None], 2, axis=2) for one in (away, slope)]
+    return filtered(WINDOWS, GRID, *both, np.full((SLIP.size, 2), variance or noise**2))
+
+
+@pytest.mark.parametrize("ln", [-0.5, 0.0, 0.4])
+def test_the_filter_finds_the_friction_with_its_doubt(ln):
+    found = told(ln)
+    assert np.log(found.ratio[-1]) == pytest.approx(ln, abs=0.06)
+    assert found.another[-1] == pytest.approx(float(ln != 0.0), abs=0.01)
+    assert 0.1 / np.sqrt(12.0) <= found.sd[-1] < 0.06
+    assert found.unexplained[-1] < 0.01
+    assert found.unchanged == (ln == 0.0)
+    assert (found.t == WINDOWS).all() and len(found.roads) == (ln != 0.0)
+
+
+def test_a_zero_of_the_slip_is_found_for_each_friction():
+    found = told(0.0, zero=0.012)
+    assert found.another[-1] < 0.05 and found.roads == ()
+
+
+def test_what_tells_nothing_leaves_what_was_believed():
+    found = told(0.0, variance=1e4)
+    likely = np.exp(-0.5 * (GRID / 0.7) ** 2)
+    p = 0.5 * 0.98 * likely / likely.sum()
+    p[GRID == 0.0] += 0.5
+    of_friction = p / 0.99
+    mean = of_friction @ GRID
+    spread = np.sqrt(of_friction @ GRID**2 - mean**2)
+    cell = np.diff(GRID).max() / np.sqrt(12.0)
+    assert found.unexplained[0] == pytest.approx(0.01, rel=0.01)
+    assert found.another[0] == pytest.approx(p @ (np.abs(GRID) > 0.25), rel=0.01)
+    assert np.log(found.ratio[0]) == pytest.approx(mean, rel=0.02)
+    assert found.sd[0] == pytest.approx(np.hypot(spread, cell), rel=0.01)
+    assert found.another[-1] > found.another[0], "another road may have begun"
+
+
+def test_a_road_that_begins_takes_over_the_zeros_of_all():
+    """Mean and variance of the mixture of a road that goes on and one that begins."""
+    rng = np.random.default_rng(2)
+    p = np.append(rng.random(4), 0.3)
+    zero, doubt = rng.standard_normal((4, 2)), rng.random((4, 2))
+    stays = rng.random((4, 1))
+    new, wide = _mixed(p, zero, doubt, stays)
+    share = p[:-1] / p[:-1].sum()
+    for k in range(4):
+        weight = (1.0 - stays[k]) * share
+        weight[k] += stays[k, 0]
+        mean = weight @ zero
+        np.testing.assert_allclose(new[k], mean)
+        np.testing.assert_allclose(wide[k], weight @ (doubt + (zero - mean) ** 2))

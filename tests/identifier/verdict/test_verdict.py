@@ -16,7 +16,7 @@ from identifier.motion.parameters import INDEX
 from identifier.prediction import predict
 from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
-from identifier.verdict import judge, judge_prediction
+from identifier.verdict import calibrated, judge, judge_prediction
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer, Slalom, StepSteer
 from models.plant import Plant
@@ -153,7 +153,9 @@ def test_v_y_that_is_not_measured_is_noticed(drive, value):
 
 def test_a_drive_of_a_moment_is_too_short(drive):
     for end in (6.9, 9.0):
-        assert codes(judge(answer(drive.between(6.0, end)))) == {"too_short"}
+        run = answer(drive.between(6.0, end))
+        assert codes(judge(run)) == {"too_short"}
+        assert calibrated(run).model_error is None
 
 
 def test_each_learnt_number_holds_the_truth_within_its_doubt(good):
