@@ -40,8 +40,13 @@ _ROWS = (  # title, unit that is printed, per SI, of NUMBERS
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Day:
     """Errors of the sensors in one log.
-    value : of `NUMBERS`, SI, (5,).   covariance : with the tires held, (5, 5).
-    expected, usual : what was believed before the log, and its standard deviation, (5,).
+
+    Parameters
+    ----------
+    value : of `NUMBERS`, SI (5,).
+    covariance : of them with the tires held (5, 5).
+    expected : what was believed before the log (5,).
+    usual : standard deviations of that (5,).
     speed : at which is driven, median [m/s].
     anew : whether the log was long enough; else they are those of the identification drive.
     """
@@ -62,7 +67,12 @@ class Day:
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     def on(self, p: Array) -> Array:
-        """Return parameters of the forward model with these errors, (p,)."""
+        """Return parameters of the forward model with these errors, (p,).
+
+        Parameters
+        ----------
+        p : parameters (p,).
+        """
         moved = p.copy()
         moved[WHERE] = self.value
         return moved

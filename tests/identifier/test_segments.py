@@ -116,7 +116,7 @@ def test_a_step_that_judges_samples_must_tell_how_it_rests(name) -> None:
 
 
 def test_after_a_gap_a_frozen_model_starts_as_at_the_beginning(log, cut) -> None:
-    tire = ti.identify(log, CAR).freeze()
+    tire = ti.identify(log, CAR).freeze().held_on(cut)
     second = cut.taken(cut.segments[1])
     alone, together = tire.predict(second), tire.predict(cut)
     assert np.array_equal(together[cut.breaks[0] :], alone)

@@ -126,7 +126,8 @@ def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys, undrawn):
     log = read_recording(logs / "slalom.csv")
     tire = ti.identify(log, ti.sedan()).freeze(t=1.6)  # the slalom has just begun
     tire.save(tmp_path / "young.json")
-    summary, columns = predicted(tmp_path / "out", tmp_path / "young.json", logs / "quick.csv")
+    words = tmp_path / "young.json", logs / "quick.csv", "--accept"
+    summary, columns = predicted(tmp_path / "out", *words)
     beyond = np.mean(np.abs(columns["alpha_f_rad"]) > tire.known_slip[0])
     assert summary["beyond_known_slip"][0] == pytest.approx(beyond, abs=1e-3)
     assert beyond > 0.2

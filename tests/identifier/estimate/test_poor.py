@@ -134,7 +134,7 @@ def test_the_motion_between_values_is_that_of_dense_least_squares(log, late):
     short = joined([log.between(3.0, 3.4), log.between(6.0, 6.3)])
     n, dt, new = len(short), short.dt, np.append(np.arange(0, len(short) - 1, 3), len(short) - 1)
     s = _Sensor(0.03, late=late, noise=0.02, push=0.01, wanders=0.005)
-    v, residual, cost = _Kinematics(short, new).solved(s, 1.0)
+    v, residual, cost, _ = _Kinematics(short, new).solved(s, 1.0)
     (edge,) = short.breaks
     goes = [k for k in range(n - 1) if k + 1 != edge]
     felt, turned = short.a_y, short.a_y - short.v_x * short.r

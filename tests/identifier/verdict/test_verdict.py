@@ -217,7 +217,7 @@ def test_a_prediction_has_a_verdict_of_its_own(clean, drive):
     half = moved(model, ln_grip=np.log(0.5), ln_stiffness=np.log(0.5))
     verdict = judge_prediction(half, drive)
     assert codes(verdict) == {"force_missed"}
-    assert all(0.4 < missed < 0.6 for missed in verdict.measures["force_missed"])
+    assert all(0.2 < missed < 0.6 for missed in verdict.measures["force_missed"])
 
 
 def test_a_drive_without_force_at_one_axle_judges_the_other(clean):
