@@ -234,6 +234,11 @@ class TireModel(ABC):
         del recording
         return None
 
+    def days(self, recording: Recording) -> "tuple[tuple[int, Day], ...]":
+        """Return the same of each day of a log: its first sample, and the day; mostly one."""
+        del recording
+        return ()
+
     def held_on(self, recording: Recording) -> "TireModel":
         """Return the model as it reads the sensors of a log, to be asked about it many times."""
         del recording

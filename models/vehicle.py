@@ -228,7 +228,7 @@ class Vehicle:
     drive_front_share: float | None = None
     brake_front_share: float | None = None
     drag_area: float | None = None
-    center_of_gravity_sd: float | None = None
+    center_of_gravity_sd: float | None = field(default=None, compare=False)
     chassis: Chassis | None = None
     estimated: tuple[str, ...] = field(default=(), compare=False)
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from codegen.escape import visible
+from identifier.day import Day
 from identifier.measured import NOT_IDENTIFIABLE, printed_unit, with_doubt
 from identifier.tire_model import AXLES, Axle, TireModel, stored_verdict
 from identifier.verdict import Number, Verdict
@@ -72,22 +73,31 @@ def verdicts_text(verdicts: Mapping[str, Verdict], what: str) -> str:
     return "\n".join(lines)
 
 
+def days_of(model: TireModel, recordings: Iterable[Recording]) -> list[tuple[str, Day]]:
+    """Return the errors of the sensors of each log and day that are taken off, by its name."""
+    return [
+        (f"{one.name} from {one.t[first]:.4g} s on" if len(days) > 1 else one.name, day)
+        for one in recordings
+        for days in [model.days(one)]
+        for first, day in days
+    ]
+
+
 def sensors_text(model: TireModel, recordings: Iterable[Recording]) -> str:
-    """Return the errors of the sensors of each log that were taken off, a line each."""
-    days = {one.name: model.on(one) for one in recordings}
+    """Return the same, a line each."""
     return "\n".join(
-        f"sensors of {visible(name)}: {day.line}" for name, day in days.items() if day is not None
+        f"sensors of {visible(name)}: {day.line}" for name, day in days_of(model, recordings)
     )
 
 
 def sensors_section(model: TireModel, recordings: Iterable[Recording]) -> list[Section]:
     """Return the same as a section of a report; none of a model that finds none."""
-    days = {one.name: day for one in recordings if (day := model.on(one)) is not None}
+    days = days_of(model, recordings)
     if not days:
         return []
-    titles = list(dict.fromkeys(title for day in days.values() for title in day.words))
+    titles = list(dict.fromkeys(title for _, day in days for title in day.words))
     rows: list[list[Cell]] = [
-        [name, *(day.words.get(title, "") for title in titles)] for name, day in days.items()
+        [name, *(day.words.get(title, "") for title in titles)] for name, day in days
     ]
     caption = "Errors that were found from its motion with the tires held, and taken off."
     table = Table(caption=caption, header=["log", *titles], rows=rows)

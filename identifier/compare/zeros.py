@@ -23,7 +23,7 @@ _MEMORY = 1.0  # [s] for which it is alike
 
 def replayed(model: TireModel, recording: Recording) -> Array:
     """Return the axle forces of a log, errors of its sensors taken off (n, 2) [N]."""
-    if model.on(recording) is not None:
+    if model.days(recording):
         return model.predict(recording)
     return model.predict(zeros(model, recording).corrected(recording))
 

@@ -124,8 +124,8 @@ class FittedBand(Band):
 
     def on(self, recording: Recording) -> "FittedBand":
         """Return the band on a log: by the doubt of its sensors, and by what is missed of it."""
-        day, part = self.model.on(recording), portion(recording).recording
-        zeros = day.covariance[:3, :3]
+        part, days = portion(recording).recording, self.model.days(recording)
+        zeros = np.mean([day.covariance[:3, :3] for _, day in days], axis=0)
         found = evidence(self.model, part, road_push(part, self.model))
         if found is None or not (found.peak > 0.0).all():
             return replace(self, here=_Here(zeros, *self._missed))

@@ -16,7 +16,6 @@ from models.vehicle import Vehicle
 _STEERED = np.array([name.startswith("steering") for name in NUMBERS])
 _ZEROS = 3  # of NUMBERS, that change from day to day
 _ANOTHER = 30.0  # squared deviations of a segment's zeros from those of the whole: another day
-_MOST = 20  # segments that are asked
 _LONGEST = 600.0  # [s] of a log that are looked at: those of hardest cornering
 _LEAST_DOUBT = 0.02  # of what was identified, in standard deviations of the table
 
@@ -34,7 +33,8 @@ def day_of(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) 
     on = recording.v_x > SLOW * vehicle.froude_speed
     if recording.logged_v_y is None:
         value, P = taught * _STEERED, doubt * np.outer(_STEERED, _STEERED)
-        return of_day(value, P, taught, usual, recording.v_x[on], anew=False)
+        expected = taught * (np.array(NUMBERS) == "steering_gain")
+        return of_day(value, P, expected, usual, recording.v_x[on], anew=False)
     if np.count_nonzero(on) * recording.dt < ENOUGH:
         return of_day(taught, doubt, taught, usual, recording.v_x[on], anew=False)
     drive = Drive.of(recording, vehicle, hardest(recording, _LONGEST))
@@ -59,7 +59,7 @@ def day_of(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) 
 
 def days_of(
     recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
-) -> list[tuple[int, Day]]:
+) -> tuple[tuple[int, Day], ...]:
     """Return the days of a log: the first sample of each, and the day.
 
     Of several logs in a row each long segment is asked; where one differs clearly from the whole,
@@ -72,8 +72,8 @@ def days_of(
         for one in recording.segments
         if (moving[one.stop] - moving[one.start]) * recording.dt >= ENOUGH
     ]
-    if not (whole.anew and 1 < len(long) <= _MOST):
-        return [(0, whole)]
+    if not (whole.anew and len(long) > 1):
+        return ((0, whole),)
     each = [day_of(recording.taken(one), vehicle, p, covariance) for one in long]
     z, away = slice(0, _ZEROS), [one.value - whole.value for one in each]
     far = [
@@ -81,5 +81,5 @@ def days_of(
         for one, d in zip(each, away, strict=True)
     ]
     if not max(far) > _ANOTHER:
-        return [(0, whole)]
-    return list(zip([0, *(one.start for one in long[1:])], each, strict=True))
+        return ((0, whole),)
+    return tuple(zip([0, *(one.start for one in long[1:])], each, strict=True))

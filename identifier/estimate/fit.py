@@ -46,6 +46,7 @@ _SURELY = 3.0  # standard deviations that a play is then from none
 _REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
 _NOTHING_FITS = 0.15  # share of the force that tires of several logs miss, from which zeros of
 _MUCH_LESS = 0.7  # each are tried, and times what they must miss then
+_FORCELESS = 0.1  # static loads, rms, below which a log does not say
 _ZEROS = [INDEX[name] for name in CHANGES]
 Days: TypeAlias = Literal["found", "one", "each"]
 _LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of its model are not
@@ -53,7 +54,8 @@ _LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of i
 
 class _Fit(NamedTuple):
     """What logs taught: the model, the estimate behind it, and each block's own information.
-    parts : when blocks begin, by the clock of their first log [s], and what they alone tell.
+    parts : when blocks begin, by the clock of their first log [s], and what they alone tell,
+        zeros of a day of their own integrated out.
     """
 
     model: FittedModel
@@ -117,7 +119,8 @@ def fit(
         part = Information.about(
             found.p, found.slope, found.curvature, sd, here.slip, found.seconds
         )
-        known += part.of_one_day(sd[_ZEROS]) if days == "each" else part
+        part = part.of_one_day(sd[_ZEROS]) if days == "each" else part
+        known += part
         parts.append((drives[0].begin, part))
         went_on(sum(len(one.signals) * one.dt for one in drives))
     beliefs = before if found is None else _after(before, found)
@@ -149,9 +152,9 @@ def fit(
         loose = fit(recordings, vehicle, before.with_play(), block=block, coarse=coarse, days=days)
         if loose.posterior.p[_PLAY] > _SURELY * loose.posterior.sd(NAMES[_PLAY]):
             return loose
-    alike = len({one.dt for one in measured}) == 1
-    if days == "found" and alike and sum(len(_alone(one)) for one in measured) > 1:
-        apart = len(days_of(joined(measured), vehicle, model.p, model.covariance)) > 1
+    if days == "found" and sum(len(_alone(one)) for one in measured) > 1:
+        apart = len({one.dt for one in measured}) == 1
+        apart = apart and len(days_of(joined(measured), vehicle, model.p, model.covariance)) > 1
         share = 0.0 if apart else _missed(measured, model)
         if apart or share > _NOTHING_FITS:  # then tires tell no zeros apart
             each = fit(recordings, vehicle, priors, block=block, coarse=coarse, days="each")
@@ -168,7 +171,7 @@ def _missed(recordings: Sequence[Recording], model: FittedModel) -> float:
         e = simulate(drive, model.on(one).on(model.p), model.vehicle)["residual"][drive.counts]
         v_x, r = drive.signals[drive.counts][:, [0, 2]].T
         rms = float(np.sqrt(np.mean((v_x * r / GRAVITY) ** 2))) if v_x.size else 0.0
-        if rms > 0.0:
+        if rms > _FORCELESS:
             shares.append(float(np.sqrt(np.mean(e**2, axis=0)).max()) / rms)
     return max(shares)
 

@@ -52,7 +52,8 @@ class FittedModel(TireModel):
     reach : what the identification drives reached.
     model_error : share of the measured force that it misses of them, (2,); None where not
         computed.
-    day : errors of the sensors that are held for every log; None finds them anew for each.
+    held : errors of the sensors for every log: of each day its first sample, and the day; None
+        finds them anew for each log.
     """
 
     kind = "fit"
@@ -63,7 +64,7 @@ class FittedModel(TireModel):
     covariance: Array
     reach: Reach
     model_error: Array | None = None
-    day: Day | None = None
+    held: tuple[tuple[int, Day], ...] | None = None
 
     def __post_init__(self) -> None:
         numbers = (self.p, self.covariance, *self.reach[:5])
@@ -172,24 +173,26 @@ class FittedModel(TireModel):
 
     def on(self, recording: Recording) -> Day:
         """Return the errors of a log's sensors, found from its motion with the tires held."""
-        if self.day is not None:
-            return self.day
+        if self.held is not None:
+            return self.held[0][1]
         day = self._known(recording, day_of)
         if recording.logged_v_y is not None or recording.a_y is None:
             return day
         return day.steered(*self.estimated_v_y(recording.as_logged()).steering_zero)
 
-    def _days(self, recording: Recording) -> list[tuple[int, Day]]:
-        if self.day is not None or not recording.breaks:
-            return [(0, self.on(recording))]
+    def days(self, recording: Recording) -> tuple[tuple[int, Day], ...]:
+        if self.held is not None:
+            return self.held
+        if not recording.breaks or recording.logged_v_y is None:
+            return ((0, self.on(recording)),)
         return self._known(recording, days_of)
 
     def of_day(self, day: Day) -> Self:
         """Return the tires read by sensors with these errors: every log, the tracker, C."""
-        return replace(self, p=day.on(self.p), day=day)
+        return replace(self, p=day.on(self.p), held=((0, day),))
 
     def held_on(self, recording: Recording) -> Self:
-        return self.of_day(self.on(recording))
+        return replace(self.of_day(self.on(recording)), held=self.days(recording))
 
     def estimated_v_y(self, recording: Recording) -> LateralVelocity:
         """Return the v_y of a drive whose sensors show none, smoothed on these tires.
@@ -217,7 +220,7 @@ class FittedModel(TireModel):
 
     def _over(self, recording: Recording) -> tuple[Array, Array]:
         force, slip = large((len(recording), 2)), large((len(recording), 2))
-        firsts, days = zip(*self._days(recording), strict=True)
+        firsts, days = zip(*self.days(recording), strict=True)
         for segment in recording.segments:
             k = int(np.searchsorted(firsts, segment.start, side="right")) - 1
             p = days[k].on(self.p)
@@ -331,4 +334,4 @@ class FittedModel(TireModel):
 
 
 # A run, its verdict and its report ask about the same drive: the last few answers are kept.
-_LAST: deque[tuple[tuple[Any, ...], tuple[Any, ...], Any]] = deque(maxlen=8)
+_LAST: deque[tuple[tuple[Any, ...], tuple[Any, ...], Any]] = deque(maxlen=32)

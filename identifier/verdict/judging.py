@@ -350,9 +350,11 @@ def _unobserved(evaluated: _Evaluated) -> Iterator[Objection]:
 
 
 def _sensors(evaluated: _Evaluated) -> Iterator[Objection]:
-    day = evaluated.model.on(evaluated.recording)
-    for code, text in () if day is None else day.notes:
-        yield Objection(code, None, text, False)
+    days = evaluated.model.days(evaluated.recording)
+    for first, day in days:
+        begin = f"from {evaluated.recording.t[first]:.4g} s on: " if len(days) > 1 else ""
+        for code, text in day.notes:
+            yield Objection(code, None, f"{begin}{text}", False)
 
 
 def _roads(found: RoadFriction | None) -> list[Objection]:

@@ -241,14 +241,12 @@ def frozen_tires(
     options: argparse.Namespace, labels: Sequence[str], conditions: driving.Conditions
 ) -> tuple[str, TireModel | None]:
     """Return where frozen tires come from, and the model where one is needed."""
-    setup = conditions.setup
+    setup, stored = conditions.setup, shared.model_of_day(options)
     if not {driving.FROZEN, driving.LEARNING} & set(labels):
         return "no tires were identified", None
-    if options.weights is not None:
-        model = shared.model_of_day(options)
-        assert model is not None
-        _require_its_car(options, model.vehicle, setup)
-        return f"frozen ones from {options.weights}", model
+    if stored is not None:
+        _require_its_car(options, stored.vehicle, setup)
+        return f"frozen ones from {options.weights}", stored
     law, method = shared.chosen_method(options, setup.vehicle)
     recording = learning_drive(
         setup.car(open_field=True),

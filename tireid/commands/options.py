@@ -31,6 +31,7 @@ from models.recordings.reader import map_of, with_columns
 from models.schema import require_few
 from models.vehicle import Vehicle, sedan
 from tireid.commands import DONE, NOT_VALID
+from tireid.learning import with_v_y
 from tireid.progress import say
 from tireid.verdicts import warn_of_stored
 
@@ -135,7 +136,8 @@ def model_of_day(options: argparse.Namespace) -> TireModel | None:
     if model is None:
         raise ValueError("--day is of a stored model: give --weights, too")
     path, named = split_log_argument(options.day)
-    log = read_recording(path, run=named)
+    log = with_v_y(read_recording(path, run=named), model)
+    say(f"read {log.name}: {log.t.size} samples, {log.duration:.1f} s")
     day = model.on(log)
     if day is None:
         raise ValueError(f"--day is for tires of a fit, {options.weights} is a {model.kind}")

@@ -71,6 +71,9 @@ def test_logs_of_different_days_have_zeros_of_their_own():
     away = [np.abs(each.force(slip) / clean.force(slip) - 1.0).max() for each in (apart, one)]
     assert away[0] < 0.08 < away[1]
     together = joined(logs)
+    assert len(apart.days(together)) == 2 and apart.days(logs[0])[0][0] == 0
+    held = apart.held_on(together)
+    np.testing.assert_array_equal(held.predict(together), apart.predict(together))
     forces = apart.predict(together)
     error = np.sqrt(np.mean((forces - together.axle_force) ** 2, axis=0))
     assert (error < 0.08 * np.sqrt(np.mean(together.axle_force**2, axis=0))).all()
@@ -84,6 +87,17 @@ def test_without_v_y_a_zero_of_the_steering_is_found_and_no_error_of_v_y_is_take
     day = model.on(replace(blind, v_y=model.estimated_v_y(blind).v_y, estimated=("v_y",)))
     assert day["v_y_bias"] == day["v_y_angle"] == day["v_y_lever"] == 0.0
     assert day["steering_zero"] == pytest.approx(ZERO, abs=0.006)
+
+
+def test_segments_without_v_y_are_read_with_the_zero_that_is_found(tire):
+    logs = []
+    for seed in (5, 6):
+        shown = of_another_day(driven(seed))
+        a_y = smooth(np.gradient(driven(seed).v_y, shown.dt) + shown.v_x * shown.r)
+        logs.append(replace(shown, v_y=None, a_y=a_y))
+    blind = joined(logs)
+    blind = replace(blind, v_y=tire.estimated_v_y(blind).v_y, estimated=("v_y",))
+    assert share_missed(tire, blind).max() < 0.1
 
 
 def test_the_tracker_reads_the_sensors_of_a_day(tire):
