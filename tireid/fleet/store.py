@@ -196,11 +196,25 @@ class Store:
         """
         pyarrow, dataset = needed("pyarrow"), needed("pyarrow.dataset")
         fs, files = self._place[0], self.files() if files is None else files
-        # Threads of pyarrow's may outlive Python, and must hold nothing of Python's then.
-        place = pyarrow.fs.LocalFileSystem() if "file" in protocols(fs) else fs
+
+        def batches() -> Iterator[Any]:
+            """Threads of pyarrow's may outlive Python, and must hold nothing of Python's then."""
+            if "file" in protocols(fs):
+                local = pyarrow.fs.LocalFileSystem()
+                rows = dataset.dataset(files, schema=schema(), format="parquet", filesystem=local)
+                yield from rows.to_batches(list(columns), batch_size=BATCH, use_threads=False)
+                return
+            for name in files:
+                with fs.open(name, "rb") as opened:  # read at once, by this thread
+                    whole = pyarrow.BufferReader(opened.read())
+                yield from (
+                    needed("pyarrow.parquet")
+                    .ParquetFile(whole)
+                    .iter_batches(BATCH, columns=list(columns), use_threads=False)
+                )
+
         try:
-            rows = dataset.dataset(files, schema=schema(), format="parquet", filesystem=place)
-            for batch in rows.to_batches(list(columns), batch_size=BATCH, use_threads=False):
+            for batch in batches():
                 for row in batch.to_pylist():
                     if row["version"] != VERSION:
                         raise StoreError(
