@@ -252,6 +252,11 @@ class Band(ABC):
         speed = np.maximum(recording.v_x, self.model.min_speed)
         return self.along(self.model.lagged_slip(recording), speed, level)
 
+    def on(self, recording: Recording) -> "Band":
+        """Return the band of a log: with what is missed of it, where that is in the width."""
+        del recording
+        return self
+
     def over(self, recording: Recording, level: float = LEVEL) -> Array:
         """Return half its width around the predicted forces of a drive, (n, 2) [N].
 
@@ -263,7 +268,7 @@ class Band(ABC):
         level : share of samples that it shall hold, above 0 and below 1.
         """
         moving = recording.v_x[:, None] >= self.model.min_speed
-        return np.where(moving, self.of_curves(recording, level), 0.0)
+        return np.where(moving, self.on(recording).of_curves(recording, level), 0.0)
 
     def slope_over(self, recording: Recording) -> Array:
         """Return the slope of the curves over the slip of a drive [static loads/rad], (n, 2)."""

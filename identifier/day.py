@@ -28,6 +28,7 @@ _SIDEWAYS = 0.0045  # [rad] of b/v + β that is noted, and
 _SURELY = 5.0  # its standard deviations: 0 of 46 simulated logs, 32 of 32 planted errors
 _APART = 0.7  # of the prior's, up to which bias and angle of v_y are told apart
 
+ONE_SPEED = ": a bias, or its sensor is turned; one speed cannot tell"
 _ROWS = (  # title, unit that is printed, per SI, of NUMBERS
     ("zero of the steering", "°", math.degrees(1.0)),
     ("bias of v_y", " m/s", 1.0),
@@ -57,6 +58,32 @@ class Day:
     usual: Array
     speed: float
     anew: bool
+
+    @classmethod
+    def of(
+        cls,
+        value: Array,
+        covariance: Array,
+        believed: tuple[Array, Array],
+        v_x: Array,
+        *,
+        anew: bool,
+    ) -> "Day":
+        """Return a day of a log; the others as of the fields.
+
+        Parameters
+        ----------
+        value : (5,).
+        covariance : (5, 5).
+        believed : `expected` and `usual`, (5,) each.
+        v_x : speeds that count [m/s], (n,).
+        """
+        speed = float(np.median(v_x)) if v_x.size else 1.0
+        expected, usual = believed
+        return cls(
+            value=value, covariance=covariance, expected=expected, usual=usual,
+            speed=max(speed, 1e-3), anew=anew,
+        )  # fmt: skip
 
     def __getitem__(self, name: str) -> float:
         return float(self.value[NUMBERS.index(name)])
@@ -138,7 +165,7 @@ class Day:
         if (self.sd[where] < _APART * self.usual[where]).all():
             known = ", ".join(f"{_ROWS[k][0]} {self.words[_ROWS[k][0]]}" for k in (b, beta))
             return f"{text}: {known}; the forces allow for it"
-        return f"{text}: a bias, or its sensor is turned; one speed cannot tell"
+        return f"{text}{ONE_SPEED}"
 
 
 def sideways(errors: Array, covariance: Array, speed: float) -> str:
@@ -165,15 +192,6 @@ def corrected(recording: Recording, value: Array) -> Recording:
     given = (recording.v_x, still if v_y is None else v_y, recording.r, recording.delta_f)
     _, true_v_y, _, delta = true_signals((*given, 0.0, 0.0, 0.0), p)
     return replace(recording, delta_f=delta, v_y=recording.v_y if v_y is None else true_v_y)
-
-
-def of_day(
-    value: Array, covariance: Array, expected: Array, usual: Array, v_x: Array, *, anew: bool
-) -> Day:
-    """Return a day of a log.   v_x : speeds that count [m/s]; the others as of `Day`."""
-    speed = float(np.median(v_x)) if v_x.size else 1.0
-    return Day(value=value, covariance=covariance, expected=expected, usual=usual,
-               speed=max(speed, 1e-3), anew=anew)  # fmt: skip
 
 
 def usual_errors(vehicle: Vehicle) -> Array:

@@ -27,6 +27,7 @@ from identifier.measured import NOT_IDENTIFIABLE, printed_unit, printed_value
 from identifier.setup import Setup
 from models.files import write_atomically
 from models.recordings import Recording
+from models.recordings.portion import Portion
 from models.schema import Table, read_json
 from models.vehicle import Vehicle
 
@@ -239,9 +240,14 @@ class TireModel(ABC):
         del recording
         return ()
 
-    def held_on(self, recording: Recording) -> "TireModel":
-        """Return the model as it reads the sensors of a log, to be asked about it many times."""
-        del recording
+    def held_on(self, recording: Recording, part: Portion | None = None) -> "TireModel":
+        """Return the model as it reads the sensors of a log, to be asked about it many times.
+
+        Parameters
+        ----------
+        part : of the log, that it will be asked about; None is the whole.
+        """
+        del recording, part
         return self
 
     def mounted_on(self, vehicle: Vehicle) -> "TireModel":

@@ -43,7 +43,7 @@ from tireid.output import (
     write_long_csv,
 )
 from tireid.progress import Progress, say
-from tireid.verdicts import days_of
+from tireid.verdicts import named_days
 
 _OBSERVED = "xi_tilde"  # the output of a method that learns from the error of an observer
 _ESTIMATED = {  # columns of forces.csv by the outputs of methods that estimate v_y
@@ -165,7 +165,7 @@ class Results:
             }
 
         split = of_frozen("reproduction")
-        sensors = {name: day.to_dict() for name, day in days_of(self.model, self.drives)}
+        sensors = {name: day.to_dict() for name, day in named_days(self.model, self.drives)}
         return {
             "verdict": self.verdict.to_dict(),
             **({"sensors": sensors} if sensors else {}),

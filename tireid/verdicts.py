@@ -73,7 +73,7 @@ def verdicts_text(verdicts: Mapping[str, Verdict], what: str) -> str:
     return "\n".join(lines)
 
 
-def days_of(model: TireModel, recordings: Iterable[Recording]) -> list[tuple[str, Day]]:
+def named_days(model: TireModel, recordings: Iterable[Recording]) -> list[tuple[str, Day]]:
     """Return the errors of the sensors of each log and day that are taken off, by its name."""
     return [
         (f"{one.name} from {one.t[first]:.4g} s on" if len(days) > 1 else one.name, day)
@@ -86,13 +86,13 @@ def days_of(model: TireModel, recordings: Iterable[Recording]) -> list[tuple[str
 def sensors_text(model: TireModel, recordings: Iterable[Recording]) -> str:
     """Return the same, a line each."""
     return "\n".join(
-        f"sensors of {visible(name)}: {day.line}" for name, day in days_of(model, recordings)
+        f"sensors of {visible(name)}: {day.line}" for name, day in named_days(model, recordings)
     )
 
 
 def sensors_section(model: TireModel, recordings: Iterable[Recording]) -> list[Section]:
     """Return the same as a section of a report; none of a model that finds none."""
-    days = days_of(model, recordings)
+    days = named_days(model, recordings)
     if not days:
         return []
     titles = list(dict.fromkeys(title for _, day in days for title in day.words))

@@ -7,7 +7,7 @@ the numbers of `identifier.day`, so that a comparison is one of tires.
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.day import ENOUGH, NUMBERS, WHERE, Day, corrected, of_day
+from identifier.day import ENOUGH, NUMBERS, WHERE, Day, corrected
 from identifier.estimate.priors import Priors
 from identifier.evidence import brisk_from, brisk_windows, measured_force
 from identifier.tire_model import TireModel
@@ -68,4 +68,4 @@ def zeros(model: TireModel, recording: Recording) -> Day:
             if (np.abs(step) < 0.02 * sd).all():
                 break
     driven = part.v_x[part.v_x >= slowest]
-    return of_day(value, P, np.zeros(len(NUMBERS)), sd, driven, anew=enough)
+    return Day.of(value, P, (np.zeros(len(NUMBERS)), sd), driven, anew=enough)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.day import sideways
+from identifier.day import ONE_SPEED, sideways
 from identifier.doctor.accelerometer import OF_A_Y, Accelerometer, Line, descended
 from identifier.doctor.finding import Finding
 from identifier.doctor.pieces import segments_of
@@ -489,7 +489,7 @@ def _sideways(search: Search, post: Posterior) -> Iterator[Finding]:
     if text := sideways(post.p[where], P, speed):
         yield Finding(
             code="v_y_reads", channel="v_y", confidence=0.9, note=True,
-            text=f"{text}: a bias, or its sensor is turned; one speed cannot tell",
+            text=f"{text}{ONE_SPEED}",
         )  # fmt: skip
 
 

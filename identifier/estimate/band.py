@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.band import LARGEST_SD, LEVEL, Band, BandSpread
+from identifier.band import LARGEST_SD, Band, BandSpread
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import ERROR_SIZE
 from identifier.evidence import evidence, road_push
@@ -124,16 +124,14 @@ class FittedBand(Band):
 
     def on(self, recording: Recording) -> "FittedBand":
         """Return the band on a log: by the doubt of its sensors, and by what is missed of it."""
-        part, days = portion(recording).recording, self.model.days(recording)
+        part, days = portion(recording), self.model.days(recording)
         zeros = np.mean([day.covariance[:3, :3] for _, day in days], axis=0)
-        found = evidence(self.model, part, road_push(part, self.model))
+        model = self.model.held_on(recording, part)
+        found = evidence(model, part.recording, road_push(part.recording, model))
         if found is None or not (found.peak > 0.0).all():
             return replace(self, here=_Here(zeros, *self._missed))
         error = _HERE * found.model_error
         return replace(self, here=_Here(zeros, _STILL * error * found.force, _WITH_FORCE * error))
-
-    def over(self, recording: Recording, level: float = LEVEL) -> Array:
-        return super(FittedBand, self.on(recording)).over(recording, level)
 
     def _error_at(self, force: float) -> Array:
         """Return that error over a force [static loads], (2,)."""
@@ -180,8 +178,6 @@ class FittedBand(Band):
         _, prior = Priors.of(self.model.vehicle).around(self.model.p)
         less = prior[k, k] - 1.0 / _TYPED_RATIO**2
         left = max(1.0 - less * P[k, k], P[k, k] / _TYPED_RATIO**2)
-        if not left > 0.0:  # the ratio did not move
-            return self, np.zeros_like(self.model.p)
         opened = P + np.outer(P[k], P[k]) * less / left
         held = opened[k] * less * self.model.p[k]
         return FittedBand(replace(self.model, covariance=opened)), held

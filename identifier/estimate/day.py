@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.day import ENOUGH, INSTALLED, NUMBERS, WHERE, Day, of_day, usual_errors
+from identifier.day import ENOUGH, INSTALLED, NUMBERS, WHERE, Day, usual_errors
 from identifier.estimate.drive import SLOW, Drive, hardest
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import estimate
@@ -34,9 +34,9 @@ def day_of(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) 
     if recording.logged_v_y is None:
         value, P = taught * _STEERED, doubt * np.outer(_STEERED, _STEERED)
         expected = taught * (np.array(NUMBERS) == "steering_gain")
-        return of_day(value, P, expected, usual, recording.v_x[on], anew=False)
+        return Day.of(value, P, (expected, usual), recording.v_x[on], anew=False)
     if np.count_nonzero(on) * recording.dt < ENOUGH:
-        return of_day(taught, doubt, taught, usual, recording.v_x[on], anew=False)
+        return Day.of(taught, doubt, (taught, usual), recording.v_x[on], anew=False)
     drive = Drive.of(recording, vehicle, hardest(recording, _LONGEST))
     v_x = drive.signals[drive.counts, 0]
     mean, moves = p.copy(), np.zeros(p.size, dtype=bool)
@@ -54,7 +54,7 @@ def day_of(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) 
     held = replace(table, mean=mean, information=information, moves=moves)
     found = estimate([drive], vehicle, held)
     P = found.covariance[np.ix_(WHERE, WHERE)]
-    return of_day(found.p[WHERE], P, mean[WHERE], usual, v_x, anew=True)
+    return Day.of(found.p[WHERE], P, (mean[WHERE], usual), v_x, anew=True)
 
 
 def days_of(

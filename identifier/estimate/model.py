@@ -36,6 +36,7 @@ from identifier.motion.parameters import INDEX, NAMES, curve_index
 from identifier.setup import Setup
 from identifier.tire_model import Drives, Estimate, Fact, TireModel
 from models.recordings import Recording
+from models.recordings.portion import Portion
 from models.rules import require_positive
 from models.schema import Table
 from models.vehicle import DOWNFORCE_SPEED, Vehicle, load_ratio
@@ -191,8 +192,11 @@ class FittedModel(TireModel):
         """Return the tires read by sensors with these errors: every log, the tracker, C."""
         return replace(self, p=day.on(self.p), held=((0, day),))
 
-    def held_on(self, recording: Recording) -> Self:
-        return replace(self.of_day(self.on(recording)), held=self.days(recording))
+    def held_on(self, recording: Recording, part: Portion | None = None) -> Self:
+        days = self.days(recording)
+        if part is not None:
+            days = tuple((part.place(first), day) for first, day in days)
+        return replace(self, held=days)
 
     def estimated_v_y(self, recording: Recording) -> LateralVelocity:
         """Return the v_y of a drive whose sensors show none, smoothed on these tires.

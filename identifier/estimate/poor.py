@@ -86,8 +86,9 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
             return recording  # a_y does not show this motion
         delay = _doubt_of_delay(problem, sensor)
     weights, whole = np.ones(len(new)), _Kinematics(recording, new)
-    for _ in range(_AGAIN):
-        found, misses, _, each = whole.solved(sensor, weights, asked=_ASKED)
+    for k in range(_AGAIN):
+        asked = _ASKED if k == _AGAIN - 1 and recording.a_y is not None else 0
+        found, misses, _, each = whole.solved(sensor, weights, asked=asked)
         weights = np.minimum(1.0, _CLIP * sensor.noise / np.maximum(np.abs(misses), 1e-12))
     found.setflags(write=False)
     alone = recording.a_y is None

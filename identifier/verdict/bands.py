@@ -54,11 +54,13 @@ def within_band(model: TireModel, recording: Recording, level: float = LEVEL) ->
     White noise of the sensors is added to the band. None where the model has none, or too little
     is driven.
     """
-    recording = portion(recording).recording
-    found = evidence(model, recording)
+    part = portion(recording)
+    model = model.held_on(recording, part)
+    found = evidence(model, part.recording)
     if found is None or model.band is None:
         return None
-    half = model.band.of_curves(recording, level) / np.array(model.vehicle.axle_loads)
+    band = model.band.on(part.recording)
+    half = band.of_curves(part.recording, level) / np.array(model.vehicle.axle_loads)
     noise = normal_quantile(level) ** 2 * found.noise
     wide = np.sqrt(found.windows.mean(half) ** 2 + noise)
     share: Array = np.mean(np.abs(found.measured - found.modelled) <= wide, axis=0)

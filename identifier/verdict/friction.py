@@ -118,7 +118,7 @@ def road_friction(
         [weights]; None where nobody knows of it.
     """
     part = portion(recording)
-    model = model.held_on(part.recording)
+    model = model.held_on(recording, part)
     band, found = model.band, evidence(model, part.recording, road)
     if band is None or not band.calibrated or found is None:
         return None

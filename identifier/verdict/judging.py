@@ -166,6 +166,7 @@ def _evaluated(
 ) -> _Evaluated | None:
     """Return what is judged; None where too little is driven."""
     part = portion(recording) if frozen is None else portion(recording, frozen)
+    model = model.held_on(recording, part)
     found = evidence(model, part.recording, road_push(part.recording, model))
     if taught and found is not None:
         other = model.drives.road_differs(recording.t[part.samples])

@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from identifier.estimate.model import FittedModel
 from identifier.method import Method
 from identifier.methods import (
     DEFAULT,
@@ -32,7 +33,7 @@ from models.schema import require_few
 from models.vehicle import Vehicle, sedan
 from tireid.commands import DONE, NOT_VALID
 from tireid.learning import with_v_y
-from tireid.progress import say
+from tireid.progress import complain, say
 from tireid.verdicts import warn_of_stored
 
 
@@ -135,14 +136,16 @@ def model_of_day(options: argparse.Namespace) -> TireModel | None:
         return model
     if model is None:
         raise ValueError("--day is of a stored model: give --weights, too")
+    if not isinstance(model, FittedModel):
+        raise ValueError(f"--day is for tires of a fit, {options.weights} is a {model.kind}")
     path, named = split_log_argument(options.day)
     log = with_v_y(read_recording(path, run=named), model)
     say(f"read {log.name}: {log.t.size} samples, {log.duration:.1f} s")
     day = model.on(log)
-    if day is None:
-        raise ValueError(f"--day is for tires of a fit, {options.weights} is a {model.kind}")
+    if not day.anew:
+        complain(f"{log.name}: too short for its sensors, those of the identification drive stay")
     say(f"sensors of {log.name}: {day.line}")
-    return model.held_on(log)
+    return model.of_day(day)
 
 
 def require_toml(path: Path) -> None:

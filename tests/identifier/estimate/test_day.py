@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identifier.compare.zeros import replayed, zeros
-from identifier.day import NUMBERS, Day, of_day, sideways
+from identifier.day import NUMBERS, Day, sideways
 from identifier.doctor import diagnose
 from identifier.estimate.fit import fit
 from identifier.measured import with_doubt
@@ -15,6 +15,7 @@ from identifier.motion.parameters import INDEX, NAMES
 from identifier.prediction import predict
 from identifier.run import identify
 from models.recordings import joined
+from models.recordings.portion import Portion
 from models.vehicle import Vehicle, sedan
 from mpc.tires import prediction_tire
 from tests.identifier.estimate.conftest import driven
@@ -98,6 +99,16 @@ def test_segments_without_v_y_are_read_with_the_zero_that_is_found(tire):
     blind = joined(logs)
     blind = replace(blind, v_y=tire.estimated_v_y(blind).v_y, estimated=("v_y",))
     assert share_missed(tire, blind).max() < 0.1
+
+
+def test_parts_of_a_long_log_are_read_with_the_zeros_of_the_whole(tire, monkeypatch):
+    days = joined([of_another_day(driven(5)), of_another_day(driven(6), -1.0)])
+    part = Portion(days.taken(np.r_[500:1900, 2500:3900]), np.r_[500:1900, 2500:3900])
+    (a, _), (b, other) = tire.held_on(days, part).days(part.recording)
+    assert (a, b) == (0, part.place(tire.days(days)[1][0])) and other is tire.days(days)[1][1]
+    held = tire.held_on(days, part)
+    monkeypatch.setattr("identifier.estimate.model.days_of", None)  # asked no more
+    assert share_missed(held, part.recording).max() < 0.1
 
 
 def test_the_tracker_reads_the_sensors_of_a_day(tire):
@@ -225,5 +236,6 @@ def test_at_one_speed_bias_and_angle_are_one_error_and_told_apart_where_they_dif
     of_two = np.array([[0.04, -0.00199], [-0.00199, 1e-4]])  # bias and angle make up for each other
     assert sideways(np.array([0.2, 0.0]), of_two, 20.0)
     assert not sideways(np.array([0.2, 0.0]), np.diag(np.diag(of_two)), 20.0)
-    assert of_day(*np.zeros((4, 5)), np.array([1.0, 30.0, 20.0]), anew=True).speed == 20.0
-    assert of_day(*np.zeros((4, 5)), np.zeros(0), anew=True).speed == 1.0
+    still = np.zeros(5), np.zeros((5, 5)), (np.zeros(5), np.zeros(5))
+    assert Day.of(*still, np.array([1.0, 30.0, 20.0]), anew=True).speed == 20.0
+    assert Day.of(*still, np.zeros(0), anew=True).speed == 1.0
