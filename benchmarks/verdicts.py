@@ -99,12 +99,12 @@ def plant_answers(job: tuple[str, int]) -> list[Judged]:
         if fate == 1:
             make = partial(random_beginning, str(rng.choice(BEGINNINGS)))
         drive = drawn(kind, seed, make, k)
-        told = drive.car.told
-        case = random_case(told, rng) if fate == 2 else Case()
+        declared_one = drive.car.told
+        case = random_case(declared_one, rng) if fate == 2 else Case()
         log = drive.log(rng)
         judged = drive.cornering(log) if fate == 1 else drive.exact
         what = str(case) if fate != 1 else f"beginning: {drive.beginning.kind}"
-        result = answer(case.log(log), case.car(told), case.judged(judged))
+        result = answer(case.log(log), case.car(declared_one), case.judged(judged))
         found.append(Judged(kind, seed, what, result))
     return found
 
@@ -309,8 +309,8 @@ def pair_answers(job: tuple[Pair, bool]) -> list[Judged]:
         found.append(judged(next(one for one in GROUPS if what.startswith(one)), change(tire)))
     for share in CENTER:
         moved = share * car.wheelbase
-        told = replace(car, l_f=car.l_f + moved, l_r=car.l_r - moved)
-        found.append(judged("center of gravity", taught(log, told)))
+        declared_one = replace(car, l_f=car.l_f + moved, l_r=car.l_r - moved)
+        found.append(judged("center of gravity", taught(log, declared_one)))
     for ratio in RATIOS:
         tire = taught(replace(log, delta_f=ratio * log.delta_f), car)
         alike = replace(asked, delta_f=ratio * asked.delta_f)

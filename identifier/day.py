@@ -26,7 +26,7 @@ ENOUGH = 15.0  # [s] of driving: 10 s, left turns only, made three times the err
 _FAR = 3.0  # standard deviations of what is expected, beyond which a number is noted
 _SIDEWAYS = 0.0045  # [rad] of b/v + β that is noted, and
 _SURELY = 5.0  # its standard deviations: 0 of 46 simulated logs, 32 of 32 planted errors
-_APART = 0.7  # of the prior's, up to which bias and angle of v_y are told apart
+_APART = 0.7  # of the prior's, up to which bias and angle of v_y are apart
 
 ONE_SPEED = ": a bias, or its sensor is turned; one speed cannot tell"
 _ROWS = (  # title, unit that is printed, per SI, of NUMBERS

@@ -35,8 +35,8 @@ def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
     numbers = {key: getattr(vehicle, key) for key in VEHICLE_KEYS}
     if vehicle.has_downforce:
         numbers |= {key: getattr(vehicle, key) for key in AREAS}
-    told = (*LENGTHWISE, "center_of_gravity_sd")
-    given = {key: value for key in told if (value := getattr(vehicle, key)) is not None}
+    declared = (*LENGTHWISE, "center_of_gravity_sd")
+    given = {key: value for key in declared if (value := getattr(vehicle, key)) is not None}
     return numbers | given | ({"estimated": list(vehicle.estimated)} if vehicle.estimated else {})
 
 

@@ -171,9 +171,9 @@ def test_a_road_pushes_by_what_the_accelerometer_does_not_show():
     )
     assert road_push(replace(driven, a_y=None), model) is None
     blind = replace(driven, v_y=None)
-    for told in (None, SimpleNamespace(beside=fall)):
-        tires = SimpleNamespace(vehicle=CAR, estimated_v_y=lambda log, told=told: told)
-        assert road_push(blind, tires) is (None if told is None else fall)
+    for answer in (None, SimpleNamespace(beside=fall)):
+        tires = SimpleNamespace(vehicle=CAR, estimated_v_y=lambda log, answer=answer: answer)
+        assert road_push(blind, tires) is (None if answer is None else fall)
 
 
 def test_what_forces_miss_of_a_motion_is_told_of_both_balances(rng):

@@ -36,8 +36,8 @@ def run(options: argparse.Namespace) -> None:
     require_free(options.file, force=options.force)
     source, text = options.center_of_gravity or _asked(), vehicle_template()
     if source is not None:
-        told = f"center_of_gravity_sd = {SOURCES[source]:g}"
-        text = re.sub(r"(?m)^# center_of_gravity_sd = [\d.]+", told, text)
+        line = f"center_of_gravity_sd = {SOURCES[source]:g}"
+        text = re.sub(r"(?m)^# center_of_gravity_sd = [\d.]+", line, text)
     write_atomically(options.file, text)
     say(f"wrote {options.file}: replace its numbers by those of your car")
 

@@ -62,16 +62,16 @@ def test_the_ratio_of_the_steering_wheel_is_found(found):
 
 def test_what_is_sure_mends_the_log_as_well_as_the_right_one(driven, ratio, found):
     car, log = driven
-    mended, told = found.repair.apply(ratio[1], car)
+    mended, outcome = found.repair.apply(ratio[1], car)
     design = AxleIdentifier.for_vehicle(car)
     errors = []
     for one in (log, mended):
         history = identify(one, car, design)
         model = history.freeze(float(one.t[-1]))
         errors.append(float(np.sqrt(np.mean((model.predict(log) - log.axle_force) ** 2))))
-    assert told == car
+    assert outcome == car
     assert errors[1] < 1.2 * errors[0]
-    assert diagnose(mended, told).healthy
+    assert diagnose(mended, outcome).healthy
 
 
 def test_gross_repairs_come_before_fine_ones_and_only_sure_ones_are_taken():
@@ -129,18 +129,18 @@ def test_a_diagnosis_is_told_in_lines_and_numbers():
         Finding(code="delay", channel="v_y", confidence=0.4, text="two", repair=repair),
         Finding(code="yaw_inertia", confidence=0.9, text="three", note=True),
     )  # fmt: skip
-    told = Diagnosis(name="log", findings=listed, unobservable=("mass",))
+    outcome = Diagnosis(name="log", findings=listed, unobservable=("mass",))
     lines = ["one (sure)", "two (confidence 40 %)", "three (note, confidence 90 %)"]
-    assert told.lines(unobservable=False) == lines
-    assert told.summary().split("\n") == ["log:", *lines, "not observable: mass"]
-    assert not told.healthy and told.repair == repair
-    numbers = told.to_dict()
+    assert outcome.lines(unobservable=False) == lines
+    assert outcome.summary().split("\n") == ["log:", *lines, "not observable: mass"]
+    assert not outcome.healthy and outcome.repair == repair
+    numbers = outcome.to_dict()
     assert numbers["recording"] == "log" and numbers["not_observable"] == ["mass"]
     assert numbers["repair"] == {"offset": {"r": 0.1}} and not numbers["healthy"]
     first = numbers["findings"][0]
     assert first["size"] == 0.1 and first["deviation"] is None and first["unit"] == "rad/s"
     assert first["repair"] == {"offset": {"r": 0.1}} and numbers["findings"][2]["repair"] is None
-    assert repr(told) == "<Diagnosis of 'log': offset r, delay v_y, yaw_inertia>"
+    assert repr(outcome) == "<Diagnosis of 'log': offset r, delay v_y, yaw_inertia>"
     assert listed[0].percent == "99 %" and not listed[2].matters
     again = replace(listed[1], channel="r")
     assert first_of_each([*listed, again, listed[1]]) == [*listed, again]

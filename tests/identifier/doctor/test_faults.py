@@ -191,10 +191,10 @@ def test_a_model_of_the_repaired_log_explains_the_half_that_did_not_teach_it(dri
     assert (parts[0] + parts[1] == 1.0).all()
     force = search.problem.force**2
     assert parts[0] @ force == pytest.approx(parts[1] @ force, rel=0.05)
-    told = search.left_out(post, search.wide, parts)
+    outcome = search.left_out(post, search.wide, parts)
     plain = Search(problem=search.problem, accelerometer=None)
     without = plain.left_out(plain.nominal(), {}, parts)
-    assert (told < without).all()
+    assert (outcome < without).all()
 
 
 def test_what_does_not_help_the_other_half_is_not_sure(driven, monkeypatch):
@@ -280,8 +280,14 @@ def test_a_size_is_believed_that_stands_out_and_that_devices_have(driven):
         return Candidate(suspect, value, sd, 20.0, 20.0, felt, None)
 
     assert search.deviation(fitted(0.1)) == pytest.approx(0.005)
-    for value, told in ((0.012, False), (0.013, True), (-0.013, True), (0.41, True), (0.43, False)):
-        assert search.believed(fitted(value)) is told
+    for value, outcome in (
+        (0.012, False),
+        (0.013, True),
+        (-0.013, True),
+        (0.41, True),
+        (0.43, False),
+    ):
+        assert search.believed(fitted(value)) is outcome
     assert search.believed(fitted(0.1, felt=-3.9)) and not search.believed(fitted(0.1, felt=-4.1))
     assert search.believed(fitted(0.1, lag)) and not search.believed(fitted(-0.1, lag))
     assert fitted(0.1).is_late_as(fitted(0.1, lag)) and not fitted(0.1).is_late_as(fitted(0.2))
@@ -316,9 +322,9 @@ def test_a_clean_drive_promises_no_gain_and_a_fault_without_its_number_is_missed
     wide, parts = search.widened(suspect), search.problem.halves()
     post = descend(search.problem.under(search.priors(wide)), search.nominal().p)
     assert post["v_y_bias"] == pytest.approx(fault.size, abs=0.01)
-    told = search.left_out(post, wide, parts)
+    outcome = search.left_out(post, wide, parts)
     without = search.left_out(post, wide, parts, zero=suspect)
-    assert (told < without).all()
+    assert (outcome < without).all()
     p = post.p.copy()
     p[INDEX["v_y_bias"]] *= 0.5  # held there it is zero from wherever the step began
     again = search.left_out(replace(post, p=p), wide, parts, zero=suspect)

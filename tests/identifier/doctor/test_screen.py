@@ -132,8 +132,8 @@ def test_every_gross_fault_is_the_first_that_is_named_and_its_repair_gives_the_d
     first = found.findings[0]
     assert f"{first.code} {first.channel}" == want
     if first.sure and not case.endswith("mirrored"):  # which mirrors the other channels, too
-        mended, told = found.repair.apply(broken, car)
-        assert told == car
+        mended, declared = found.repair.apply(broken, car)
+        assert declared == car
         for name in ("v_x", "v_y", "r", "delta_f", "a_y"):
             np.testing.assert_allclose(getattr(mended, name), getattr(log, name), atol=1e-9)
 
@@ -187,18 +187,18 @@ def test_another_car_and_its_size_are_told(driven):
     other = DART if car.mass > 100.0 else replace(sedan(), chassis=None)
     found = screen(log, other)
     assert found.findings[0].code == "other_car"
-    told = found.findings[0].size * car.wheelbase / other.wheelbase
-    assert abs(np.log(told)) < np.log(2.0)
+    declared = found.findings[0].size * car.wheelbase / other.wheelbase
+    assert abs(np.log(declared)) < np.log(2.0)
     assert found.blind
     assert not found.findings[0].sure
 
 
 def test_an_inertia_that_no_car_has_is_told_without_a_log(one):
     car, log = one
-    for factor, told in ((0.49, True), (0.51, False), (1.59, False), (1.61, True)):
+    for factor, declared in ((0.49, True), (0.51, False), (1.59, False), (1.61, True)):
         wrong = replace(car, yaw_inertia=factor * car.mass * car.l_f * car.l_r)
         found = _unlike(wrong)
-        assert len(found) == told
+        assert len(found) == declared
         for one in found:
             assert one.size == pytest.approx(factor) and f"is {factor:.2g} times" in one.text
             assert one.repair.on(wrong).yaw_inertia == pytest.approx(wrong.yaw_inertia / factor)
@@ -352,11 +352,11 @@ READINGS = {
 }
 
 
-def same_motion(logged, told, reading, right, car):
+def same_motion(logged, declared, reading, right, car):
     """Forces and slips of a log as it is read are those of the right log."""
     found, expected = (
         forces_and_slips(Motion.of(log), each, one)
-        for log, each, one in ((logged, told, reading), (right, car, Reading()))
+        for log, each, one in ((logged, declared, reading), (right, car, Reading()))
     )
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(one, other, atol=0.01 * np.abs(other).max())

@@ -54,17 +54,17 @@ def away(log, clean, names=CHANNELS):
 @pytest.mark.parametrize(("kind", "sign"), SIZES)
 def test_the_repair_takes_out_what_was_planted(clean, kind, sign):
     fault, suspect = planted(kind, sign)
-    logged, told = fault.case.log(clean), fault.case.car(CAR)
-    repair = suspect.repair(fault.size, told)
-    assert suspect.plausible(fault.size, told)
+    logged, declared_one = fault.case.log(clean), fault.case.car(CAR)
+    repair = suspect.repair(fault.size, declared_one)
+    assert suspect.plausible(fault.size, declared_one)
     if kind == "bank":
         assert repair is None
         return
-    mended, car = repair.apply(logged, told)
+    mended, car = repair.apply(logged, declared_one)
     assert [car.l_f, car.l_r, car.yaw_inertia] == pytest.approx([CAR.l_f, CAR.l_r, CAR.yaw_inertia])
     before = away(logged, clean)
     assert (away(mended, clean) <= 0.1 * before.max()).all()
-    assert (before.max() > 0.0) == (told == CAR)
+    assert (before.max() > 0.0) == (declared_one == CAR)
 
 
 OF_SENSORS = [each for each in SIZES if planted(*each)[1].parameter in SENSORS]

@@ -205,8 +205,8 @@ def test_the_numbers_of_a_day_are_told_in_units_that_people_read():
     assert day.words == words and len(words) == 4
     assert day.line == ", ".join(f"{title} {said}" for title, said in words.items())
     assert replace(day, anew=False).line.endswith("(of the identification drive)")
-    told = day.to_dict()
-    assert told["anew"] and told["v_y_bias"] == {"value": 0.3, "sd": pytest.approx(0.01)}
+    written = day.to_dict()
+    assert written["anew"] and written["v_y_bias"] == {"value": 0.3, "sd": pytest.approx(0.01)}
 
 
 def test_what_is_far_from_what_is_usual_is_noted():

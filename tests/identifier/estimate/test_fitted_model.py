@@ -85,11 +85,11 @@ def test_the_doubt_of_a_load_is_that_of_mass_and_center_of_gravity(learnt):
     car, sd = replace(sedan(), l_f=0.9, l_r=1.8), 0.04
     moved = replace(car, l_f=car.l_f + sd * car.wheelbase, l_r=car.l_r - sd * car.wheelbase)
     change = np.array(moved.axle_loads) / np.array(car.axle_loads) - 1.0
-    told = learnt.model.mounted_on(replace(car, center_of_gravity_sd=sd))
-    np.testing.assert_allclose(told.band.load_doubt, np.hypot(0.03, change))
+    doubted = learnt.model.mounted_on(replace(car, center_of_gravity_sd=sd))
+    np.testing.assert_allclose(doubted.band.load_doubt, np.hypot(0.03, change))
     untold = learnt.model.mounted_on(car)
     np.testing.assert_allclose(untold.band.load_doubt, np.hypot(0.03, change / 4.0))
-    for one, other in zip(told.estimates(), untold.estimates(), strict=True):
+    for one, other in zip(doubted.estimates(), untold.estimates(), strict=True):
         if one.title in (STIFFNESS, GRIP):
             assert one.sd > other.sd
 

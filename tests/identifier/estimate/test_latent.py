@@ -77,8 +77,8 @@ def test_the_gradient_is_that_of_the_cost(problem, place):
         dp[problem.index] = 1e-7 * rng.normal(size=problem.index.size)
         ahead = problem.cost(z + dz, p + dp, weights)
         behind = problem.cost(z - dz, p - dp, weights)
-        told = 2.0 * (np.sum(at.g * dz) + at.g_p @ dp[problem.index])
-        assert ahead - behind == pytest.approx(told, rel=1e-3, abs=1e-6)
+        outcome = 2.0 * (np.sum(at.g * dz) + at.g_p @ dp[problem.index])
+        assert ahead - behind == pytest.approx(outcome, rel=1e-3, abs=1e-6)
 
 
 def test_the_step_is_that_of_the_dense_matrix(problem, place):
@@ -122,10 +122,10 @@ def test_parameters_that_are_held_leave_their_doubt(problem, place):
     own_held, P_held, slopes_held, _ = held.spread(z, p, problem.R)
     np.testing.assert_allclose(own_held, own, rtol=1e-6)
     known = np.flatnonzero(~moves[problem.index])
-    told = np.einsum(
+    outcome = np.einsum(
         "ni,ij,nj->n", slopes_held[:, known], P[np.ix_(known, known)], slopes_held[:, known]
     ) + np.einsum("ni,ij,nj->n", slopes_held[:, held.free], P_held, slopes_held[:, held.free])
-    np.testing.assert_allclose(told, free, rtol=1e-3)
+    np.testing.assert_allclose(outcome, free, rtol=1e-3)
 
 
 @pytest.mark.parametrize("size", [1.0, 0.1])
@@ -136,9 +136,9 @@ def test_without_v_y_the_accelerometer_is_believed_by_the_size_of_the_car(size):
     for late, left in ((False, 0.0007), (True, 0.01 * scale)):
         found = latent_priors(car, beliefs, late)
         sd = dict(zip(LATENT_NAMES, np.diag(found.covariance) ** 0.5, strict=True))
-        told = [sd[name] for name in ("r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")]
+        outcome = [sd[name] for name in ("r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")]
         expected = [0.002 / scale, 0.015, 0.04, left, 0.01 * car.wheelbase]
-        assert told == pytest.approx(expected)
+        assert outcome == pytest.approx(expected)
         assert found.mean[LATENT_NAMES.index("roll")] == pytest.approx(0.06)
     held = {LATENT_NAMES[k] for k in np.flatnonzero(beliefs.moves) if not found.moves[k]}
     assert held == {"ln_sway", "v_y_bias", "v_y_angle", "v_y_lever"}
@@ -212,11 +212,11 @@ def learnt(exact):
 
 def test_tires_that_are_known_tell_the_side_slip_of_another_drive(learnt):
     other = driven(9)
-    told = learnt.estimated_v_y(blind(other, seed=4))
-    away = np.degrees((told.v_y - other.v_y) / other.v_x)
+    outcome = learnt.estimated_v_y(blind(other, seed=4))
+    away = np.degrees((outcome.v_y - other.v_y) / other.v_x)
     assert np.sqrt(np.mean(away**2)) < 0.12
-    assert np.mean(np.abs(told.v_y - other.v_y) < 2.0 * told.sd) > 0.9
-    assert told.observable.mean() > 0.9
+    assert np.mean(np.abs(outcome.v_y - other.v_y) < 2.0 * outcome.sd) > 0.9
+    assert outcome.observable.mean() > 0.9
 
 
 @pytest.mark.parametrize("less", range(1, 5))
@@ -257,10 +257,10 @@ def test_a_delay_that_is_hardly_known_is_not_believed(exact, monkeypatch):
     """As after a single step of the steering."""
     log = blind(exact)
     log = replace(log, a_y=lfilter(*butter(2, 10.0 * log.dt), log.a_y))
-    told = _Latent.spread
+    outcome = _Latent.spread
 
     def doubtful(*given):
-        covariance, P, slopes, shows = told(*given)
+        covariance, P, slopes, shows = outcome(*given)
         return covariance, 400.0 * P, slopes, shows
 
     monkeypatch.setattr(_Latent, "spread", doubtful)
@@ -270,8 +270,8 @@ def test_a_delay_that_is_hardly_known_is_not_believed(exact, monkeypatch):
 def test_the_zero_of_the_steering_is_another_in_each_log(learnt):
     other = driven(9)
     turned = replace(other, delta_f=other.delta_f + np.radians(1.0))
-    told = learnt.estimated_v_y(blind(turned, seed=4))
-    away = np.degrees((told.v_y - other.v_y) / other.v_x)
+    outcome = learnt.estimated_v_y(blind(turned, seed=4))
+    away = np.degrees((outcome.v_y - other.v_y) / other.v_x)
     assert np.sqrt(np.mean(away**2)) < 0.12
 
 
@@ -291,9 +291,9 @@ def test_nothing_goes_from_one_segment_to_the_next(exact):
     nodes = Nodes.of(both, CAR)
     assert nodes.begins.sum() == 2
     assert not nodes.goes[np.flatnonzero(nodes.begins)[1] - 1]
-    told = fit([both], CAR).model.estimated_v_y(both)
+    outcome = fit([both], CAR).model.estimated_v_y(both)
     parts = [exact.between(0.0, 8.0).v_y, exact.between(12.0, 19.9).v_y]
-    away = told.v_y - np.concatenate(parts)
+    away = outcome.v_y - np.concatenate(parts)
     assert np.degrees(np.sqrt(np.mean(away**2)) / 20.0) < 0.15
 
 
@@ -314,9 +314,9 @@ def test_starts_part_only_where_both_explain_the_drive(problem, monkeypatch, wor
     monkeypatch.setattr(_Latent, "descend", lambda *given: (moved, p, best.cost + worse))
     found = learn_latent(problem.nodes, CAR, Priors.of(CAR))
     assert (found.parted > TRUST.parted) == parted
-    told = found.posterior
-    assert told.seconds == pytest.approx(problem.nodes.counts.sum() * problem.nodes.dt)
-    assert told.scale.tolist() == [1.0, 1.0] and told.cost == best.cost
+    outcome = found.posterior
+    assert outcome.seconds == pytest.approx(problem.nodes.counts.sum() * problem.nodes.dt)
+    assert outcome.scale.tolist() == [1.0, 1.0] and outcome.cost == best.cost
 
 
 @pytest.mark.parametrize(("wider", "refused"), [(1.0, False), (400.0, True)])

@@ -257,25 +257,25 @@ def test_what_drives_reached_adds_up():
     other = Reach(pair([0.05, 0.03]), pair([4.0, 8.0]), pair([-2.0, 2.0]), pair([4.0, -9.0]), 2.0,
                   (Segment(3.0, 4.0, 0.7, 0.1),), 0.2, 0.1)  # fmt: skip
     both = one.with_(other)
-    told = [both.slip, both.speeds, both.a_x, both.alike]
-    assert [x.tolist() for x in told] == [[0.1, 0.03], [4.0, 9.0], [-3.0, 2.0], [8.0, -1.0]]
+    outcome = [both.slip, both.speeds, both.a_x, both.alike]
+    assert [x.tolist() for x in outcome] == [[0.1, 0.03], [4.0, 9.0], [-3.0, 2.0], [8.0, -1.0]]
     assert [x.begin for x in both.segments] == [0.0, 3.0]
     assert (both.pairs, both.parted, both.a_y_late) == (4.0, 0.2, -0.3)
     assert both.unexplained.tolist() == [np.sqrt(2.0), 0.0]
 
 
 @pytest.mark.parametrize(
-    ("gain", "sd", "told"), [(0.1, 0.02, True), (-0.1, 0.04, False), (0.07, 0.01, False)]
+    ("gain", "sd", "outcome"), [(0.1, 0.02, True), (-0.1, 0.04, False), (0.07, 0.01, False)]
 )
-def test_a_fit_notes_what_its_drives_had_beside_tires(gain, sd, told):
+def test_a_fit_notes_what_its_drives_had_beside_tires(gain, sd, outcome):
     p, covariance, k = PRIORS.mean.copy(), np.zeros((len(NAMES),) * 2), INDEX["steering_gain"]
     p[k], covariance[k, k] = gain, sd**2
     reach = Reach(segments=(Segment(3.0, 8.0, 0.5, 0.04),), parted=TRUST.parted, a_y_late=0.05)
     listed = dict(report.notes(reach, p, covariance))
-    assert set(listed) == {"another_road", "a_y_late"} | ({"steering_gain"} if told else set())
+    assert set(listed) == {"another_road", "a_y_late"} | ({"steering_gain"} if outcome else set())
     assert "from 3 to 8 s the friction was 0.50 ± 0.04 times" in listed["another_road"]
     assert "50 ms late" in listed["a_y_late"]
-    if told:
+    if outcome:
         assert "turn 1.10 ± 0.02 times as far" in listed["steering_gain"]
     assert "not_observable" in dict(report.notes(reach._replace(parted=0.01), p, covariance))
 
@@ -358,9 +358,9 @@ def test_a_bank_is_what_motion_shows_and_no_accelerometer_but_for_roll_and_level
         name="bank", t=t, v_x=np.full(t.size, 20.0), v_y=0.0 * t, r=r, delta_f=0.1 * r,
         delta_r=0.0 * t, a_y=1.05 * (motion - GRAVITY * fall) + 0.03,
     )  # fmt: skip
-    told = Drive.of(drive, CAR).signals[:, 6] / GRAVITY
+    outcome = Drive.of(drive, CAR).signals[:, 6] / GRAVITY
     middle = (np.abs(t - 20.0) < 2.0) & (np.abs(np.sin(2.0 * t)) < 2.0)
-    np.testing.assert_allclose(told[middle], fall[middle], atol=0.012)
-    assert (told[np.abs(t - 20.0) > 12.0] == 0.0).all(), "within what a sensor is off level"
+    np.testing.assert_allclose(outcome[middle], fall[middle], atol=0.012)
+    assert (outcome[np.abs(t - 20.0) > 12.0] == 0.0).all(), "within what a sensor is off level"
     deaf = replace(drive, a_y=0.5 * motion)
     assert (Drive.of(deaf, CAR).signals[:, 6] == 0.0).all()

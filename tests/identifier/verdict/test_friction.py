@@ -123,7 +123,7 @@ def curve(slip, ln):
     return np.exp(ln) * np.tanh(10.0 * slip / np.exp(ln))
 
 
-def told(ln, zero=0.0, noise=0.02, variance=None):
+def from_windows(ln, zero=0.0, noise=0.02, variance=None):
     """What windows tell of a road of some friction, the slip of both axles off by a zero."""
     rng = np.random.default_rng(1)
     true = curve(SLIP, ln) + noise * rng.standard_normal(SLIP.size)
@@ -135,7 +135,7 @@ def told(ln, zero=0.0, noise=0.02, variance=None):
 
 @pytest.mark.parametrize("ln", [-0.5, 0.0, 0.4])
 def test_the_filter_finds_the_friction_with_its_doubt(ln):
-    found = told(ln)
+    found = from_windows(ln)
     assert np.log(found.ratio[-1]) == pytest.approx(ln, abs=0.06)
     assert found.another[-1] == pytest.approx(float(ln != 0.0), abs=0.01)
     assert 0.1 / np.sqrt(12.0) <= found.sd[-1] < 0.06
@@ -145,12 +145,12 @@ def test_the_filter_finds_the_friction_with_its_doubt(ln):
 
 
 def test_a_zero_of_the_slip_is_found_for_each_friction():
-    found = told(0.0, zero=0.012)
+    found = from_windows(0.0, zero=0.012)
     assert found.another[-1] < 0.05 and found.roads == ()
 
 
 def test_what_tells_nothing_leaves_what_was_believed():
-    found = told(0.0, variance=1e4)
+    found = from_windows(0.0, variance=1e4)
     likely = np.exp(-0.5 * (GRID / 0.7) ** 2)
     p = 0.5 * 0.98 * likely / likely.sum()
     p[GRID == 0.0] += 0.5
