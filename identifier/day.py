@@ -26,7 +26,7 @@ ENOUGH = 15.0  # [s] of driving: 10 s, left turns only, made three times the err
 _FAR = 3.0  # standard deviations of what is expected, beyond which a number is noted
 _SIDEWAYS = 0.0045  # [rad] of b/v + β that is noted, and
 _SURELY = 5.0  # its standard deviations: 0 of 46 simulated logs, 32 of 32 planted errors
-_APART = 0.7  # of the prior's, up to which bias and angle of v_y are apart
+_APART = 0.33  # sd of b/sd_b - β/sd_β, up to which both are apart: 0.7 of what is believed
 
 ONE_SPEED = ": a bias, or its sensor is turned; one speed cannot tell"
 _ROWS = (  # title, unit that is printed, per SI, of NUMBERS
@@ -162,7 +162,8 @@ class Day:
         text = sideways(self.value[where], self.covariance[np.ix_(where, where)], self.speed)
         if not (text and self.anew):
             return ""
-        if (self.sd[where] < _APART * self.usual[where]).all():
+        both = np.array([1.0, -1.0]) / np.maximum(self.usual[where], 1e-12)
+        if both @ self.covariance[np.ix_(where, where)] @ both < _APART**2:
             known = ", ".join(f"{_ROWS[k][0]} {self.words[_ROWS[k][0]]}" for k in (b, beta))
             return f"{text}: {known}; the forces allow for it"
         return f"{text}{ONE_SPEED}"

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from identifier.day import ONE_SPEED, sideways
+from identifier.day import ENOUGH, ONE_SPEED, sideways
 from identifier.doctor.accelerometer import OF_A_Y, Accelerometer, Line, descended
 from identifier.doctor.finding import Finding
 from identifier.doctor.pieces import segments_of
@@ -67,6 +67,9 @@ class _Rules:
 
 RULES = _Rules()
 SLOW = "sizes of faults: the car hardly drives, or not fast enough"
+_OF_ONE_LOG = (
+    "sizes of faults but in the longest segment: no tire explains all with the same sensors"
+)
 _SIZES_BLIND = "sizes of faults: no tire explains the log"
 UNEXPLAINED = (
     (
@@ -468,6 +471,12 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
     taken = frozenset((one.first.suspect.code, one.first.suspect.channel) for one in search.found)
     worst = search.problem.model_error(post.p)
     if worst.max() > RULES.unexplained:
+        alone = max(recording.segments, key=lambda part: part.stop - part.start)
+        length = alone.stop - alone.start
+        if length < len(recording) and length * recording.dt > ENOUGH:
+            longest = examine(recording.taken(alone), vehicle)
+            if not any(found.code == "no_tire" for found in longest.findings):
+                return longest._replace(unobservable=(*longest.unobservable, _OF_ONE_LOG))
         channel, text = UNEXPLAINED[int(np.argmax(worst))]
         share = f"{100.0 * worst.max():.0f} % model error (typical: below 12 %)"
         one = Finding(code="no_tire", channel=channel, confidence=0.9, text=f"{text}; {share}")

@@ -97,8 +97,8 @@ def calibrated(
         return model
     if history.method.whole:
         share = (verdict or judge(history, t)).model_error
-        judged: TireModel = band.calibrated_by(None, None if share is None else np.array(share))
-        return judged
+        whole_log: TireModel = band.calibrated_by(None, None if share is None else np.array(share))
+        return whole_log
     whole, start = history.recording, history.start
     frozen = state_index(whole, float(whole.t[-1]) if t is None else t)
     part = portion(whole, frozen)

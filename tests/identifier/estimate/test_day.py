@@ -150,6 +150,13 @@ def test_at_one_speed_the_doctor_names_the_sum(errors):
     assert not any(one.channel == "v_y" for one in diagnose(drive, sedan()).findings)
 
 
+def test_the_doctor_looks_at_one_log_where_days_differ():
+    logs = [of_another_day(driven(3)), of_another_day(driven(4), -1.0)]
+    found = diagnose(joined(logs), sedan())
+    assert "no_tire" not in {one.code for one in found.findings}
+    assert any("longest segment" in line for line in found.unobservable)
+
+
 def test_a_fit_is_mounted_on_a_model_car(tire):
     small = Vehicle(
         mass=1.6, yaw_inertia=0.005, l_f=0.08, l_r=0.09, cornering_stiffness_front=30.0,
@@ -229,10 +236,15 @@ def test_at_one_speed_bias_and_angle_are_one_error_and_told_apart_where_they_dif
         assert "bias of v_y" in text and "the forces allow for it" in text
     assert "too little" in a_day([0, -0.2, 0, 0, 0], usual=usual).notes[0][1]
     assert a_day([0, 0.25, -0.0125, 0, 0], usual=usual).notes == ()
-    unclear = a_day([0, 0.4, 0, 0, 0], [1e-4, 0.065, 1e-4, 1e-4, 1e-4], usual=usual)
+    unclear = a_day([0, 0.4, 0, 0, 0], [1e-4, 0.03, 1e-4, 1e-4, 1e-4], usual=usual)
     assert "bias of v_y" in unclear.notes[0][1]
-    worse = replace(unclear, value=np.array([0, 0.5, 0, 0, 0]), usual=0.8 * usual)
+    worse = replace(unclear, usual=0.8 * usual)
     assert "one speed cannot tell" in worse.notes[0][1]
+    halves = np.zeros((5, 5))  # the sum is known, and that each is half of it is believed
+    halves[1:3, 1:3] = [[9.76e-4, -4.877e-5], [-4.877e-5, 2.44e-6]]
+    believed = replace(worse, covariance=halves, usual=usual)
+    assert (believed.sd[1:3] < 0.4 * usual[1:3]).all()
+    assert "one speed cannot tell" in believed.notes[0][1]
     of_two = np.array([[0.04, -0.00199], [-0.00199, 1e-4]])  # bias and angle make up for each other
     assert sideways(np.array([0.2, 0.0]), of_two, 20.0)
     assert not sideways(np.array([0.2, 0.0]), np.diag(np.diag(of_two)), 20.0)
