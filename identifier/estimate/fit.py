@@ -46,6 +46,7 @@ _SURELY = 3.0  # standard deviations that a play is then from none
 _REACHED = 0.25  # [s] for which a slip must have been exceeded to count as driven
 _NOTHING_FITS = 0.15  # share of the force that tires of several logs miss, from which zeros of
 _MUCH_LESS = 0.7  # each are tried, and times what they must miss then
+_ANY_ZERO = 100.0  # of their priors' deviations: one log says nothing of another's zeros
 _FORCELESS = 0.1  # static loads, rms, below which a log does not say
 _ZEROS = [INDEX[name] for name in CHANGES]
 Days: TypeAlias = Literal["found", "one", "each"]
@@ -109,7 +110,9 @@ def fit(
     for drives in _blocks(measured, vehicle, block, coarse=coarse, alone=days == "each"):
         if not any(one.counts.any() for one in drives):
             continue
-        begin = None if found is None else found.p
+        begin = None if found is None else found.p.copy()
+        if begin is not None and days == "each":
+            begin[_ZEROS] = before.mean[_ZEROS]
         enough = ENOUGH if begin is None else _ENOUGH_MORE
         beliefs = before.after(known) if parts else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
@@ -119,7 +122,7 @@ def fit(
         part = Information.about(
             found.p, found.slope, found.curvature, sd, here.slip, found.seconds
         )
-        part = part.of_one_day(sd[_ZEROS]) if days == "each" else part
+        part = part.of_one_day(_ANY_ZERO * sd[_ZEROS]) if days == "each" else part
         known += part
         parts.append((drives[0].begin, part))
         went_on(sum(len(one.signals) * one.dt for one in drives))

@@ -71,6 +71,7 @@ def test_logs_of_different_days_have_zeros_of_their_own():
     slip = np.linspace(0.005, 0.05, 10)
     away = [np.abs(each.force(slip) / clean.force(slip) - 1.0).max() for each in (apart, one)]
     assert away[0] < 0.08 < away[1]
+    assert (apart.reach.unexplained < 1.5).all()  # the second taught, too
     together = joined(logs)
     assert len(apart.days(together)) == 2 and apart.days(logs[0])[0][0] == 0
     held = apart.held_on(together)
