@@ -51,16 +51,15 @@ PARTS = 4  # of the drive, each of which is left out once
 def within_band(model: TireModel, recording: Recording, level: float = LEVEL) -> Array | None:
     """Return in which share of windows of a drive the band holds what the motion shows, (2,).
 
-    White noise of the sensors is added to the band. None where the model has none, or too little
-    is driven.
+    White noise of the sensors is added to the band, nothing of what is missed of this drive, by
+    which any band would hold. None where the model has none, or too little is driven.
     """
     part = portion(recording)
     model = model.held_on(recording, part)
     found = evidence(model, part.recording)
     if found is None or model.band is None:
         return None
-    band = model.band.on(part.recording)
-    half = band.of_curves(part.recording, level) / np.array(model.vehicle.axle_loads)
+    half = model.band.of_curves(part.recording, level) / np.array(model.vehicle.axle_loads)
     noise = normal_quantile(level) ** 2 * found.noise
     wide = np.sqrt(found.windows.mean(half) ** 2 + noise)
     share: Array = np.mean(np.abs(found.measured - found.modelled) <= wide, axis=0)

@@ -176,7 +176,7 @@ _SHARES = {  # keys of summary.json, and what their shares are printed as
     "beyond_known_slip": "known to {1:.1f} / {2:.1f} deg of slip, which {0} of the samples exceed "
     "(front / rear)",
     "windows_within_band": "in {0} of the windows of 0.3 s the force in the motion lies in the "
-    "band of 90 % (front / rear)",
+    "band of 90 % that the tires had before this log (front / rear)",
     "truth_within_band": "{0} of the true forces lie in it, the noise of the sensors in the band "
     "(front / rear)",
 }
