@@ -24,6 +24,9 @@ MOST_A_X = 18.0  # m/s²
 _BANK_MEAN = 1.0  # [s]: roads bank slowly
 _LEVEL = 0.01  # sine, by which an accelerometer may be off level; twice that is a bank in full
 _MOST_ROLL = 0.08  # per g, by which a body rolls outwards
+_TORN = (20.0, 30.0, 30.0, 2.0)  # per s: faster no car changes v_x, v_y [m/s], r and δ_f [rad]
+_USUAL = 0.995  # quantile of a signal's own steps, of which a tear is
+_TIMES = 3.0  # times as many: held samples step, too
 _LATE = (1, 2, 3)  # columns of v_y, r and δ_f
 _EXPLAINED = 0.15  # of the fast motion that an accelerometer may miss, else it is none of this car
 _ACROSS = (0.8, 1.2)  # slope of an accelerometer's a_y on that motion; a body rolls
@@ -70,11 +73,8 @@ class Drive:
         slowest = vehicle.lowest_speed if replay else SLOW * vehicle.froude_speed
         dt = recording.dt * every
         begin, end, _ = part.indices(len(recording))
-        within = [
-            slice(max(one.start, begin), min(one.stop, end))
-            for one in recording.segments
-            if one.start < end and one.stop > begin
-        ]
+        edges = sorted({begin, end, *recording.breaks, *(() if replay else _tears(recording))})
+        within = [slice(a, b) for a, b in pairwise(edges) if begin <= a < b <= end]
         pieces = [
             _piece(recording, one, vehicle, every, dt, slowest)
             for one in within
@@ -108,6 +108,21 @@ class Drive:
                     values[:] = np.interp(at + delay / self.dt, at, values)
         return replace(self, signals=signals, rates=rates)
 
+    def thinned(self, every: int) -> "Drive":
+        """Return the drive with means of so many samples each."""
+        edges = [*self.begins, len(self.signals)]
+        within = [slice(a, b) for a, b in pairwise(edges) if b - a >= every]
+        signals, rates, t = (
+            np.concatenate([thinned(one[part], every) for part in within])
+            for one in (self.signals, self.rates, self.t)
+        )
+        ends = np.cumsum([(part.stop - part.start) // every for part in within])
+        signals[:, -1] = signals[:, -1] == 1.0
+        return replace(
+            self, t=t, signals=signals, rates=rates, counts=signals[:, -1] > 0.0,
+            dt=every * self.dt, every=every * self.every, begins=(0, *(int(k) for k in ends[:-1])),
+        )  # fmt: skip
+
     def on(self, ln_m: Array | float) -> "Drive":
         """Return the drive on roads of other frictions.
         ln_m : ln of each sample's friction over that of the curves, (n,) or one.
@@ -115,6 +130,17 @@ class Drive:
         signals = self.signals.copy()
         signals[:, 7] = ln_m
         return replace(self, signals=signals)
+
+
+def _tears(recording: Recording) -> NDArray[np.intp]:
+    """Return the first samples after a tear, where two signals leap at once: two drives are one."""
+    leaps = np.zeros(len(recording) - 1, dtype=np.intp)
+    signals = (recording.v_x, recording.needed("v_y"), recording.r, recording.delta_f)
+    for signal, fastest in zip(signals, _TORN, strict=True):
+        step = np.abs(np.diff(signal))
+        usual = np.partition(step, k := int(_USUAL * (step.size - 1)))[k]
+        leaps += step > max(fastest * recording.dt, _TIMES * usual)
+    return np.flatnonzero(leaps > 1) + 1
 
 
 def _piece(
@@ -149,9 +175,9 @@ def _piece(
 
 
 def thinned(signal: Array, every: int) -> Array:
-    """Return the means of so many samples each, (n // every,)."""
+    """Return the means of so many rows each, (n // every, ...)."""
     m = len(signal) // every * every
-    return signal[:m].reshape(-1, every).mean(axis=1)
+    return signal[:m].reshape(-1, every, *signal.shape[1:]).mean(axis=1)
 
 
 def gradient(signal: Array, dt: float) -> Array:

@@ -36,7 +36,7 @@ from models.vehicle import GRAVITY, Vehicle
 _BLOCK = 600.0  # [s] that are estimated at once
 _BLIND = 300.0  # [s] of a log without v_y that teach: those of hardest cornering
 _ENOUGH_MORE = 1.0  # [nats] of improvement by a later block, below which it ends
-_LONG = 3600.0  # [s]: samples of longer logs are averaged
+_LONG = 600.0  # [s]: samples of logs that last as long are averaged
 _COARSE = 2.0  # times the usual interval, to which they are averaged
 _PLAY = INDEX["steering_play"]
 # standard deviations of the front axle's softness, from which a play is asked for: of 12 full-size
@@ -78,7 +78,7 @@ def fit(
     recordings : logs of the car; a longer log is taken in blocks, and what these tell adds up.
     priors : beliefs; None takes those of the car.
     block : longest time that is estimated at once [s].
-    coarse : whether samples are averaged to twice the interval, as they are of logs of hours.
+    coarse : whether samples are averaged to twice the interval, as they are from ten minutes on.
     days : whether zeros of sensors are of all logs ("one"), of each ("each"), or of each where
         they clearly differ ("found").
     progress : called now and then with the share that is done, 0 to 1.
@@ -96,7 +96,7 @@ def fit(
     reach = Reach()
     known, sd = Information.nothing(), Priors.of(vehicle).sd
     total, done = sum(one.duration for one in recordings), 0.0
-    coarse = coarse or total > _LONG
+    coarse = coarse or total >= _LONG
 
     def went_on(seconds: float) -> None:
         nonlocal done

@@ -56,7 +56,7 @@ def with_roads(
         ln_m = found.roads
         changes = sum(int(np.count_nonzero(np.diff(one))) for one in labels) + len(drives) - 1
         one_road = Problem(drives, vehicle, priors)
-        before = one_road.cost(one_road.residuals(plain.p).e, plain.p, found.memory)
+        before = one_road.cost(one_road.misses(plain.p), plain.p, found.memory)
         gained = before - found.cost - PRICE * max(changes, 1)
         if gained <= 0.0 or np.abs(ln_m).max() < LEAST_CHANGE:
             break
@@ -77,7 +77,7 @@ def _segments(
     S2, T = np.minimum(at.scale, _MOST_SCALE) ** 2, np.minimum(at.memory, _MOST_MEMORY)
     loss = np.empty((len(GRID), len(weight)))
     for k, ln_m in enumerate(GRID):
-        e = problem.residual_on(at.p, float(ln_m))
+        e = problem.misses(at.p, float(ln_m))
         loss[k] = (weight / T * (NU + 1.0) / 2.0 * np.log1p(e**2 / (NU * S2))).sum(axis=1)
     count = loss.shape[1]
     bins = np.arange(0, count, _BIN)

@@ -34,9 +34,15 @@ _LEAST_STIFF = 0.9  # of C: slope at zero; 0.25 leaves a third of a planted play
 _STIFF_SD = 0.1  # of C: how firmly that is believed, chosen on random cars and CommonRoad's
 _ITERATIONS = 25  # of a descent, at most
 ENOUGH = 0.02  # [nats] of improvement, below which it ends
+_COARSE = 0.045  # [s] of a sedan, between samples of the problem that starts are tried in
+_COARSELY = 0.2  # [nats] of improvement, below which a descent there ends
+_SAME_SLOPES = 0.2  # of what the first step on slopes gained, that another on them must gain
+_SETTLED_MEMORY = 0.1  # |ln| by which T changes where the descent may end
 _SETTLING = 60  # iterations at most where no drive is looked at
 _SETTLED = 1e-4  # [nats] of improvement, below which these end
 
+_FAR_USE = 0.25  # by which a step changes a use of the ellipse: G is quadratic in it
+_USES = [INDEX[f"{use}_{axle}"] for use in ("braking", "driving") for axle in "fr"]
 DELAYS = [INDEX[name] for name in ("v_y_delay", "r_delay", "steering_delay")]
 
 
@@ -109,7 +115,7 @@ class Problem:
 
     def model_error(self, p: Array) -> Array:
         """Return the share of the force that the balance misses at each axle, (2,)."""
-        e = self.residuals(p).e * self.size[:, None]
+        e = self.misses(p) * self.size[:, None]
         return np.sqrt(self.weight @ e**2 / (self.weight @ self.force**2))
 
     def places(self, k: int) -> NDArray[np.intp]:
@@ -117,43 +123,52 @@ class Problem:
         found: NDArray[np.intp] = self._kept[k] * self._strides[k]
         return found
 
-    def residual_on(self, p: Array, road: float) -> Array:
-        """Return what the balance misses over its size where the friction is another, (m, 2)."""
-        e = [
-            _simulated(one.on(road), p, self._car, motion_scan(), ("residual",), stride)[0][kept]
-            for one, stride, kept in zip(self.drives, self._strides, self._kept, strict=True)
-        ]
-        return np.nan_to_num(np.concatenate(e) / self.size[:, None], nan=1e3, posinf=1e3)
+    def misses(self, p: Array, road: float = 0.0) -> Array:
+        """Return what the balance misses over its size, (m, 2).
+        p : as of `residuals`.   road : ln of the friction that is added to that of all samples.
+        """
+        found = []
+        for k, one in enumerate(self.drives):
+            driven = self._driven(k, p, road)
+            e = _simulated(driven, p, self._car, motion_scan(), ("residual",), self._strides[k])[0]
+            found.append(e[self._kept[k]])
+        return self._over_size(np.concatenate(found), p)
+
+    def _driven(self, k: int, p: Array, road: float = 0.0) -> Drive:
+        """Return a drive on its roads."""
+        if self.labels is None:
+            return self.drives[k].on(road) if road else self.drives[k]
+        return self.drives[k].on(np.concatenate([[0.0], p[len(NAMES) :]])[self.labels[k]] + road)
+
+    def _over_size(self, e: Array, p: Array) -> Array:
+        """Return e over its size, which shrinks with v_x: that shrinks what is missed, and
+        explains nothing.
+        """
+        size = self.size[:, None] * min(1.0 + float(p[INDEX["v_x_factor"]]), 1.0)
+        with np.errstate(invalid="ignore", over="ignore"):
+            return np.nan_to_num(e / size, nan=1e3, posinf=1e3, neginf=-1e3)
 
     def residuals(self, p: Array) -> _Residuals:
         """Return what the balance misses, and its slopes.
         p : parameters, and behind them ln of the friction of other roads.
         """
         many, slopes = [], []
-        ln_m = np.concatenate([[0.0], p[len(NAMES) :]])
         ports = ("residual", "residual_slopes")
-        for k, one in enumerate(self.drives):
-            stride, kept = self._strides[k], self._kept[k]
-            roads = None if self.labels is None else self.labels[k]
-            driven = one if roads is None else one.on(ln_m[roads])
-            residual, J = _simulated(driven, p[: len(NAMES)], self._car, self._scan, ports, stride)
+        for k, (stride, kept) in enumerate(zip(self._strides, self._kept, strict=True)):
+            residual, J = _simulated(self._driven(k, p), p, self._car, self._scan, ports, stride)
             many.append(residual[kept])
             of_road, J = J[kept][:, :, -1:], J[kept][:, :, self._columns]
-            if self.roads and roads is not None:
-                on = roads[::stride][kept][:, None] == np.arange(1, self.roads + 1)
+            if self.roads and self.labels is not None:
+                on = self.labels[k][::stride][kept][:, None] == np.arange(1, self.roads + 1)
                 J = np.concatenate([J, of_road * on[:, None, :]], axis=2)
             slopes.append(J)
         e, slope = np.concatenate(many), np.concatenate(slopes)
-        # To shrink v_x shrinks what is missed, and explains nothing: its size shrinks alike.
         shrunk = min(1.0 + float(p[INDEX["v_x_factor"]]), 1.0)
-        size = self.size[:, None] * shrunk
         if shrunk < 1.0:
             slope[:, :, self.index == INDEX["v_x_factor"]] -= e[..., None] / shrunk
         with np.errstate(invalid="ignore", over="ignore"):
-            return _Residuals(
-                np.nan_to_num(e / size, nan=1e3, posinf=1e3, neginf=-1e3),
-                np.nan_to_num(slope / size[..., None]),
-            )
+            slope = np.nan_to_num(slope / (self.size[:, None, None] * shrunk))
+        return _Residuals(self._over_size(e, p), slope)
 
     def memory(self, e: Array) -> Array:
         """Return T of both axles [s], (2,), from the correlation of residuals (m, 2).
@@ -236,6 +251,7 @@ def _simulated(
     Late signals are read on time; the rest of a delay is 0.
     car : of `car_numbers`, (7,).   every : samples between what is returned.
     """
+    p = p[: len(NAMES)]
     late = p[DELAYS]
     if late.any():
         one, p = one.on_time(late), p.copy()
@@ -272,10 +288,21 @@ def estimate(
     """
     priors = Priors.of(vehicle) if priors is None else priors
     problem = Problem(drives, vehicle, priors, labels)
-    begins = starts(problem) if begin is None else [begin]
-    begins = [np.concatenate([one[: len(NAMES)], np.zeros(problem.roads)]) for one in begins]
-    found = [descend(problem, one, enough=enough) for one in begins]
-    return min(found, key=lambda one: one.cost)
+    if begin is None:
+        found = [descend(_coarse(problem), one, enough=_COARSELY) for one in starts(problem)]
+        begin = min(found, key=lambda one: one.cost).p
+    begin = np.concatenate([begin[: len(NAMES)], np.zeros(problem.roads)])
+    return descend(problem, begin, enough=enough)
+
+
+def _coarse(problem: Problem) -> Problem:
+    """Return the problem of means of samples, in which starts are tried."""
+    small = min(float(np.sqrt(problem.vehicle.wheelbase / SEDAN)), 1.0)
+    every = max(1, int(_COARSE * small / min(one.dt for one in problem.drives)))
+    if every == 1:
+        return problem
+    drives = [one.thinned(every) for one in problem.drives if len(one.signals) > 2 * every]
+    return Problem(drives or problem.drives, problem.vehicle, problem.priors)
 
 
 def starts(problem: Problem) -> list[Array]:
@@ -314,27 +341,35 @@ def descend(
     """
     priors, index = problem.priors, problem.index
     p, damping = start.copy(), 1e-3 if memory is None else 1e-6  # then it is near
-    now = problem.residuals(p)
     # Far from the optimum all residuals are correlated: by their T they would count for nothing.
     T = np.full(2, _SHORTEST_MEMORY) if memory is None else memory
+    ended, settled = False, memory is not None
     for count in range(1, iterations + 1):
-        S2 = problem.scale(now.e)
-        T = np.sqrt(T * problem.memory(now.e)) if count > 1 and memory is None else T
-        cost = problem.misfit(now.e, S2, T) + beliefs_cost(priors, p)
-        H, gradient = normal(problem, now, S2, T)
-        of_beliefs, curvature = around_beliefs(priors, p)
-        H = H + curvature[np.ix_(index, index)]
-        gradient = gradient + of_beliefs[index]
-        for trial, tried in _trials(H, gradient, p, priors, damping):
-            then = problem.residuals(trial)
-            reached = problem.misfit(then.e, S2, T) + beliefs_cost(priors, trial)
-            if reached < cost:
-                p, now, damping = trial, then, max(tried / 5.0, 1e-6)
-                break
-        else:
-            break
-        gained = cost - reached
-        if gained < enough and (count > 3 or memory is not None):
+        now, gains = problem.residuals(p), []
+        while not gains or gains[-1] > max(enough, _SAME_SLOPES * gains[0]):
+            S2 = problem.scale(now.e)
+            if memory is None and (count > 1 or gains):
+                before, T = T, np.sqrt(T * problem.memory(now.e))
+                settled = bool(np.abs(np.log(T / before)).max() < _SETTLED_MEMORY)
+            cost = problem.misfit(now.e, S2, T) + beliefs_cost(priors, p)
+            H, gradient = normal(problem, now, S2, T)
+            of_beliefs, curvature = around_beliefs(priors, p)
+            H = H + curvature[np.ix_(index, index)]
+            gradient = gradient + of_beliefs[index]
+            gains.append(0.0)
+            for trial, tried in _trials(H, gradient, p, priors, damping):
+                step = (trial - p)[index]
+                if -step @ (gradient + 0.5 * H @ step) < 0.5 * enough:
+                    break  # there is nothing left to gain
+                e = problem.misses(trial)
+                reached = problem.misfit(e, S2, T) + beliefs_cost(priors, trial)
+                if reached < cost:
+                    p, now, damping = trial, now._replace(e=e), max(tried / 5.0, 1e-6)
+                    gains[-1] = cost - reached
+                if gains[-1] or len(gains) > 1:
+                    break  # where slopes of before do not serve, new ones do
+        ended = settled and gains[0] < enough
+        if ended:
             break
     S2, T = problem.scale(now.e), problem.memory(now.e) if memory is None else memory
     H, gradient = normal(problem, now, S2, T)
@@ -401,7 +436,10 @@ def _trials(
 ) -> Iterator[tuple[Array, float]]:
     """Yield where steps with more and more of Levenberg's damping end, and that damping."""
     index = np.flatnonzero(priors.moves)
-    low, high = priors.low[index], priors.high[index]
+    low, high = priors.low.copy(), priors.high.copy()
+    low[_USES] = np.maximum(low[_USES], p[_USES] - _FAR_USE)
+    high[_USES] = np.minimum(high[_USES], p[_USES] + _FAR_USE)
+    low, high = low[index], high[index]
     for _ in range(8):
         step = bounded_step(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
         trial = p.copy()
@@ -455,17 +493,24 @@ def normal(problem: Problem, at: _Residuals, S2: Array, T: Array) -> tuple[Array
 
 
 def bounded_step(H: Array, gradient: Array, p: Array, low: Array, high: Array) -> Array:
-    """Return the step of a quadratic model; parameters at a bound that it would leave stay."""
-    free = np.ones(p.size, dtype=bool)
-    step = np.zeros(p.size)
-    for _ in range(4):
-        step[:] = 0.0
-        step[free] = -np.linalg.solve(H[np.ix_(free, free)], gradient[free])
-        aimed = p + step
-        out = ((aimed < low - 1e-12) & (p <= low + 1e-9)) | (
-            (aimed > high + 1e-12) & (p >= high - 1e-9)
-        )
-        if not (free & out).any():
+    """Return the step to the least of a quadratic model within bounds, by an active set.
+    H : positive definite (n, n).   gradient, p, low, high : (n,), p within its bounds.
+    """
+    least, most = low - p, high - p
+    free, step = np.ones(p.size, dtype=bool), np.zeros(p.size)
+    for _ in range(3 * p.size):
+        held = ~free
+        rest = gradient[free] + H[np.ix_(free, held)] @ step[held]
+        step[free] = -np.linalg.solve(H[np.ix_(free, free)], rest)
+        out = free & ((step < least) | (step > most))
+        if out.any():
+            step[out] = np.clip(step[out], least[out], most[out])
+            free &= ~out
+            continue
+        slope = gradient + H @ step
+        back = held & (((step <= least) & (slope < 0.0)) | ((step >= most) & (slope > 0.0)))
+        if not back.any():
             break
-        free &= ~out
+        worst = np.argmax(np.where(back, np.abs(slope) / np.sqrt(np.diag(H)), 0.0))
+        free[worst] = True
     return step
