@@ -31,7 +31,6 @@ CERTAIN = 0.99  # confidence in what samples show by themselves
 LATERAL = ("v_y", "r", "delta_f", "a_y")
 UNITS = {"v_x": "m/s", "v_y": "m/s", "r": "rad/s", "delta_f": "rad", "delta_r": "rad",
          "a_y": "m/s^2"}  # fmt: skip
-SMOOTH = frozenset(("v_y", "r", "v_x"))  # that no car can change at once, as it can its steering
 _ESTIMATED, _SWITCHED = ("v_y", "r"), 2  # channels that may be, how often they are off in a turn
 
 
@@ -252,7 +251,7 @@ def _turning(name: str, recording: Recording) -> Array:
 def _clock_jump(recording: Recording, moving: Mapping[str, Array]) -> Finding | None:
     """Return where the clock jumped, None where it did not."""
     again, dt = facts.logged_again(moving), recording.dt
-    jump = facts.torn(moving, SMOOTH) if again is None else None
+    jump = next(iter(facts.tears(moving, facts.SMOOTH)), None) if again is None else None
     if again is not None:
         at, size, confidence, deviation = again[0], -again[1] * dt, CERTAIN, 0.0
     elif jump is not None:

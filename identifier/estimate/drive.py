@@ -14,6 +14,7 @@ from codegen.arrays import Array
 from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
 from models.recordings.record import ALL
+from models.recordings.samples import SMOOTH, tears
 from models.vehicle import GRAVITY, Vehicle
 
 FASTEST = 0.01  # [s]: sampled faster, samples are averaged
@@ -24,9 +25,6 @@ MOST_A_X = 18.0  # m/s²
 _BANK_MEAN = 1.0  # [s]: roads bank slowly
 _LEVEL = 0.01  # sine, by which an accelerometer may be off level; twice that is a bank in full
 _MOST_ROLL = 0.08  # per g, by which a body rolls outwards
-_TORN = (20.0, 30.0, 30.0, 2.0)  # per s: faster no car changes v_x, v_y [m/s], r and δ_f [rad]
-_USUAL = 0.995  # quantile of a signal's own steps, of which a tear is
-_TIMES = 3.0  # times as many: held samples step, too
 _LATE = (1, 2, 3)  # columns of v_y, r and δ_f
 _EXPLAINED = 0.15  # of the fast motion that an accelerometer may miss, else it is none of this car
 _ACROSS = (0.8, 1.2)  # slope of an accelerometer's a_y on that motion; a body rolls
@@ -73,8 +71,11 @@ class Drive:
         slowest = vehicle.lowest_speed if replay else SLOW * vehicle.froude_speed
         dt = recording.dt * every
         begin, end, _ = part.indices(len(recording))
-        edges = sorted({begin, end, *recording.breaks, *(() if replay else _tears(recording))})
-        within = [slice(a, b) for a, b in pairwise(edges) if begin <= a < b <= end]
+        within = []
+        for one in recording.segments:
+            a, b = max(one.start, begin), min(one.stop, end)
+            cuts = [] if replay or a >= b else sorted(_tears(recording, slice(a, b)))
+            within += [slice(*edges) for edges in pairwise([a, *cuts, b])]
         pieces = [
             _piece(recording, one, vehicle, every, dt, slowest)
             for one in within
@@ -111,7 +112,7 @@ class Drive:
     def thinned(self, every: int) -> "Drive":
         """Return the drive with means of so many samples each."""
         edges = [*self.begins, len(self.signals)]
-        within = [slice(a, b) for a, b in pairwise(edges) if b - a >= every]
+        within = [slice(a, b) for a, b in pairwise(edges) if b - a >= every] or [slice(0, every)]
         signals, rates, t = (
             np.concatenate([thinned(one[part], every) for part in within])
             for one in (self.signals, self.rates, self.t)
@@ -132,15 +133,12 @@ class Drive:
         return replace(self, signals=signals)
 
 
-def _tears(recording: Recording) -> NDArray[np.intp]:
-    """Return the first samples after a tear, where two signals leap at once: two drives are one."""
-    leaps = np.zeros(len(recording) - 1, dtype=np.intp)
-    signals = (recording.v_x, recording.needed("v_y"), recording.r, recording.delta_f)
-    for signal, fastest in zip(signals, _TORN, strict=True):
-        step = np.abs(np.diff(signal))
-        usual = np.partition(step, k := int(_USUAL * (step.size - 1)))[k]
-        leaps += step > max(fastest * recording.dt, _TIMES * usual)
-    return np.flatnonzero(leaps > 1) + 1
+def _tears(recording: Recording, within: slice) -> list[int]:
+    """Return the first samples after tears, where no car went on: two drives in one log."""
+    named = ("v_x", "v_y", "r", "delta_f")
+    signals = {name: getattr(recording, name)[within] for name in named}
+    moving = {name: signal for name, signal in signals.items() if np.ptp(signal) > 0.0}
+    return [within.start + at for at, _ in tears(moving, SMOOTH)]
 
 
 def _piece(

@@ -36,7 +36,7 @@ from models.vehicle import GRAVITY, Vehicle
 _BLOCK = 600.0  # [s] that are estimated at once
 _BLIND = 300.0  # [s] of a log without v_y that teach: those of hardest cornering
 _ENOUGH_MORE = 1.0  # [nats] of improvement by a later block, below which it ends
-_LONG = 600.0  # [s]: samples of logs that last as long are averaged
+_LONG = 599.0  # [s]: samples of logs of ten minutes and more are averaged
 _COARSE = 2.0  # times the usual interval, to which they are averaged
 _PLAY = INDEX["steering_play"]
 # standard deviations of the front axle's softness, from which a play is asked for: of 12 full-size
@@ -171,11 +171,17 @@ def _missed(recordings: Sequence[Recording], model: FittedModel) -> float:
     shares = [0.0]
     for one in (part for whole in recordings for part in _alone(whole)):
         drive = Drive.of(one, model.vehicle)
-        e = simulate(drive, model.on(one).on(model.p), model.vehicle)["residual"][drive.counts]
         v_x, r = drive.signals[drive.counts][:, [0, 2]].T
         rms = float(np.sqrt(np.mean((v_x * r / GRAVITY) ** 2))) if v_x.size else 0.0
-        if rms > _FORCELESS:
-            shares.append(float(np.sqrt(np.mean(e**2, axis=0)).max()) / rms)
+        if rms <= _FORCELESS:
+            continue
+        for day in (None, model.on):  # its own zeros only where those of all do not do
+            p = model.p if day is None else day(one).on(model.p)
+            e = simulate(drive, p, model.vehicle)["residual"][drive.counts]
+            share = float(np.sqrt(np.mean(e**2, axis=0)).max()) / rms
+            if share <= _NOTHING_FITS:
+                break
+        shares.append(share)
     return max(shares)
 
 

@@ -71,7 +71,7 @@ def _segments(
     at: Posterior,
 ) -> tuple[NDArray[np.intp], ...]:
     """Return which road each sample is on, 0 the longest, by dynamic programming."""
-    problem = Problem(drives, vehicle, priors)
+    problem = Problem(drives, vehicle, priors).thinned()
     weight = problem.weight[:, None]
     # A fit between two roads misses much, for long: that must not hide them.
     S2, T = np.minimum(at.scale, _MOST_SCALE) ** 2, np.minimum(at.memory, _MOST_MEMORY)
@@ -88,7 +88,7 @@ def _segments(
         mine = np.zeros(len(one.signals), dtype=np.intp)
         if length:
             steps = path[begin : begin + length]
-            nearest = np.searchsorted(problem.places(k), np.arange(len(mine)), side="right") - 1
+            nearest = np.searchsorted(problem.times(k), one.t, side="right") - 1
             mine = steps[np.clip(nearest, 0, length - 1)]
         found.append(mine)
         begin += length

@@ -118,10 +118,19 @@ class Problem:
         e = self.misses(p) * self.size[:, None]
         return np.sqrt(self.weight @ e**2 / (self.weight @ self.force**2))
 
-    def places(self, k: int) -> NDArray[np.intp]:
-        """Return which samples of a drive its residuals are at."""
-        found: NDArray[np.intp] = self._kept[k] * self._strides[k]
+    def times(self, k: int) -> Array:
+        """Return when the residuals of a drive are [s]."""
+        found: Array = self.drives[k].t[:: self._strides[k]][self._kept[k]]
         return found
+
+    def thinned(self) -> "Problem":
+        """Return the problem of one road with means of samples, for first guesses."""
+        small = min(float(np.sqrt(self.vehicle.wheelbase / SEDAN)), 1.0)
+        every = max(1, int(_COARSE * small / min(one.dt for one in self.drives)))
+        if every == 1 and self.labels is None:
+            return self
+        drives = [one.thinned(every) for one in self.drives]
+        return Problem(drives, self.vehicle, self.priors)
 
     def misses(self, p: Array, road: float = 0.0) -> Array:
         """Return what the balance misses over its size, (m, 2).
@@ -289,20 +298,11 @@ def estimate(
     priors = Priors.of(vehicle) if priors is None else priors
     problem = Problem(drives, vehicle, priors, labels)
     if begin is None:
-        found = [descend(_coarse(problem), one, enough=_COARSELY) for one in starts(problem)]
+        coarse = problem.thinned()
+        found = [descend(coarse, one, enough=_COARSELY) for one in starts(problem)]
         begin = min(found, key=lambda one: one.cost).p
     begin = np.concatenate([begin[: len(NAMES)], np.zeros(problem.roads)])
     return descend(problem, begin, enough=enough)
-
-
-def _coarse(problem: Problem) -> Problem:
-    """Return the problem of means of samples, in which starts are tried."""
-    small = min(float(np.sqrt(problem.vehicle.wheelbase / SEDAN)), 1.0)
-    every = max(1, int(_COARSE * small / min(one.dt for one in problem.drives)))
-    if every == 1:
-        return problem
-    drives = [one.thinned(every) for one in problem.drives if len(one.signals) > 2 * every]
-    return Problem(drives or problem.drives, problem.vehicle, problem.priors)
 
 
 def starts(problem: Problem) -> list[Array]:

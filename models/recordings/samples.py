@@ -28,6 +28,7 @@ _BLOCK = 5  # samples in a row that were logged before, of all signals
 _SIDE = 12  # samples on each side of a jump
 _JUMP = 5.5  # of the usual disagreement of both sides of a jump, in two signals
 _ALSO = 2.5  # of the same disagreement, in a third signal
+SMOOTH = frozenset(("v_y", "r", "v_x"))  # that no car can change at once, as it can its steering
 _SHORTEST_JUMP = 4.0  # samples that a jump has at least: less is a late sample
 
 
@@ -253,31 +254,34 @@ def logged_again(signals: Mapping[str, Array]) -> tuple[int, int] | None:
     return None
 
 
-def torn(signals: Mapping[str, Array], smooth: frozenset[str]) -> tuple[int, float] | None:
-    """Return where both sides of an instant disagree in several signals, by how many samples.
+def tears(signals: Mapping[str, Array], smooth: frozenset[str]) -> list[tuple[int, float]]:
+    """Return where both sides of an instant disagree in several signals, and by how many samples.
+
+    The clearest is first; none is nearer to a clearer one than both sides are long.
     signals : that move (n,).   smooth : names of those that cannot jump, of which one must.
     """
     names = list(signals)
     if len(names) < 3 or not smooth & set(names) or signals[names[0]].size <= 20 * _SIDE:
-        return None
+        return []
     # Of a parabola through each side: its value and its slope between both.
     value, slope = np.linalg.pinv(np.vander(np.arange(_SIDE) + 0.5, 3, increasing=True))[:2]
-    jumps, rates, scores = [], [], []
+    jumps, scores = [], []
     for signal in signals.values():
-        sides = np.lib.stride_tricks.sliding_window_view(signal, _SIDE)
-        left, right = sides[:-_SIDE], sides[_SIDE:]
-        jump = right @ value - left @ value[::-1]
-        usual = np.median(np.abs(jump)) / _NORMAL_MEDIAN
-        busy = np.convolve(np.abs(jump), np.ones(8 * _SIDE) / (8 * _SIDE), "same")
-        scores.append(np.abs(jump) / np.maximum(np.maximum(usual, 0.8 * busy), 1e-300))
+        jump = np.convolve(signal, np.concatenate([value[::-1], -value]), "valid")
+        size = np.abs(jump)
+        usual = np.median(size) / _NORMAL_MEDIAN
+        busy = np.convolve(size, np.full(8 * _SIDE, 1.0 / (8 * _SIDE)), "same")
+        scores.append(size / np.maximum(np.maximum(usual, 0.8 * busy), 1e-300))
         jumps.append(jump)
-        rates.append(0.5 * (right @ slope - left @ slope[::-1]))
-    table = np.sort(np.stack(scores), axis=0)
-    at = int(np.argmax(table[-2]))
-    surest = max(score[at] for name, score in zip(names, scores, strict=True) if name in smooth)
-    if min(table[-2, at], surest) < _JUMP or table[-3, at] < _ALSO:
-        return None
-    scale = np.array([np.std(signal) for signal in signals.values()])
-    a, b = np.stack(rates)[:, at] / scale, np.stack(jumps)[:, at] / scale
-    size = float(a @ b / (a @ a + 1e-300))
-    return None if abs(size) < _SHORTEST_JUMP else (at + _SIDE, size)
+    third, second = np.sort(np.stack(scores), axis=0)[[-3, -2]]
+    surest = np.max([one for name, one in zip(names, scores, strict=True) if name in smooth], axis=0)
+    clear = np.flatnonzero((np.minimum(second, surest) >= _JUMP) & (third >= _ALSO))
+    scale, found = np.array([np.std(signal) for signal in signals.values()]), []
+    for at in clear[np.argsort(-second[clear], kind="stable")].tolist():
+        if any(abs(at + _SIDE - other) <= 2 * _SIDE for other, _ in found):
+            continue
+        sides = np.stack([signal[at : at + 2 * _SIDE] for signal in signals.values()])
+        rates = 0.5 * (sides[:, _SIDE:] @ slope - sides[:, :_SIDE] @ slope[::-1])
+        a, b = rates / scale, np.stack(jumps)[:, at] / scale
+        found.append((at + _SIDE, float(a @ b / (a @ a + 1e-300))))
+    return [one for one in found if abs(one[1]) >= _SHORTEST_JUMP]
