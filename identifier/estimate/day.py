@@ -52,7 +52,7 @@ def day_of(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) 
             information[k, k] = sd**-2
             usual[NUMBERS.index(name)] = sd
     held = replace(table, mean=mean, information=information, moves=moves)
-    found = estimate([drive], vehicle, held, mean)
+    found = estimate([drive], vehicle, held)
     P = found.covariance[np.ix_(WHERE, WHERE)]
     return Day.of(found.p[WHERE], P, (mean[WHERE], usual), v_x, anew=True)
 

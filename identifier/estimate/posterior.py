@@ -20,6 +20,7 @@ class Posterior:
     road_sd : standard deviation of these (K,).
     scale : S of the residuals of both axles [-], (2,).
     memory : T, their integrated autocorrelation time [s], (2,).   cost : J at the optimum [nats].
+    ended : whether nothing was left to gain; else the descent ended at its limit of iterations.
     """
 
     p: Array
@@ -32,6 +33,7 @@ class Posterior:
     scale: Array
     memory: Array
     cost: float
+    ended: bool = True
 
     def __getitem__(self, name: str) -> float:
         return float(self.p[INDEX[name]])

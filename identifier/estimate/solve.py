@@ -7,6 +7,7 @@ second of it counts 1/T_i times; S_i: its scale, by expectation maximization in 
 Gauss-Newton with Levenberg's damping and active bounds.
 """
 
+import itertools
 from collections.abc import Iterator, Sequence
 from copy import copy
 from typing import NamedTuple, TypeAlias
@@ -41,7 +42,7 @@ _SETTLED_MEMORY = 0.1  # |ln| by which T changes where the descent may end
 _SETTLING = 60  # iterations at most where no drive is looked at
 _SETTLED = 1e-4  # [nats] of improvement, below which these end
 
-_FAR_USE = 0.25  # by which a step changes a use of the ellipse: G is quadratic in it
+_GOOD = 0.5  # of what a step promised, that it gains where the next is damped less
 _USES = [INDEX[f"{use}_{axle}"] for use in ("braking", "driving") for axle in "fr"]
 DELAYS = [INDEX[name] for name in ("v_y_delay", "r_delay", "steering_delay")]
 
@@ -343,34 +344,26 @@ def descend(
     p, damping = start.copy(), 1e-3 if memory is None else 1e-6  # then it is near
     # Far from the optimum all residuals are correlated: by their T they would count for nothing.
     T = np.full(2, _SHORTEST_MEMORY) if memory is None else memory
-    ended, settled = False, memory is not None
-    for count in range(1, iterations + 1):
-        now, gains = problem.residuals(p), []
-        while not gains or gains[-1] > max(enough, _SAME_SLOPES * gains[0]):
-            S2 = problem.scale(now.e)
-            if memory is None and (count > 1 or gains):
-                before, T = T, np.sqrt(T * problem.memory(now.e))
-                settled = bool(np.abs(np.log(T / before)).max() < _SETTLED_MEMORY)
-            cost = problem.misfit(now.e, S2, T) + beliefs_cost(priors, p)
-            H, gradient = normal(problem, now, S2, T)
-            of_beliefs, curvature = around_beliefs(priors, p)
-            H = H + curvature[np.ix_(index, index)]
-            gradient = gradient + of_beliefs[index]
-            gains.append(0.0)
-            for trial, tried in _trials(H, gradient, p, priors, damping):
-                step = (trial - p)[index]
-                if -step @ (gradient + 0.5 * H @ step) < 0.5 * enough:
-                    break  # there is nothing left to gain
-                e = problem.misses(trial)
-                reached = problem.misfit(e, S2, T) + beliefs_cost(priors, trial)
-                if reached < cost:
-                    p, now, damping = trial, now._replace(e=e), max(tried / 5.0, 1e-6)
-                    gains[-1] = cost - reached
-                if gains[-1] or len(gains) > 1:
-                    break  # where slopes of before do not serve, new ones do
-        ended = settled and gains[0] < enough
-        if ended:
-            break
+    settled, ended, first = memory is not None, False, 0.0
+    now, taken = problem.residuals(p), 1  # slopes; `first` of the steps on them gained so much
+    for look in itertools.count():
+        S2 = problem.scale(now.e)
+        if memory is None and look:
+            before, T = T, np.sqrt(T * problem.memory(now.e))
+            settled = bool(np.abs(np.log(T / before)).max() < _SETTLED_MEMORY)
+        p, e, damping, gained = _better(problem, now, p, (S2, T), damping, enough, once=first > 0.0)
+        now = now._replace(e=e)
+        if gained > max(_SAME_SLOPES * first, enough):
+            first = first or gained
+        elif not (first or gained or settled):
+            continue  # T alone moves
+        else:
+            ended = not first and settled
+            if not (ended and not gained):
+                now = problem.residuals(p)
+            if ended or taken == iterations:
+                break
+            taken, first = taken + 1, 0.0
     S2, T = problem.scale(now.e), problem.memory(now.e) if memory is None else memory
     H, gradient = normal(problem, now, S2, T)
     slope, curvature = _of_drives(problem, H, gradient)
@@ -390,7 +383,44 @@ def descend(
         scale=np.sqrt(S2),
         memory=T,
         cost=cost,
+        ended=ended,
     )
+
+
+def _better(
+    problem: Problem,
+    now: _Residuals,
+    p: Array,
+    weight: tuple[Array, Array],
+    damping: float,
+    enough: float,
+    *,
+    once: bool,
+) -> tuple[Array, Array, float, float]:
+    """Return parameters that cost less, their e, the damping from there on and what was gained.
+    weight : S² and T.   once : whether no more damping is tried, as where the slopes are old.
+    """
+    priors, index = problem.priors, problem.index
+    cost = problem.misfit(now.e, *weight) + beliefs_cost(priors, p)
+    H, gradient = normal(problem, now, *weight)
+    # G is quadratic in a use of the ellipse, whose second slope is the first over it.
+    uses = np.isin(index, _USES)
+    H[uses, uses] += np.maximum(gradient[uses] / p[index[uses]], 0.0)
+    of_beliefs, curvature = around_beliefs(priors, p)
+    H, gradient = H + curvature[np.ix_(index, index)], gradient + of_beliefs[index]
+    for trial, tried in _trials(H, gradient, p, priors, damping):
+        step = (trial - p)[index]
+        promised = float(-step @ (gradient + 0.5 * H @ step))
+        if promised < enough:
+            break
+        e = problem.misses(trial)
+        reached = problem.misfit(e, *weight) + beliefs_cost(priors, trial)
+        if reached < cost:
+            good = cost - reached > _GOOD * promised
+            return trial, e, max(tried / 5.0, 1e-6) if good else max(tried, 1e-3), cost - reached
+        if once:
+            break
+    return p, now.e, damping, 0.0
 
 
 def _of_drives(problem: Problem, H: Array, gradient: Array) -> tuple[Array, Array]:
@@ -436,10 +466,7 @@ def _trials(
 ) -> Iterator[tuple[Array, float]]:
     """Yield where steps with more and more of Levenberg's damping end, and that damping."""
     index = np.flatnonzero(priors.moves)
-    low, high = priors.low.copy(), priors.high.copy()
-    low[_USES] = np.maximum(low[_USES], p[_USES] - _FAR_USE)
-    high[_USES] = np.minimum(high[_USES], p[_USES] + _FAR_USE)
-    low, high = low[index], high[index]
+    low, high = priors.low[index], priors.high[index]
     for _ in range(8):
         step = bounded_step(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
         trial = p.copy()
