@@ -23,9 +23,11 @@ from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
 from identifier.estimate.solve import (
     ENOUGH,
+    MOST_COUNT,
     STRIDE,
     error_size,
     estimate,
+    settled,
     simulate,
     softness,
 )
@@ -94,7 +96,7 @@ def fit(
     parts: list[tuple[float, Information]] = []
     found: Posterior | None = None
     reach = Reach()
-    known, sd = Information.nothing(), Priors.of(vehicle).sd
+    known, count, sd = Information.nothing(), 0.0, Priors.of(vehicle).sd
     total, done = sum(one.duration for one in recordings), 0.0
     coarse = coarse or total >= _LONG
 
@@ -114,7 +116,8 @@ def fit(
         if begin is not None and days == "each":
             begin[_ZEROS] = before.mean[_ZEROS]
         enough = ENOUGH if begin is None else _ENOUGH_MORE
-        beliefs = before.after(known) if parts else before
+        share = MOST_COUNT / max(count, MOST_COUNT)
+        beliefs = before.after(known.counted(share)) if parts else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         found, roads = with_roads(drives, vehicle, beliefs, found)
         here = _reach(drives, roads, found, vehicle)
@@ -123,9 +126,12 @@ def fit(
             found.p, found.slope, found.curvature, sd, here.slip, found.seconds
         )
         part = part.of_one_day(_ANY_ZERO * sd[_ZEROS]) if days == "each" else part
-        known += part
+        known, count = known + part, count + found.seconds / float(found.memory.min())
         parts.append((drives[0].begin, part))
         went_on(sum(len(one.signals) * one.dt for one in drives))
+    if found is not None and count > MOST_COUNT:
+        p, covariance = settled(before.after(known.counted(MOST_COUNT / count)), found.p)
+        found = replace(found, p=p, covariance=covariance)
     beliefs = before if found is None else _after(before, found)
     for blind in (one for one in recordings if one.logged_v_y is None):
         try:

@@ -121,6 +121,11 @@ class Information:
             seconds=self.seconds + other.seconds,
         )
 
+    def counted(self, share: float) -> "Information":
+        """Return the same where a second counts for that share of one."""
+        return Information(matrix=share * self.matrix, vector=share * self.vector,
+                           seconds=self.seconds)  # fmt: skip
+
     def around(self, p: Array) -> tuple[float, Array, Array]:
         """Return the loss [nats] but for a constant, its slope (p,) and curvature (p, p)."""
         u, slopes = coordinates(p)
