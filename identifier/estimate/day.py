@@ -62,24 +62,31 @@ def days_of(
 ) -> tuple[tuple[int, Day], ...]:
     """Return the days of a log: the first sample of each, and the day.
 
-    Of several logs in a row each long segment is asked; where one differs clearly from the whole,
-    each has a day of its own, and short ones have that of the one before.
+    Of several logs in a row each long segment has a day of its own where they differ clearly, and
+    short ones have that of the one before; else there is one.
     """
-    whole = day_of(recording, vehicle, p, covariance)
+    apart = days_apart(recording, vehicle, p, covariance)
+    return apart or ((0, day_of(recording, vehicle, p, covariance)),)
+
+
+def days_apart(
+    recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
+) -> tuple[tuple[int, Day], ...]:
+    """Return the days of the long segments of a log, as `days_of`; none where they are alike."""
     moving = np.concatenate([[0], np.cumsum(recording.v_x > SLOW * vehicle.froude_speed)])
     long = [
         one
         for one in recording.segments
         if (moving[one.stop] - moving[one.start]) * recording.dt >= ENOUGH
     ]
-    if not (whole.anew and len(long) > 1):
-        return ((0, whole),)
+    if recording.logged_v_y is None or len(long) < 2:
+        return ()
     each = [day_of(recording.taken(one), vehicle, p, covariance) for one in long]
-    z, away = slice(0, _ZEROS), [one.value - whole.value for one in each]
-    far = [
-        d[z] @ np.linalg.solve(one.covariance[z, z], d[z])
-        for one, d in zip(each, away, strict=True)
-    ]
-    if not max(far) > _ANOTHER:
-        return ((0, whole),)
-    return tuple(zip([0, *(one.start for one in long[1:])], each, strict=True))
+    z = slice(0, _ZEROS)
+    weights = [np.linalg.inv(one.covariance[z, z]) for one in each]
+    pulls = [W @ one.value[z] for W, one in zip(weights, each, strict=True)]
+    mean = np.linalg.solve(np.sum(weights, axis=0), np.sum(pulls, axis=0))
+    away = [one.value[z] - mean for one in each]
+    far = max(float(d @ W @ d) for W, d in zip(weights, away, strict=True))
+    firsts = [0, *(one.start for one in long[1:])]
+    return tuple(zip(firsts, each, strict=True)) if far > _ANOTHER else ()

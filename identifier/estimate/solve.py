@@ -46,6 +46,7 @@ _SETTLING = 60  # iterations at most where no drive is looked at
 _SETTLED = 1e-4  # [nats] of improvement, below which these end
 
 _GOOD = 0.5  # of what a step promised, that it gains where the next is damped less
+_LEAST_USE = 1e-3  # of the ellipse, of which its second slope is told
 _USES = [INDEX[f"{use}_{axle}"] for use in ("braking", "driving") for axle in "fr"]
 DELAYS = [INDEX[name] for name in ("v_y_delay", "r_delay", "steering_delay")]
 
@@ -54,11 +55,12 @@ Labels: TypeAlias = Sequence[NDArray[np.intp]]
 
 
 class _Residuals(NamedTuple):
-    """e over b (m, 2), and its slopes over the parameters that move (m, 2, n) at p."""
+    """e over b (m, 2), and its slopes (m, 2, n) at p over those of its entries `index` (n,)."""
 
     e: Array
     slopes: Array
     p: Array
+    index: NDArray[np.intp]
 
 
 class Problem:
@@ -182,7 +184,7 @@ class Problem:
             slope[:, :, self.index == INDEX["v_x_factor"]] -= e[..., None] / shrunk
         with np.errstate(invalid="ignore", over="ignore"):
             slope = np.nan_to_num(slope / (self.size[:, None, None] * shrunk))
-        return _Residuals(self._over_size(e, p), slope, p)
+        return _Residuals(self._over_size(e, p), slope, p, self.index)
 
     def memory(self, e: Array) -> Array:
         """Return T of both axles [s], (2,), from the correlation of residuals (m, 2).
@@ -521,8 +523,8 @@ def normal(problem: Problem, at: _Residuals, S2: Array, T: Array) -> tuple[Array
     J = at.slopes.reshape(-1, at.slopes.shape[2])
     weighted = J * w.reshape(-1, 1)
     H, gradient = weighted.T @ J, weighted.T @ at.e.ravel()
-    uses = np.isin(problem.index, _USES)
-    H[uses, uses] += np.maximum(gradient[uses] / at.p[problem.index[uses]], 0.0)
+    uses = np.isin(at.index, _USES)
+    H[uses, uses] += np.maximum(gradient[uses] / np.maximum(at.p[at.index[uses]], _LEAST_USE), 0.0)
     return H, gradient
 
 
