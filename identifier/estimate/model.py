@@ -9,7 +9,7 @@ from typing import Any, Self, TypeVar
 import casadi as ca
 import numpy as np
 
-from codegen.arrays import Array, blocks, large
+from codegen.arrays import LONG, Array, blocks, large
 from identifier.axle.car import Car
 from identifier.axle.car import car_numbers as axle_numbers
 from identifier.axle.curve import Curve
@@ -166,7 +166,7 @@ class FittedModel(TireModel):
         Signals go through a zero-phase mean of 0.07 s (`estimate.drive`), the errors of this log's
         sensors (`on`) are taken off; where the car is slower than `min_speed` forces are zero.
         """
-        return self._over(recording)[0] * self._loads
+        return self._over(recording)[0]
 
     def lagged_slip(self, recording: Recording) -> Array:
         """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
@@ -210,34 +210,11 @@ class FittedModel(TireModel):
 
     def _known(self, log: Recording, find: Callable[..., _Found]) -> _Found:
         """Return what a log and these tires tell, kept for the next who asks."""
-        key = (
-            *(log.t, log.v_x, log.r, log.a_y, log.a_x, log.delta_f, log.delta_r, log.v_y),
-            *(self.p, self.covariance, self.vehicle, find),
-        )
-        for known, about, found in _LAST:
-            same = all(one is other for one, other in zip(known, key, strict=True))
-            if same and about == (log.breaks, log.estimated):
-                return found
-        found = find(log, self.vehicle, self.p, self.covariance)
-        _LAST.append((key, (log.breaks, log.estimated), found))
-        return found
+        return _found(_LAST, find, log, self.vehicle, self.p, self.covariance)
 
     def _over(self, recording: Recording) -> tuple[Array, Array]:
-        force, slip = large((len(recording), 2)), large((len(recording), 2))
-        firsts, days = zip(*self.days(recording), strict=True)
-        for segment in recording.segments:
-            k = int(np.searchsorted(firsts, segment.start, side="right")) - 1
-            p = days[k].on(self.p)
-            begin, end = segment.start, min(segment.stop, len(recording))
-            for part in blocks(end - begin):
-                first = max(part.start - _WARM, 0)
-                some = slice(begin + first, begin + part.stop)
-                drive = Drive.of(recording, self.vehicle, some, replay=True)
-                out = simulate(drive, p, self.vehicle)
-                kept = slice(begin + part.start, begin + part.stop)
-                force[kept] = out["force"][part.start - first :]
-                slip[kept] = out["slip"][part.start - first :]
-        return force, slip
+        given = recording, self.vehicle, self.p, self.days(recording)
+        return _driven(*given) if len(recording) <= LONG else _found(_LONG_DRIVES, _driven, *given)
 
     def slope_at(self, slip: Array) -> Array:
         """Return the slope of the curves under static loads at slips [static loads/rad], (n, 2)."""
@@ -338,4 +315,39 @@ class FittedModel(TireModel):
 
 
 # A run, its verdict and its report ask about the same drive: the last few answers are kept.
+_LONG_DRIVES: deque[Any] = deque(maxlen=2)
 _LAST: deque[tuple[tuple[Any, ...], tuple[Any, ...], Any]] = deque(maxlen=32)
+
+
+def _found(kept: deque[Any], find: Callable[..., _Found], log: Recording, *given: Any) -> _Found:
+    """Return what is found of a log, or was: of the same signals and of the same objects."""
+    signals = (log.t, log.v_x, log.r, log.a_y, log.a_x, log.delta_f, log.delta_r, log.v_y)
+    key, about = (*signals, *given, find), (log.breaks, log.estimated)
+    for known, what, found in kept:
+        if what == about and all(one is other for one, other in zip(known, key, strict=True)):
+            return found
+    found = find(log, *given)
+    kept.append((key, about, found))
+    return found
+
+
+def _driven(
+    recording: Recording, vehicle: Vehicle, tires: Array, days: tuple[tuple[int, Day], ...]
+) -> tuple[Array, Array]:
+    """Return forces [N] and lagged slip of a drive, (n, 2)."""
+    force, slip = large((len(recording), 2)), large((len(recording), 2))
+    loads, firsts = np.array(vehicle.axle_loads), [first for first, _ in days]
+    for segment in recording.segments:
+        p = days[int(np.searchsorted(firsts, segment.start, side="right")) - 1][1].on(tires)
+        begin, end = segment.start, min(segment.stop, len(recording))
+        for part in blocks(end - begin):
+            first = max(part.start - _WARM, 0)
+            some = slice(begin + first, begin + part.stop)
+            drive = Drive.of(recording, vehicle, some, replay=True)
+            out = simulate(drive, p, vehicle)
+            kept = slice(begin + part.start, begin + part.stop)
+            force[kept] = loads * out["force"][part.start - first :]
+            slip[kept] = out["slip"][part.start - first :]
+    for one in (force, slip):
+        one.setflags(write=len(recording) <= LONG)  # long ones are kept for the next who asks
+    return force, slip
