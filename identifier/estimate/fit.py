@@ -4,6 +4,7 @@ Logs with a v_y are estimated by the balance (`solve`), those without by `latent
 """
 
 import itertools
+import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple, TypeAlias
@@ -34,6 +35,8 @@ from identifier.estimate.solve import (
 from identifier.motion.parameters import INDEX, NAMES
 from models.recordings import Recording, joined
 from models.vehicle import GRAVITY, Vehicle
+
+log = logging.getLogger("tireid.estimate")
 
 _BLOCK = 600.0  # [s] that are estimated at once
 _BLIND = 300.0  # [s] of a log without v_y that teach: those of hardest cornering
@@ -119,6 +122,9 @@ def fit(
         share = MOST_COUNT / max(count, MOST_COUNT)
         beliefs = before.after(known.counted(share)) if parts else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
+        if not found.ended:
+            log.warning("%s: the descent ended at its limit, not where nothing was left to gain",
+                        recordings[0].name)  # fmt: skip
         found, roads = with_roads(drives, vehicle, beliefs, found)
         here = _reach(drives, roads, found, vehicle)
         reach = reach.with_(here)

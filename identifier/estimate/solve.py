@@ -55,12 +55,12 @@ Labels: TypeAlias = Sequence[NDArray[np.intp]]
 
 
 class _Residuals(NamedTuple):
-    """e over b (m, 2), and its slopes (m, 2, n) at p over those of its entries `index` (n,)."""
+    """e over b (m, 2), and its slopes (m, 2, n) at p over those of its entries `moved` (n,)."""
 
     e: Array
     slopes: Array
     p: Array
-    index: NDArray[np.intp]
+    moved: NDArray[np.intp]
 
 
 class Problem:
@@ -144,10 +144,10 @@ class Problem:
         p : as of `residuals`.   road : ln of the friction that is added to that of all samples.
         """
         found = []
-        for k, one in enumerate(self.drives):
+        for k, (stride, kept) in enumerate(zip(self._strides, self._kept, strict=True)):
             driven = self._driven(k, p, road)
-            e = _simulated(driven, p, self._car, motion_scan(), ("residual",), self._strides[k])[0]
-            found.append(e[self._kept[k]])
+            e = _simulated(driven, p, self._car, motion_scan(), ("residual",), stride)[0]
+            found.append(e[kept])
         return self._over_size(np.concatenate(found), p)
 
     def _driven(self, k: int, p: Array, road: float = 0.0) -> Drive:
@@ -523,8 +523,8 @@ def normal(problem: Problem, at: _Residuals, S2: Array, T: Array) -> tuple[Array
     J = at.slopes.reshape(-1, at.slopes.shape[2])
     weighted = J * w.reshape(-1, 1)
     H, gradient = weighted.T @ J, weighted.T @ at.e.ravel()
-    uses = np.isin(at.index, _USES)
-    H[uses, uses] += np.maximum(gradient[uses] / np.maximum(at.p[at.index[uses]], _LEAST_USE), 0.0)
+    uses = np.isin(at.moved, _USES)
+    H[uses, uses] += np.maximum(gradient[uses] / np.maximum(at.p[at.moved[uses]], _LEAST_USE), 0.0)
     return H, gradient
 
 

@@ -274,9 +274,10 @@ def tears(signals: Mapping[str, Array], smooth: frozenset[str]) -> list[tuple[in
         scores.append(size / np.maximum(np.maximum(usual, 0.8 * busy), 1e-300))
         jumps.append(jump)
     third, second = np.sort(np.stack(scores), axis=0)[[-3, -2]]
-    surest = np.max([one for name, one in zip(names, scores, strict=True) if name in smooth], axis=0)
+    surest = np.max([scores[k] for k, name in enumerate(names) if name in smooth], axis=0)
     clear = np.flatnonzero((np.minimum(second, surest) >= _JUMP) & (third >= _ALSO))
-    scale, found = np.array([np.std(signal) for signal in signals.values()]), []
+    scale = np.array([np.std(signal) for signal in signals.values()])
+    found: list[tuple[int, float]] = []
     for at in clear[np.argsort(-second[clear], kind="stable")].tolist():
         if any(abs(at + _SIDE - other) <= 2 * _SIDE for other, _ in found):
             continue

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 import casadi as ca
 import numpy as np
@@ -9,15 +10,17 @@ import pytest
 
 from benchmarks.random_cars import random_car, random_drive
 from identifier.doctor.faults import examine
+from identifier.estimate import solve
 from identifier.estimate.drive import Drive
 from identifier.estimate.fit import _after, _blocks, _lasting, fit
 from identifier.estimate.method import FitMethod
 from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
-from identifier.estimate.solve import estimate
+from identifier.estimate.solve import Problem, descend, estimate
 from identifier.motion.parameters import INDEX, NAMES
 from identifier.verdict import judge_identification
 from models.maneuvers import RandomSteer
 from models.plant import Plant
+from models.recordings import Recording
 from models.tires import Tire
 from models.vehicle import estimate as estimated
 from models.vehicle import sedan
@@ -101,6 +104,38 @@ def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt):
     np.testing.assert_allclose(
         blocks.band.relative_sd(GRID), learnt.model.band.relative_sd(GRID), rtol=0.7
     )
+
+
+def test_hours_of_one_drive_tell_no_more_than_minutes_and_tears_between_are_cut():
+    """Errors of a model do not average out; where a car would have leapt another drive begins."""
+    drive, rng = driven(3), np.random.default_rng(1)
+    times, n = 70, len(drive)
+    noise = {"v_x": 0.01, "v_y": 0.01, "r": 0.002, "delta_f": 0.0}
+    signals = {
+        name: np.tile(getattr(drive, name), times) + sd * rng.standard_normal(n * times)
+        for name, sd in noise.items()
+    }
+    t = drive.dt * np.arange(n * times)
+    hours = Recording(name="again", t=t, delta_r=np.zeros(t.size), **signals)
+    begins = Drive.of(hours, sedan()).begins
+    assert np.abs(np.array(begins) - n * np.arange(times)).max() <= 2
+    many, few = (fit([one], sedan()).model for one in (hours, hours.taken(slice(0, 4 * n))))
+    on = np.diag(few.covariance) > 0.0
+    sd, less = (np.sqrt(np.diag(one.covariance)[on]) for one in (few, many))
+    assert (less > 0.6 * sd).all() and (np.abs(many.p - few.p)[on] < sd).all()
+    k = INDEX["v_y_bias"]
+    assert abs(many.p[k]) < 4.0 * np.sqrt(many.covariance[k, k])
+
+
+def test_a_descent_that_did_not_end_is_said(monkeypatch, caplog):
+    drive = driven(3)
+    problem = Problem([Drive.of(drive, sedan())], sedan(), Priors.of(sedan()))
+    assert not descend(problem, problem.priors.mean, iterations=1).ended
+    assert estimate(problem.drives, sedan()).ended
+    short = partial(descend, iterations=1)
+    monkeypatch.setattr(solve, "descend", short)
+    fit([drive], sedan())
+    assert "the descent ended at its limit" in caplog.text
 
 
 def test_a_drop_of_friction_is_a_segment_and_without_one_there_is_none(learnt):
