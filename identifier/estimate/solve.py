@@ -455,17 +455,24 @@ def normal(problem: Problem, at: _Residuals, S2: Array, T: Array) -> tuple[Array
 
 
 def bounded_step(H: Array, gradient: Array, p: Array, low: Array, high: Array) -> Array:
-    """Return the step of a quadratic model; parameters at a bound that it would leave stay."""
-    free = np.ones(p.size, dtype=bool)
-    step = np.zeros(p.size)
-    for _ in range(4):
-        step[:] = 0.0
-        step[free] = -np.linalg.solve(H[np.ix_(free, free)], gradient[free])
-        aimed = p + step
-        out = ((aimed < low - 1e-12) & (p <= low + 1e-9)) | (
-            (aimed > high + 1e-12) & (p >= high - 1e-9)
-        )
-        if not (free & out).any():
+    """Return the step to the least of a quadratic model within bounds, by an active set.
+    H : positive definite (n, n).   gradient, p, low, high : (n,), p within its bounds.
+    """
+    least, most = low - p, high - p
+    free, step = np.ones(p.size, dtype=bool), np.zeros(p.size)
+    for _ in range(3 * p.size):
+        held = ~free
+        rest = gradient[free] + H[np.ix_(free, held)] @ step[held]
+        step[free] = -np.linalg.solve(H[np.ix_(free, free)], rest)
+        out = free & ((step < least) | (step > most))
+        if out.any():
+            step[out] = np.clip(step[out], least[out], most[out])
+            free &= ~out
+            continue
+        slope = gradient + H @ step
+        back = held & (((step <= least) & (slope < 0.0)) | ((step >= most) & (slope > 0.0)))
+        if not back.any():
             break
-        free &= ~out
+        worst = np.argmax(np.where(back, np.abs(slope) / np.sqrt(np.diag(H)), 0.0))
+        free[worst] = True
     return step
