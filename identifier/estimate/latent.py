@@ -461,7 +461,7 @@ class _Latent:
         self, z: Array, p: Array, firm: float, R: Array | None = None, *, rounds: int = 2
     ) -> _Smoothed:
         """Return the optimum from a start, its noise learnt in some rounds.
-        R : to begin with (2,); None takes that of good sensors.   firm : as of `descend`.
+        firm : as of `descend`.   R : to begin with (2,); None takes that of good sensors.
         """
         R = self.R if R is None else R
         for _ in range(rounds):
