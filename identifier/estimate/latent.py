@@ -308,7 +308,8 @@ class _Latent:
         g[1:] += out["slope_next"][:-1]
         A[~self.nodes.counts] = np.eye(N)
         gradient, curvature = around_beliefs(self.priors, p)
-        C = out["sums_final"] + curvature[np.ix_(over, over)]
+        half = out["sums_final"]
+        C = half + np.tril(half, -1).T + curvature[np.ix_(over, over)]
         g_p = out["slopes_final"].ravel() + gradient[over]
         return _Around(A, out["both"][:-1], B, C, g, g_p), out["shows_z"]
 
