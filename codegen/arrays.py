@@ -8,10 +8,12 @@ BLAS takes one thread: matrices are small here, and threads that wait for work c
 
 import mmap
 import os
+import sys
 import tempfile
 import weakref
 from collections.abc import Callable, Iterator
 from contextlib import ContextDecorator, suppress
+from functools import cache
 from threading import Lock
 from typing import IO, Any, Literal
 
@@ -102,11 +104,10 @@ class _OneThread(ContextDecorator):
         self._before: Any = None
 
     def __enter__(self) -> None:
-        from threadpoolctl import threadpool_limits
-
         with self._lock:
             if not self._calls:
-                self._before = threadpool_limits(1, "blas")
+                libraries = _libraries("scipy.linalg" in sys.modules)
+                self._before = libraries.limit(limits=1, user_api="blas")
             self._calls += 1
 
     def __exit__(self, *_: object) -> None:
@@ -114,6 +115,14 @@ class _OneThread(ContextDecorator):
             self._calls -= 1
             if not self._calls:
                 self._before.restore_original_limits()
+
+
+@cache
+def _libraries(_scipy: bool) -> Any:
+    """Return those of the process, looked up anew when SciPy has brought its own."""
+    from threadpoolctl import ThreadpoolController  # 6 ms
+
+    return ThreadpoolController()
 
 
 one_thread = _OneThread()

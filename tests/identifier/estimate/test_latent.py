@@ -109,6 +109,26 @@ def test_the_step_is_that_of_the_dense_matrix(problem, place):
     np.testing.assert_allclose(whole, np.diag(inverse)[: z.size : 8], rtol=1e-3)
 
 
+def test_steps_that_are_tried_again_are_smaller_and_within_bounds(problem, place):
+    z, p, weights = place
+    low, high = problem.priors.low, problem.priors.high
+    p = np.clip(p, low, high)
+    at, _ = problem.around(z, p, weights, problem.index)
+    aimed, sizes = p.copy(), []
+    for _, dp, _ in problem._steps(at, p, 0.0):
+        aimed[problem.index] = p[problem.index] + dp
+        assert (aimed > low - 1e-9).all() and (aimed < high + 1e-9).all()
+        sizes.append(np.linalg.norm(dp * np.sqrt(np.diag(at.C))))
+    assert (np.diff(sizes) < 0.0).all() and sizes[-1] < 0.01 * sizes[0]
+
+
+def test_soft_and_stiff_tires_end_alike(exact):
+    nodes = Nodes.of(blind(exact), CAR)
+    whole = _Latent(nodes, CAR, latent_priors(CAR, Priors.of(CAR)))
+    soft, stiff = (whole.descend(*whole.begin(k), whole.R)[2] for k in (-0.4, 0.4))
+    assert soft == pytest.approx(stiff, abs=0.5)
+
+
 def test_parameters_that_are_held_leave_their_doubt(problem, place):
     """Held parameters with the covariance of the free ones tell the same doubt of v_y."""
     z, p, _ = place
