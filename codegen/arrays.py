@@ -3,14 +3,18 @@
 A recording of ten hours has millions of samples. What is computed of every sample goes through them
 block by block, and what is kept of every sample lies on disk where it is large: memory then does
 not grow with the recording. Up to `LONG` samples there is one block, and all is in memory.
+BLAS takes one thread: matrices are small here, and threads that wait for work cost more than it.
 """
 
 import mmap
 import os
+import sys
 import tempfile
 import weakref
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import ContextDecorator, suppress
+from functools import cache
+from threading import Lock
 from typing import IO, Any, Literal
 
 import numpy as np
@@ -90,3 +94,35 @@ def filled(n: int, compute: Callable[[slice], Array]) -> Array:
         values[part] = compute(part)
     values.setflags(write=False)
     return values
+
+
+class _OneThread(ContextDecorator):
+    """BLAS on one thread in the whole process, until the last of the calls that ask for it ends."""
+
+    def __init__(self) -> None:
+        self._lock, self._calls = Lock(), 0
+        self._before: Any = None
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._calls:
+                libraries = _libraries("scipy.linalg" in sys.modules)
+                self._before = libraries.limit(limits=1, user_api="blas")
+            self._calls += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._calls -= 1
+            if not self._calls:
+                self._before.restore_original_limits()
+
+
+@cache
+def _libraries(_scipy: bool) -> Any:
+    """Return those of the process, looked up anew when SciPy has brought its own."""
+    from threadpoolctl import ThreadpoolController  # 6 ms
+
+    return ThreadpoolController()
+
+
+one_thread = _OneThread()

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 from typing import Any
 
+from codegen.arrays import one_thread
 from identifier.doctor.faults import Examination, examine, prepared
 from identifier.doctor.finding import Finding, first_of_each
 from identifier.doctor.samples import sample_findings
@@ -95,6 +96,7 @@ def _certainty(one: Finding) -> str:
     return "sure" if one.sure else ("note, " if one.note else "") + f"confidence {one.percent}"
 
 
+@one_thread
 def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     """Return what is wrong with a log or with the declaration of its car, from the log alone.
 

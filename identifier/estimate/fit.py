@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from codegen.arrays import Array
+from codegen.arrays import Array, one_thread
 from identifier.day import ENOUGH as ENOUGH_DRIVEN
 from identifier.estimate.day import days_apart
 from identifier.estimate.drive import FASTEST, Drive, hardest
@@ -69,6 +69,7 @@ class _Fit(NamedTuple):
     parts: list[tuple[float, Information]]
 
 
+@one_thread
 def fit(
     recordings: Sequence[Recording],
     vehicle: Vehicle,
@@ -146,16 +147,16 @@ def fit(
                 blind,
                 vehicle,
                 hardest(blind, _BLIND),
-                a_y_late=max(late, 0.0),
+                a_y_late=max(late.seconds, 0.0),
                 ln_sway=float(beliefs.mean[INDEX["ln_sway"]]),
             )
         except TooShortError:
             if len(recordings) == 1:
                 raise
             continue
-        reach = reach.with_(Reach(a_y_late=late))
+        reach = reach.with_(Reach(a_y_late=late.seconds))
         if nodes.counts.any():
-            learnt = learn_latent(nodes, vehicle, beliefs, late=late > 0.0)
+            learnt = learn_latent(nodes, vehicle, beliefs, late)
             found, reach = learnt.posterior, reach.with_(_reach_of_states(learnt))
             beliefs = _after(beliefs, found)
         went_on(blind.duration)

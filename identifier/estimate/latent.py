@@ -10,7 +10,6 @@ what is left of all of it, which is more on a real car than on a simulated one.
 """
 
 from collections.abc import Iterator
-from copy import copy
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -18,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
-from codegen.arrays import Array
+from codegen.arrays import Array, one_thread
 from identifier.estimate.drive import hardest
 from identifier.estimate.nodes import JERKS, Nodes, low_passed
 from identifier.estimate.posterior import Posterior
@@ -45,8 +44,15 @@ _SURELY_LATE = 3.0  # sd of a delay, above which it is taken out; a single step 
 _GAINED = 8.0  # nats that a delay gains, more where more is left (`Trust.usual`)
 _ALIKE = 1e-4  # probability from which another start's end counts
 _STARTS = (-0.4, 0.4)  # of ln C: soft and stiff
-_FIRM = 50.0  # times that beliefs count at first
-_FEW = 8  # iterations of all descents but the last
+_FIRM = 50.0  # times that beliefs hold parameters at first, where the states are far off
+_NEAR = 0.1  # the same near an optimum
+_RIDGE = 1e-12  # of what states tell: rounding leaves it positive
+_TRIALS, _WHOLE = 10, 3  # of a step, and those before it is halved
+_ITERATIONS = 25  # of a descent, at most
+_ENOUGH = 0.02  # [nats] of improvement, below which it ends
+_FEW = 2  # iterations that show whether a delay is to be looked for
+_PROMISED = 2.0  # nats that it gains by then; of random cars on time at most 3.7, late at least 7
+_NEARLY = 0.2  # [nats], the same of all descents but the last
 _MOST_SLIP = 0.7  # |v_y/v_x|, at most
 _MOST_LAGGED = 0.8  # lagged slip [rad], at most
 _LOOKED = 0.25  # [s] over which what is left of a sensor is alike
@@ -192,14 +198,14 @@ class _Latent:
         trust: _Trust = TRUST,
     ) -> None:
         self.nodes, self.vehicle, self.trust = nodes, vehicle, trust
-        self.index = np.flatnonzero(priors.moves) if columns is None else columns
+        self.moves = np.flatnonzero(priors.moves)
+        self.index = self.moves if columns is None else columns
         self.free = np.flatnonzero(priors.moves[self.index])
         self.priors = priors
-        self._slopes = node_scan(tuple(LATENT_NAMES[k] for k in self.index))
-        self._plain = node_scan()
         self._car = car_numbers(vehicle)
         s, L = float(np.sqrt(vehicle.wheelbase / SEDAN)), vehicle.wheelbase
         self.scale = s
+        self._believed = np.diag(priors.information)[self.moves]
         self._times = np.array([trust.error_time * s, trust.bank_time * s])
         per = np.array([1.0 / s, 1.0])
         self._floor = per * (trust.r, trust.a_y)
@@ -216,6 +222,12 @@ class _Latent:
         )
 
     # The model over the nodes.
+
+    def seen(self, z: Array, p: Array) -> dict[str, Array]:
+        """Return what the model misses at a point, by port of `node_scan`; `shows` of sensors."""
+        out = self._run(node_scan(), z, p, {})
+        out["missed"] = self.nodes.measured - out["shows"]
+        return out
 
     def _run(self, scan: Scan, z: Array, p: Array, more: dict[str, Array]) -> dict[str, Array]:
         given = self.nodes.given
@@ -235,25 +247,25 @@ class _Latent:
         found[:, 1] += (self.trust.a_y_share * self.nodes.given[:, 5]) ** 2
         return found
 
-    def weights(self, z: Array, p: Array, R: Array) -> dict[str, Array]:
+    def weights(self, seen: dict[str, Array], R: Array) -> dict[str, Array]:
         """Return the weights of what is missed, by port of `node_scan`."""
         nodes, t = self.nodes, self.trust
-        out = self._run(self._plain, z, p, {})
-        phi = np.abs(out["force"])
-        sd = np.tile(self._sd, (len(z), 1))
+        phi = np.abs(seen["force"])
+        n = len(phi)
+        sd = np.tile(self._sd, (n, 1))
         between = (phi + _next(phi)) / 2
         sd[:, 4:6] = (t.error + t.relative * between) * np.sqrt(1.0 - self._kept**2)
         variance = self.variance(R)
-        off = np.abs(nodes.measured - out["shows"]) / np.sqrt(variance)
+        off = np.abs(seen["missed"]) / np.sqrt(variance)
         counts = nodes.counts[:, None]
         first = np.column_stack(
             [
                 t.side_slip * nodes.given[:, 0],
-                np.full(len(z), np.inf),
-                np.full((len(z), 2), 0.01),
+                np.full(n, np.inf),
+                np.full((n, 2), 0.01),
                 t.error + t.relative * phi,
-                np.full(len(z), t.bank),
-                np.full(len(z), t.bank / self._times[1]),
+                np.full(n, t.bank),
+                np.full(n, t.bank / self._times[1]),
             ]
         )
         return {
@@ -263,79 +275,83 @@ class _Latent:
             "of_begins": np.where(nodes.begins[:, None], first**-2, 0.0),
         }
 
-    def cost(self, z: Array, p: Array, weights: dict[str, Array]) -> float:
+    def cost(self, seen: dict[str, Array], p: Array, weights: dict[str, Array]) -> float:
         """Return J with weights that are fixed [nats]."""
-        total = self.misfit(z, p, weights) + beliefs_cost(self.priors, p)
+        total = _misfit(seen, weights) + beliefs_cost(self.priors, p)
         return float(np.nan_to_num(total, nan=np.inf))
 
-    def value(self, z: Array, p: Array, R: Array) -> float:
+    def value(self, seen: dict[str, Array], p: Array, R: Array) -> float:
         """Return J with Huber's loss, by which optima are compared [nats].
 
         A residual of o > c deviations has the weight c/o in `cost`, in which c o/2 is left of
         c o - c²/2.
         """
-        weights = self.weights(z, p, R)
+        weights = self.weights(seen, R)
         share = weights["of_shows"] * self.variance(R)
         clipped = share[(share > 0.0) & (share < 1.0)]
         lost = 0.5 * self.trust.clip**2 * float(np.sum(1.0 / clipped - 1.0))
-        return self.cost(z, p, weights) + lost
+        return self.cost(seen, p, weights) + lost
 
-    def misfit(self, z: Array, p: Array, weights: dict[str, Array]) -> float:
-        """Return J without what is believed [nats]."""
-        out = self._run(self._plain, z, p, {})
-        out["shows"] = out["shows"] - self.nodes.measured
-        parts = (("moves", "of_moves"), ("shows", "of_shows"), ("begins", "of_begins"))
-        return 0.5 * sum(float(np.sum(weights[w] * out[name] ** 2)) for name, w in parts)
-
-    def around(self, z: Array, p: Array, weights: dict[str, Array]) -> tuple[_Around, Array]:
-        """Return matrix and gradient at a point, and the slopes of what sensors show (n, 2, 8)."""
-        m = len(self.index)
+    def around(
+        self, z: Array, p: Array, weights: dict[str, Array], over: NDArray[np.intp]
+    ) -> tuple[_Around, Array]:
+        """Return matrix and gradient at a point, and the slopes of what sensors show (n, 2, 8).
+        over : parameters, (m,).
+        """
+        m = len(over)
         sums = {"sums": np.zeros((m, m)), "slopes": np.zeros(m)}
         more = {"measured": self.nodes.measured, **weights, **sums}
-        out = self._run(self._slopes, z, p, more)
+        out = self._run(node_scan(tuple(LATENT_NAMES[k] for k in over)), z, p, more)
         A, B, g = out["now"], out["border"], out["slope"]
         A[1:] += out["next"][:-1]
         B[1:] += out["border_next"][:-1]
         g[1:] += out["slope_next"][:-1]
         A[~self.nodes.counts] = np.eye(N)
         gradient, curvature = around_beliefs(self.priors, p)
-        C = out["sums_final"] + curvature[np.ix_(self.index, self.index)]
-        g_p = out["slopes_final"].ravel() + gradient[self.index]
+        half = out["sums_final"]
+        C = half + np.tril(half, -1).T + curvature[np.ix_(over, over)]
+        g_p = out["slopes_final"].ravel() + gradient[over]
         return _Around(A, out["both"][:-1], B, C, g, g_p), out["shows_z"]
 
-    def _eliminated(self, at: _Around, damping: float) -> tuple[Array, Array]:
-        """Return A⁻¹ g (8n,) and A⁻¹ B (8n, m)."""
+    def _factor(self, at: _Around) -> Array:
+        """Return L of the states' matrix L Lᵀ, its bands as rows (16, 8n)."""
         n = len(at.A)
-        banded = np.zeros((2 * N, n * N))
+        banded = np.zeros((2 * N, n * N), order="F")
         for i in range(N):
             for j in range(N):
                 if i >= j:
-                    banded[i - j, j::N] = at.A[:, i, j] * (1.0 + damping * (i == j))
+                    banded[i - j, j::N] = at.A[:, i, j] * (1.0 + _RIDGE * (i == j))
                 banded[N + i - j, j : (n - 1) * N : N] = at.O[:, i, j]
-        from scipy.linalg import cho_solve_banded, cholesky_banded  # takes long to import
+        from scipy.linalg import cholesky_banded  # takes long to import
 
-        factor = cholesky_banded(banded, lower=True, check_finite=False, overwrite_ab=True)
-        right = np.hstack([at.g.reshape(-1, 1), at.B.reshape(n * N, -1)])
-        X = cho_solve_banded((factor, True), right, overwrite_b=True, check_finite=False)
-        return X[:, 0], X[:, 1:]
+        return cholesky_banded(banded, lower=True, check_finite=False, overwrite_ab=True)
 
-    def _step(self, at: _Around, p: Array, damping: float) -> tuple[Array, Array]:
-        """Return the steps of states (n, 8) and of parameters that move."""
-        x, X = self._eliminated(at, damping)
-        free, index = self.free, self.index[self.free]
-        B = at.B.reshape(len(X), -1)[:, free]
-        S = at.C[np.ix_(free, free)] - B.T @ X[:, free]
-        S += damping * np.diag(np.diag(at.C)[free])
-        low, high = self.priors.low[index], self.priors.high[index]
-        dp = bounded_step((S + S.T) / 2, at.g_p[free] - B.T @ x, p[index], low, high)
-        return -(x + X[:, free] @ dp).reshape(-1, N), dp
+    def _steps(self, at: _Around, p: Array, firm: float) -> Iterator[tuple[Array, Array, float]]:
+        """Yield steps of states (n, 8) and of parameters that move, each smaller than the one
+        before, and by how many times beliefs these are held where they are.
+        """
+        index, L = self.moves, self._factor(at)
+        y, Y = _solved(L, at.g.ravel()), _solved(L, at.B.reshape(L.shape[1], -1))
+        S, slope = at.C - Y.T @ Y, at.g_p - Y.T @ y
+        low, high, held = self.priors.low[index], self.priors.high[index], self._believed
+        for k in range(_TRIALS):
+            dp = bounded_step((S + S.T) / 2 + firm * np.diag(held), slope, p[index], low, high)
+            share = min(1.0, 2.0 ** (_WHOLE - k))
+            yield -share * _solved(L, y + Y @ dp, "T").reshape(-1, N), share * dp, firm
+            firm = max(8.0 * firm, 0.1)
 
     # The optimum.
 
-    def begin(self, stiffer: float = 0.0) -> tuple[Array, Array]:
-        """Return states whose rear axle does not slip, and the parameters that are believed.
+    def begin(
+        self, stiffer: float = 0.0, late: "Lateness | None" = None
+    ) -> tuple[Array, Array, float]:
+        """Return states whose rear axle does not slip, the parameters that are believed, and how
+        firmly.
         stiffer : by which ln C of both axles is larger.
+        late : whose parameters are taken in their place, and its states if they are of these nodes.
         """
+        if late is not None and np.array_equal(late.t, self.nodes.t):
+            return late.z, late.p, _NEAR
         v_x, delta = self.nodes.given[:, 0], self.nodes.given[:, 1]
         r = low_passed(self.nodes.measured[:, 0], 3.0 / self.scale, self.nodes.dt)
         l_f, l_r = self.vehicle.bicycle.l_f, self.vehicle.bicycle.l_r
@@ -346,77 +362,81 @@ class _Latent:
         for axle in "fr":
             k = INDEX[f"ln_stiffness_{axle}"]
             p[k] += stiffer if self.priors.moves[k] else 0.0
-        return z, p
+        return z, p if late is None else late.p, _FIRM
 
-    def settled(self, stiffer: float = 0.0) -> tuple[Array, Array]:
-        """Return states and parameters near an optimum, where parameters do not run away."""
-        firm = copy(self)
-        firm.priors = replace(self.priors, information=_FIRM * self.priors.information)
-        z, p, _ = firm.descend(*self.begin(stiffer), self.R, _FEW)
-        return z, p
-
-    def descend(self, z: Array, p: Array, R: Array, most: int = 25) -> tuple[Array, Array, float]:
-        """Return states, parameters and cost at an optimum."""
-        damping, v_x = 1e-4, self.nodes.given[:, 0]
-        index = self.index[self.free]
-        sd = np.diag(self.priors.information)[index] ** -0.5
-        low, high = self.priors.low[index], self.priors.high[index]
-        most_z = np.full(z.shape, np.inf)
-        most_z[:, 0], most_z[:, 2:4] = _MOST_SLIP * v_x, _MOST_LAGGED
+    def descend(
+        self,
+        z: Array,
+        p: Array,
+        firm: float,
+        R: Array,
+        *,
+        enough: float = _ENOUGH,
+        most: int = _ITERATIONS,
+    ) -> tuple[Array, Array, float]:
+        """Return states, parameters and cost at an optimum.
+        firm : times that beliefs hold the parameters where they are at first: where states are far
+            off these diverge.
+        enough : improvement of the cost, below which it ends [nats].   most : iterations.
+        """
+        index, most_z = self.moves, np.full(z.shape, np.inf)
+        most_z[:, 0], most_z[:, 2:4] = _MOST_SLIP * self.nodes.given[:, 0], _MOST_LAGGED
+        seen = self.seen(z, p)
         for _ in range(most):
-            weights = self.weights(z, p, R)
-            cost = self.cost(z, p, weights)
-            at, _ = self.around(z, p, weights)
-            for _ in range(8):
-                try:
-                    dz, dp = self._step(at, p, damping)
-                except np.linalg.LinAlgError:
-                    damping = max(8.0 * damping, 1e-6)
-                    continue
+            weights = self.weights(seen, R)
+            cost = self.cost(seen, p, weights)
+            at, _ = self.around(z, p, weights, index)
+            for dz, dp, held in self._steps(at, p, firm):
                 z_then, p_then = np.clip(z + dz, -most_z, most_z), p.copy()
-                p_then[index] = np.clip(p[index] + dp, low, high)
-                reached = self.cost(z_then, p_then, weights)
+                p_then[index] += dp
+                then = self.seen(z_then, p_then)
+                reached = self.cost(then, p_then, weights)
                 if reached < cost:
+                    z, p, seen, firm = z_then, p_then, then, max(held / 6.0, 1e-4)
                     break
-                damping = max(8.0 * damping, 1e-6)
             else:
                 break
-            moved = float(np.abs((z_then - z)[:, 0] / v_x).max())
-            turned = float(np.abs((p_then - p)[index] / sd).max(initial=0.0))
-            z, p, damping = z_then, p_then, max(damping / 6.0, 1e-9)
-            if (moved < 3e-4 and turned < 0.05) or cost - reached < 0.02:
+            if cost - reached < enough:
                 break
-        return z, p, self.value(z, p, R)
+        return z, p, self.value(seen, p, R)
 
-    def spread(self, z: Array, p: Array, R: Array) -> tuple[Array, Array, Array, Array]:
-        """Return covariance of states alone (n, 8, 8), of parameters that move, dz/dp of v_y
-        (n, m), and the slopes of what sensors show.
+    def _states(
+        self, z: Array, p: Array, R: Array, over: NDArray[np.intp]
+    ) -> tuple[_Around, Array, Array, Array]:
+        """Return matrix and gradient, L, covariance of the states alone (n, 8, 8), and the slopes
+        of what sensors show.
         """
-        at, shows = self.around(z, p, self.weights(z, p, R))
-        _, X = self._eliminated(at, 0.0)
+        at, shows = self.around(z, p, self.weights(self.seen(z, p), R), over)
+        L, n = self._factor(at), len(z)
+        own = np.zeros((n, N, N))  # L of each node
+        for i in range(N):
+            for j in range(i + 1):
+                own[:, i, j] = L[i - j, j::N]
+        root = np.linalg.inv(own)
+        inv = root.swapaxes(1, 2) @ root
+        K = inv[:-1] @ at.O.swapaxes(1, 2)
+        covariance = inv.copy()
+        for k in range(n - 2, -1, -1):
+            covariance[k] += K[k] @ covariance[k + 1] @ K[k].T
+        return at, L, covariance, shows
+
+    def spread(self, z: Array, p: Array, R: Array) -> tuple[Array, Array, Array]:
+        """Return covariance of states alone (n, 8, 8), of parameters that move, and dz/dp of v_y
+        (n, m).
+        """
+        at, L, covariance, _ = self._states(z, p, R, self.index)
+        Y = _solved(L, at.B.reshape(L.shape[1], -1))
         believed = around_beliefs(self.priors, p)[1][np.ix_(self.index, self.index)]
-        measured = at.C - believed - at.B.reshape(len(X), -1).T @ X
-        S = believed + measured / self.trust.lasting
-        slopes, free = -X.reshape(len(z), N, -1)[:, 0], self.free
+        S = believed + (at.C - believed - Y.T @ Y) / self.trust.lasting
+        slopes, free = -_solved(L, Y, "T").reshape(len(z), N, -1)[:, 0], self.free
         fixed = np.setdiff1d(np.arange(len(self.index)), free)
         inverse: Array = np.asarray(np.linalg.inv(S[np.ix_(free, free)]), np.float64)
         if fixed.size:  # what moves makes up for a part of what is fixed
             slopes[:, fixed] -= slopes[:, free] @ inverse @ S[np.ix_(free, fixed)]
-        n = len(z)
-        M = at.A.copy()
-        for k in range(n - 1):
-            M[k + 1] -= at.O[k] @ np.linalg.solve(M[k], at.O[k].T)
-        inv = np.linalg.inv(M)
-        covariance = np.empty_like(inv)
-        covariance[-1] = V = inv[-1]
-        for k in range(n - 2, -1, -1):
-            K = inv[k] @ at.O[k].T
-            covariance[k] = V = inv[k] + K @ V @ K.T
-        return covariance, inverse, slopes, shows
+        return covariance, inverse, slopes
 
-    def noise(self, z: Array, p: Array, covariance: Array, shows: Array, R: Array) -> Array:
-        """Return R (2,) by what is left of each sensor: its density at low frequency."""
-        residual = self.nodes.measured - self._run(self._plain, z, p, {})["shows"]
+    def noise(self, residual: Array, covariance: Array, shows: Array, R: Array) -> Array:
+        """Return R (2,) by what is left of each sensor (n, 2): its density at low frequency."""
         doubt = np.einsum("nij,njk,nik->ni", shows, covariance, shows)
         found, on = R.copy(), self.nodes.counts
         lags = max(2, int(_LOOKED * self.scale / self.nodes.dt))
@@ -438,18 +458,22 @@ class _Latent:
             found[i] = max(density - known, 1e-10)
         return found
 
-    def smoothed(self, z: Array, p: Array, R: Array | None = None, rounds: int = 2) -> _Smoothed:
+    def smoothed(
+        self, z: Array, p: Array, firm: float, R: Array | None = None, *, rounds: int = 2
+    ) -> _Smoothed:
         """Return the optimum from a start, its noise learnt in some rounds.
-        R : to begin with (2,); None takes that of good sensors.
+        firm : as of `descend`.   R : to begin with (2,); None takes that of good sensors.
         """
         R = self.R if R is None else R
         for _ in range(rounds):
-            z, p, _ = self.descend(z, p, R, _FEW)
-            covariance, _, _, shows = self.spread(z, p, R)
-            R = self.noise(z, p, covariance, shows, R)
-        z, p, cost = self.descend(z, p, R)
-        covariance, P, slopes, _ = self.spread(z, p, R)
-        left = 2.0 * self.misfit(z, p, self.weights(z, p, R)) / max(self.nodes.counts.sum(), 1)
+            z, p, _ = self.descend(z, p, firm, R, enough=_NEARLY)
+            firm = _NEAR
+            _, _, covariance, shows = self._states(z, p, R, self.moves)
+            R = self.noise(self.seen(z, p)["missed"], covariance, shows, R)
+        z, p, cost = self.descend(z, p, firm, R)
+        covariance, P, slopes = self.spread(z, p, R)
+        seen = self.seen(z, p)
+        left = 2.0 * _misfit(seen, self.weights(seen, R)) / max(self.nodes.counts.sum(), 1)
         wider = max(1.0, left / self.trust.usual)
         return _Smoothed(z, p, cost, R, wider * covariance, wider * P, slopes)
 
@@ -465,19 +489,24 @@ class Learnt(NamedTuple):
     parted: float
 
 
-def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, late: bool = False) -> Learnt:
+def learn_latent(
+    nodes: Nodes, vehicle: Vehicle, beliefs: Priors, late: "Lateness | None" = None
+) -> Learnt:
     """Return what the nodes of a drive teach.
 
     It begins with soft and with stiff tires. Where they end elsewhere, the covariance has the
     distance between both, by how probable they are.
-    beliefs : of the car, or what other drives of it left.   late : as of `latent_priors`.
+    beliefs : of the car, or what other drives of it left.
+    late : of the drive, from whose end the soft start goes on; None begins afresh.
     """
-    problem = _Latent(nodes, vehicle, latent_priors(vehicle, beliefs, late))
-    first = problem.smoothed(*problem.settled(_STARTS[0]))
-    z, p, cost = problem.descend(*problem.settled(_STARTS[1]), first.R)
+    taken_out = late is not None and late.seconds > 0.0
+    problem = _Latent(nodes, vehicle, latent_priors(vehicle, beliefs, taken_out))
+    first = problem.smoothed(*problem.begin(_STARTS[0], late))
+    z, p, cost = problem.descend(*problem.begin(_STARTS[1]), first.R, enough=_NEARLY)
     best, other = first, (z, p, cost)
-    if cost < first.cost:
-        best, other = problem.smoothed(z, p, first.R, 0), (first.z, first.p, first.cost)
+    if cost < first.cost - _NEARLY:
+        best = problem.smoothed(z, p, _NEAR, first.R, rounds=0)
+        other = (first.z, first.p, first.cost)
     on, v_x = nodes.counts, nodes.given[:, 0]
     apart = ((best.z - other[0])[:, 0] / v_x)[on]
     share = 1.0 / (1.0 + np.exp(min(other[2] - best.cost, 50.0)))
@@ -509,8 +538,19 @@ def learn_latent(nodes: Nodes, vehicle: Vehicle, beliefs: Priors, *, late: bool 
     )
 
 
-def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
-    """Return by how much a_y is later than the yaw rate [s], where that is no small matter.
+class Lateness(NamedTuple):
+    """By how much a_y is later than the yaw rate [s], and what was found with it: states z (n, 8)
+    at times t (n,), and all parameters p.
+    """
+
+    seconds: float
+    t: Array
+    z: Array
+    p: Array
+
+
+def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> Lateness:
+    """Return by how much a_y is later than the yaw rate, where that is no small matter.
 
     It is the delay with which the minute of hardest cornering is explained best, found as a
     parameter that is hardly believed, and taken out until nothing is left of it. 0 where it gains
@@ -534,26 +574,33 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> float:
         return _Latent(nodes, vehicle, beliefs)
 
     on_time = problem(0.0, priors)
-    z, p, least = on_time.descend(*on_time.settled(), on_time.R)
-    late = 0.0
-    for _ in range(_LOOKS):
-        z, p, _ = problem(late, open_).descend(z, p, on_time.R, _FEW)
+    t, R, small = on_time.nodes.t, on_time.R, _SMALL_DELAY * scale
+    z, p, least = on_time.descend(*on_time.begin(_STARTS[0]), R, enough=_NEARLY)
+    none, late = Lateness(0.0, t, z, p), 0.0
+    for k in range(_LOOKS):
+        most = _ITERATIONS if k else _FEW
+        z, p, reached = problem(late, open_).descend(z, p, _NEAR, R, enough=_NEARLY, most=most)
+        if k == 0 and least - reached < _PROMISED:
+            return none
         more, p[delay] = float(p[delay]), 0.0
         late = min(max(late + more, -_MOST_LATE * scale), _MOST_LATE * scale)
-        if abs(more) < _SMALL_DELAY * scale:
+        if abs(more) < small:
             break
-    if abs(late) < _SMALL_DELAY * scale:
-        return 0.0
-    found = problem(late, priors).descend(z, p, on_time.R)[2]
+    if abs(late) < small:
+        return none
+    z, p, found = problem(late, priors).descend(z, p, _NEAR, R, enough=_NEARLY)
     count = max(on_time.nodes.counts.sum(), 1)
     enough = _GAINED * max(1.0, 2.0 * found / count / TRUST.usual)
     if least - found < enough:
-        return 0.0
+        return none
     then = problem(late, open_)
-    variance = np.diag(then.spread(z, p, on_time.R)[1])[then.index[then.free] == delay]
-    return late if late < 0.0 or late > _SURELY_LATE * np.sqrt(variance[0]) else 0.0
+    variance = np.diag(then.spread(z, p, R)[1])[then.moves == delay]
+    if late < 0.0:
+        return none._replace(seconds=late)
+    return Lateness(late, t, z, p) if late > _SURELY_LATE * np.sqrt(variance[0]) else none
 
 
+@one_thread
 def estimate_v_y(
     recording: Recording, vehicle: Vehicle, p: Array, covariance: Array
 ) -> LateralVelocity:
@@ -582,11 +629,11 @@ def estimate_v_y(
     late = lateness(recording, vehicle, fixed(late=False))
     for outer, inner in _blocks(recording):
         sway = float(p[INDEX["ln_sway"]])
-        nodes = Nodes.of(recording, vehicle, outer, a_y_late=max(late, 0.0), ln_sway=sway)
+        nodes = Nodes.of(recording, vehicle, outer, a_y_late=max(late.seconds, 0.0), ln_sway=sway)
         if not nodes.counts.any():
             continue
-        problem = _Latent(nodes, vehicle, fixed(late > 0.0), columns)
-        found = problem.smoothed(*problem.begin(), rounds=1)
+        problem = _Latent(nodes, vehicle, fixed(late.seconds > 0.0), columns)
+        found = problem.smoothed(*problem.begin(late=late), rounds=1)
         known = np.flatnonzero(~moves[columns])
         tires, free = found.slopes[:, known], found.slopes[:, problem.free]
         index = columns[known]
@@ -596,7 +643,7 @@ def estimate_v_y(
         if nodes.counts.sum() > longest:
             longest, k = (
                 nodes.counts.sum(),
-                int(np.flatnonzero(problem.index[problem.free] == zero)[0]),
+                int(np.flatnonzero(problem.moves == zero)[0]),
             )
             found_v_y.steering_zero[:] = found.p[zero], np.sqrt(found.P[k, k])
         bias, roll = (found.p[LATENT_NAMES.index(name)] for name in ("a_y_bias", "roll"))
@@ -626,8 +673,6 @@ def _fill(
     beside: Array,
 ) -> None:
     """Put v_y between nodes into its samples, run by run of nodes."""
-    from scipy.interpolate import CubicSpline  # takes long to import
-
     firsts = np.flatnonzero(nodes.begins)
     lasts = np.flatnonzero(nodes.counts & ~nodes.goes)
     beyond = 1.5 * nodes.dt  # half a node, and what is left of a segment that makes none
@@ -639,11 +684,33 @@ def _fill(
         a, b = np.searchsorted(recording.t, [t[0] - beyond, t[-1] + beyond])
         some = slice(max(int(a), inner.start), min(int(b), inner.stop))
         at = np.clip(recording.t[some], t[0], t[-1])
-        spline = CubicSpline(t, v_y[run])
-        found_v_y.v_y[some] = spline(at) + spline(at, 1) * (recording.t[some] - at)
+        found_v_y.v_y[some] = _between(t, v_y[run], at, recording.t[some])
         found_v_y.sd[some] = np.interp(at, t, sd[run])
         found_v_y.beside[some] = np.interp(at, t, beside[run])
         found_v_y.observable[some] = found_v_y.sd[some] < TRUST.observable * recording.v_x[some]
+
+
+def _between(t: Array, value: Array, at: Array, beyond: Array) -> Array:
+    """Return a cubic through values at times t, and straight on where instants are beyond these."""
+    rate = np.gradient(value, t)
+    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, len(t) - 2)
+    h = t[k + 1] - t[k]
+    s, change = (at - t[k]) / h, value[k + 1] - value[k]
+    bend = (1.0 - s) * (h * rate[k] - change) + s * (change - h * rate[k + 1])
+    return value[k] + s * (change + (1.0 - s) * bend) + np.interp(at, t, rate) * (beyond - at)
+
+
+def _misfit(seen: dict[str, Array], weights: dict[str, Array]) -> float:
+    """Return J without what is believed [nats]."""
+    parts = (("moves", "of_moves"), ("missed", "of_shows"), ("begins", "of_begins"))
+    return 0.5 * sum(float(np.sum(weights[w] * seen[name] ** 2)) for name, w in parts)
+
+
+def _solved(L: Array, right: Array, trans: str = "N") -> Array:
+    """Return L⁻¹ of columns, or L⁻ᵀ; L as of `_factor`."""
+    from scipy.linalg.lapack import dtbtrs
+
+    return dtbtrs(L, right, uplo="L", trans=trans)[0]
 
 
 def _next(values: Array) -> Array:

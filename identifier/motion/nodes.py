@@ -47,7 +47,8 @@ def node_scan(columns: Columns = ()) -> Scan:
     first node misses, and `force` (2,) [static loads] without e come out. Where slopes are asked
     for, `measured` (2,) and the weights `of_moves` (8,), `of_shows` (2,) and `of_begins` (8,) have
     a row a node, too, and parts of Gauss-Newton's matrix come out: of the node, of the next, of
-    both, with the parameters, the gradient, and of the parameters alone as sums that are carried.
+    both, with the parameters, the gradient, and of the parameters alone as sums that are carried,
+    of the matrix its lower half.
     columns : names of the parameters over which slopes are asked for, (n,), those of the
         accelerometer among them.
     """
@@ -94,7 +95,7 @@ def node_scan(columns: Columns = ()) -> Scan:
             **{"border": J.T @ wP, "border_next": K.T @ wP},
             **{"slope": wJ.T @ residual, "slope_next": wK.T @ residual},
             "shows_z": ca.jacobian(shows, z),
-            **{"sums_next": sums + P.T @ wP, "slopes_next": slopes + wP.T @ residual},
+            **{"sums_next": ca.tril(sums + P.T @ wP), "slopes_next": slopes + wP.T @ residual},
         }  # fmt: skip
     dense = {name: ca.densify(one) for name, one in out.items()}
     step = step_function(f"nodes_{len(columns)}", ports, {}, dense)

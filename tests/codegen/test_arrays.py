@@ -1,14 +1,21 @@
-"""Blocks of long recordings, and arrays that lie on disk."""
+"""Blocks of long recordings, arrays that lie on disk, and threads of BLAS."""
 
 import gc
+from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path
+from threading import Thread
 
 import numpy as np
 import pytest
+from threadpoolctl import ThreadpoolController, threadpool_limits
 
 from codegen import arrays
-from codegen.arrays import LONG, blocks, filled, large, thinning
+from codegen.arrays import LONG, blocks, filled, large, one_thread, thinning
+from identifier.doctor import diagnose
+from identifier.estimate.fit import fit
+from identifier.estimate.latent import estimate_v_y
+from models.vehicle import sedan
 
 
 @pytest.mark.parametrize("n", [1, 59_999, LONG, LONG + 1, 1_000_000])
@@ -87,3 +94,46 @@ def test_pages_on_disk_are_let_go_after_a_block_and_hold_what_was_written():
     del array
     gc.collect()
     assert len(arrays._mapped) < kept
+
+
+def blas_threads():
+    return {
+        one["num_threads"] for one in ThreadpoolController().info() if one["user_api"] == "blas"
+    }
+
+
+@pytest.fixture
+def before():
+    with threadpool_limits(3, "blas"):
+        yield blas_threads()
+
+
+def test_blas_has_one_thread_until_the_last_of_several_calls_ends(before):
+    one = {1} if before else before  # else it is a BLAS that nobody can ask
+    with suppress(KeyError), one_thread:
+        first = Thread(target=one_thread.__enter__)
+        first.start(), first.join()
+        assert blas_threads() == one
+        raise KeyError
+    assert blas_threads() == one
+    one_thread.__exit__()
+    assert blas_threads() == before
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda log: fit([log], sedan()),
+        lambda log: estimate_v_y(log, sedan(), None, None),
+        lambda log: diagnose(log, sedan()),
+    ],
+)
+def test_the_estimate_takes_one_thread_and_leaves_as_many_as_before(before, call):
+    class Log:
+        def __getattr__(self, name):
+            raise KeyError(blas_threads())
+
+    with pytest.raises(KeyError) as told:
+        call(Log())
+    assert told.value.args == ({1} if before else before,)
+    assert blas_threads() == before
