@@ -190,7 +190,7 @@ class Results:
             "version": __version__,
         }
 
-    def write(self, folder: Path, progress: Progress | None = None) -> dict[str, Figure]:
+    def write(self, folder: Path, progress: Progress | None = None) -> dict[str, bytes]:
         """Write everything into a folder; return the figures by the name of their file.
 
         progress : informed how far it is; None informs nobody.

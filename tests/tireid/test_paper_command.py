@@ -227,7 +227,7 @@ def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(tireid.commands.demo, "SEEDS", 2)
     monkeypatch.setattr("tireid.exporting.measure", lambda *_: [])  # has tests of its own
     monkeypatch.setattr("tireid.commands.demo.drive_story", lambda *_: {})  # so has this
-    monkeypatch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)  # a page has SVG
+    monkeypatch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
     page = (tmp_path / "demo" / "report.html").read_text()
     assert page.count("data:image/") >= 8

