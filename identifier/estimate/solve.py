@@ -131,7 +131,7 @@ class Problem:
         """
         many, slopes = [], []
         ln_m = np.concatenate([[0.0], p[len(NAMES) :]])
-        ports = ("residual", "residual_slopes")
+        ports = ("residual", "slopes")
         for k, one in enumerate(self.drives):
             stride, kept = self._strides[k], self._kept[k]
             roads = None if self.labels is None else self.labels[k]
