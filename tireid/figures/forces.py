@@ -171,7 +171,8 @@ def inputs_figure(recording: Recording) -> Figure:
     signals = {label: one for label, one in logged.items() if one is not None}
     part = drawn_samples(recording.t, ends, recording.delta_r, *signals.values())
     t = drawn_times(recording, recording.t[part])
-    figure = style.new_figure(0.5 + 1.05 * len(signals))
+    steers = bool(np.any(recording.delta_r))
+    figure = style.new_figure(0.5 + 1.05 * len(signals), plain=not steers)
     panels = figure.subplots(len(signals), 1, sharex=True)
     panels[0].set_xlim(ends)
     for axes, (label, signal) in zip(panels, signals.items(), strict=True):
@@ -182,13 +183,13 @@ def inputs_figure(recording: Recording) -> Figure:
         middle = float(values.min()) + span / 2
         if span < 0.05 * abs(middle):  # a speed that is held shows as held
             axes.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
-    if np.any(recording.delta_r):
+    if steers:
         panels[1].lines[0].set_label(r"front $\delta_f$")
         rear = np.degrees(recording.delta_r[part])
         panels[1].plot(t, rear, color=style.ORANGE, linewidth=0.9, label=r"rear $\delta_r$")
         style.legend_beside(panels[1])
+        figure.align_ylabels()
     style.label_time(panels[-1], recording.t)
-    figure.align_ylabels()
     return figure
 
 
