@@ -160,13 +160,13 @@ def inputs_figure(recording: Recording) -> Figure:
     """Draw the signals of a recording; rear steering and a_y only where there are any."""
     require_kind(Recording, "as of read_recording, or run.recording", recording=recording)
     ends = recording.t[0], recording.t[-1]
-    estimated = ", estimated" if recording.estimated else ""
+    estimated = "estimated " if recording.estimated else ""
     logged = {
-        "$v_x$ [m/s]": recording.v_x,
-        "steering [deg]": np.degrees(recording.delta_f),
-        f"$v_y$ [m/s]{estimated}": recording.v_y,
-        "$r$ [deg/s]": np.degrees(recording.r),
-        "$a_y$ [m/s²]": recording.a_y,
+        "speed\n[m/s]": recording.v_x,
+        "steering\n[deg]": np.degrees(recording.delta_f),
+        f"lateral speed\n{estimated}[m/s]": recording.v_y,
+        "yaw rate\n[deg/s]": np.degrees(recording.r),
+        "lateral acc.\n[m/s²]": recording.a_y,
     }
     signals = {label: one for label, one in logged.items() if one is not None}
     part = drawn_samples(recording.t, ends, recording.delta_r, *signals.values())
