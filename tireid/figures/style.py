@@ -84,12 +84,10 @@ class _NotebookFigure(Figure):
 
 
 class _Margins(LayoutEngine):
-    """Room for titles, numbers and labels as large as ours are, which is not measured anew.
+    """Room for titles, numbers and labels as large as ours are, which is not measured anew."""
 
-    entries : rows of the legend.
-    """
-
-    _adjust_compatible, _colorbar_gridspec, entries = True, False, 0
+    _adjust_compatible, _colorbar_gridspec = True, False
+    entries = 0  # rows of the legend
 
     def execute(self, fig: Figure) -> None:
         grid = fig.axes[0].get_gridspec()
