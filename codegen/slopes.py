@@ -60,6 +60,8 @@ class Tape:
         """Return what equations make of a few inputs, differentiated once, and its slopes.
         equations : of symbols in place of the inputs, and of others, which have no slopes.
         """
+        if not any(one.rows or one.slopes.nnz() for one in inputs):
+            return [self.constant(one) for one in equations(*(one.value for one in inputs))]
         symbols = [ca.SX.sym(f"stage_{i}") for i in range(len(inputs))]
         x, y = ca.vertcat(*symbols), ca.vertcat(*equations(*symbols))
         names = {one.name() for one in symbols}
@@ -108,30 +110,35 @@ class Tape:
             over = {column: slopes.nz[k] for k, column in enumerate(columns)}
             rows.append(Row(numbered(terms), numbered(over)))
         places = [place[row] for row in ends]
-        program = Program(rows, places[: len(states)], places[len(states) :], self._p)
-        return ca.vertcat(*factors), program
+        return ca.vertcat(*factors), Program(rows, places[: len(states)], places[len(states) :])
 
 
 class Program(NamedTuple):
     """Rows in the order in which they are made.
-    states : rows of the states after a sample.   shown : rows that come out.   parameters : p.
+    states : rows of the states after a sample.   shown : rows that come out.
     """
 
     rows: Sequence[Row]
     states: Sequence[int]
     shown: Sequence[int]
-    parameters: int
+
+    def width(self, n: int) -> int:
+        """Return how wide rows of n columns are: whole vectors of a processor."""
+        return -(-n // _VECTOR) * _VECTOR
 
     def columns(self, some: Sequence[int]) -> NDArray[np.int64]:
-        """Return n, the width of a row, and the column of each parameter, (2 + p,).
-
-        Parameters that nobody asks for share a column behind the others.
+        """Return what `NAME_rows` reads: n, the width m, where the slopes of each row begin, and
+        of each slope its place in the rows and its factor.
         some : parameters by column, (n,).
         """
-        n = len(some)
-        at = np.full(self.parameters, n, dtype=np.int64)
-        at[list(some)] = np.arange(n)
-        return np.concatenate([[n, n + 1], at]).astype(np.int64)
+        column, m = {of: k for k, of in enumerate(some)}, self.width(len(some))
+        listed = [
+            [(k * m + column[of], one + 1) for of, one in row.slopes.items() if of in column]
+            for k, row in enumerate(self.rows)
+        ]
+        begins = np.cumsum([0, *map(len, listed)])
+        places = np.array([pair for row in listed for pair in row]).reshape(-1, 2)
+        return np.concatenate([[len(some), m], begins, *places.T]).astype(np.int64)
 
     def source(self, name: str) -> str:
         """Return NAME_rows in C: the rows after a sample from factors and the rows before it.
@@ -143,37 +150,45 @@ class Program(NamedTuple):
             return f"y[{row} * m + j]" if row >= 0 else f"x[{self.states[-1 - row]} * m + j]"
 
         lines = []
-        for k, (terms, slopes) in enumerate(self.rows):
+        for k, (terms, _) in enumerate(self.rows):
             total = " + ".join(f"c[{one + 1}] * {read(row)}" for row, one in terms.items()) or "0"
-            lines += [_EACH, f"    y[{k} * m + j] = {total};"]
-            lines += [f"  y[{k} * m + p[{of}]] += c[{one + 1}];" for of, one in slopes.items()]
+            lines.append(_ROW.format(k=k, total=total))
         few = len(self.shown)
-        out = [f"out[{few} * j + {i}] = y[{row} * m + j];" for i, row in enumerate(self.shown)]
-        lines += [_EACH, f"  {{ {' '.join(out)} }}"]
-        return _ROWS.format(name=name, rows=len(self.rows), shown=few, lines="\n".join(lines))
+        lines += [
+            f"  for (j = 0; j < n; ++j) out[{few} * j + {i}] = y[{row} * m + j];"
+            for i, row in enumerate(self.shown)
+        ]
+        text = "\n".join(lines)
+        return _ROWS.format(name=name, rows=len(self.rows), shown=few, lines=text, last=_VECTOR - 1)
 
     def follow(self, c: Array, x: Array, y: Array, out: Array, columns: NDArray[np.int64]) -> None:
         """Do the same as the C, in Python.
         c : factors.   x, y : rows before and after the sample, flat.   out : (shown n,).
         """
-        n, m, at = columns[0], columns[1], columns[2:]
+        n, m, begins = columns[0], columns[1], columns[2 : 3 + len(self.rows)]
+        places, of = columns[3 + len(self.rows) :].reshape(2, -1)
         before, after = x.reshape(-1, m), y.reshape(-1, m)
-        after[:] = 0.0
-        for k, (terms, slopes) in enumerate(self.rows if c[0] > 0.0 else ()):
+        y[:] = 0.0
+        for k, (terms, _) in enumerate(self.rows if c[0] > 0.0 else ()):
             for row, one in terms.items():
                 source = after[row] if row >= 0 else before[self.states[-1 - row]]
-                after[k, :n] += c[one + 1] * source[:n]
-            for of, one in slopes.items():
-                after[k, at[of]] += c[one + 1]
+                after[k] += c[one + 1] * source
+            some = slice(begins[k], begins[k + 1])
+            y[places[some]] += c[of[some]]
         out[:] = after[list(self.shown), :n].ravel(order="F")
 
 
-_EACH = "#pragma GCC ivdep\n  for (j = 0; j < n; ++j)"
+_VECTOR = 4  # numbers of the longest vector that compilers are asked for
+_ROW = """\
+#pragma GCC ivdep
+  for (j = 0; j < m; ++j) y[{k} * m + j] = {total};
+  for (j = begins[{k}]; j < begins[{k} + 1]; ++j) y[places[j]] += c[of[j]];"""
 _ROWS = """
 static void {name}_rows(const double* c, const double* x, double* y, double* out,
                         const long long* columns) {{
-  const long long *p = columns + 2;
-  const long n = (long)columns[0], m = (long)columns[1];
+  const long n = (long)columns[0], m = (long)columns[1] & ~{last}L;
+  const long long *begins = columns + 2, *places = begins + {rows} + 1;
+  const long long *of = places + begins[{rows}];
   long j;
   if (!(c[0] > 0)) {{
     memset(y, 0, (size_t)({rows} * m) * sizeof(double));

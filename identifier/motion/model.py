@@ -104,8 +104,10 @@ def _motion_step(sloped: bool) -> tuple[ca.Function, Program | None]:
         dt=1,
     )
     tape, old, p = Tape(len(NAMES)), ca.vertsplit(s.state), ca.vertsplit(s.parameters)
-    before = {name: tape.state(k, old[k]) for k, name in enumerate(CARRIED)}
-    duals = {name: tape.parameter(k, p[k]) for k, name in enumerate(NAMES)}
+    before, duals = _constant(tape, CARRIED, old), _constant(tape, NAMES, p)
+    if sloped:
+        before = {name: tape.state(k, old[k]) for k, name in enumerate(CARRIED)}
+        duals = {name: tape.parameter(k, p[k]) for k, name in enumerate(NAMES)}
     fixed = _constant(tape, (*SIGNALS, *RATES), ca.vertsplit(ca.vertcat(s.signals, s.rates)))
     on = fixed["on"].value
     after, out = _step(_At(tape, before, fixed, duals, s.car, s.dt, 1 - s.was_on * on))
