@@ -136,8 +136,9 @@ def noted_errors(figure):
 
 
 @pytest.mark.heavy
-def test_figures_say_the_errors_of_the_tables(study, tmp_path):
+def test_figures_say_the_errors_of_the_tables(study, tmp_path, monkeypatch):
     """Both count from the onset on: before it there is no force to miss."""
+    monkeypatch.setattr("tireid.commands.paper.save_figures", lambda _, figures: figures)
     drawn = write_study(tmp_path, study)
     for name, maneuver in (("fig3", "step_steer"), ("fig5", "slalom")):
         trial = study.typical(maneuver, "integral")
