@@ -11,18 +11,21 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from codegen.compiler import CompilationError, load_library
+from codegen.slopes import Program
 
 log = logging.getLogger("tireid.codegen")
+
+TANGENT, SLOPES, FACTORS = "tangent", "slopes", "factors"  # ports of slopes that run along
+_BEYOND = 2  # of them at most behind the arguments of a step, and behind its results
 
 # k runs over samples. Carried ports alternate between two buffers; every other output is written
 # straight into the record on recorded samples and into scratch memory on the others. Ports without
 # a record are not recorded.
 LOOP = """
-#include <string.h>
-
 int {name}_scan(long n, long every, const double** arg, const long* arg_step,
                 long n_carry, const long* carry_arg, const long* carry_res, const long* carry_size,
                 double** carry_now, double** carry_next, double** carry_record,
@@ -46,6 +49,7 @@ int {name}_scan(long n, long every, const double** arg, const long* arg_step,
       call_res[out_res[i]] =
           keep && out_record[i] ? out_record[i] + row * out_size[i] : out_scratch[i];
     if ({name}(call_arg, call_res, iw, w, 0)) return 1;
+    {rows}
     for (i = 0; i < n_carry; ++i) {{
       swap = carry_now[i];
       carry_now[i] = carry_next[i];
@@ -71,12 +75,24 @@ class _Memory(NamedTuple):
     record: Mapping[str, Array]
 
 
+class Slopes(NamedTuple):
+    """Slopes that run along: the step's output `factors` makes rows of them.
+
+    The scan then carries `tangent` beside the states, and an output `slopes` comes out.
+    some : parameters whose slopes are asked for, by column.
+    """
+
+    program: Program
+    some: Sequence[int]
+
+
 class Scan:
     """A step function run over samples, `carry, outputs = step(carry, sample, constants)`.
     step : a function with named, dense ports. An input `p` named in `carry` has an output `p_next`
         of the same shape. Its name becomes part of a C identifier.
     over : inputs with one row a sample. Every other input is constant.
     flags : of the compiler; None takes `codegen.compiler.FLAGS`.
+    slopes : those that run along; None where there are none.
     """
 
     def __init__(
@@ -86,6 +102,7 @@ class Scan:
         carry: tuple[str, ...],
         over: tuple[str, ...],
         flags: tuple[str, ...] | None = None,
+        slopes: Slopes | None = None,
     ) -> None:
         name = step.name()
         self._size_in = {p: step.size_in(p) for p in step.name_in()}
@@ -100,6 +117,18 @@ class Scan:
         ports = [*map(step.sparsity_in, self._size_in), *map(step.sparsity_out, self._size_out)]
         if not all(port.is_dense() for port in ports):
             raise ValueError(f"{name}: inputs and outputs must be dense")
+        self._place_in = {p: step.index_in(p) for p in self._size_in}
+        self._place_out = {p: step.index_out(p) for p in self._size_out}
+        self.slopes = slopes
+        if slopes is not None:  # their ports stand behind those of the step, which knows nothing
+            program, self._columns = slopes.program, slopes.program.columns(slopes.some)
+            size = len(program.rows) * int(self._columns[1])
+            self._size_in[TANGENT] = self._size_out[f"{TANGENT}_next"] = size, 1
+            self._size_out[SLOPES] = len(program.shown), len(slopes.some)
+            self._place_in[TANGENT] = max(step.sz_arg(), step.n_in())
+            self._place_out[f"{TANGENT}_next"] = max(step.sz_res(), step.n_out())
+            self._place_out[SLOPES] = self._place_out[f"{TANGENT}_next"] + 1
+            carry = (*carry, TANGENT)
         self.step = step
         self.carry = carry
         self.over = over
@@ -123,7 +152,14 @@ class Scan:
         generator = ca.CodeGenerator(f"{name}.c")
         generator.add(self.step)
         try:
-            source = generator.dump() + LOOP.format(name=name)
+            source, rows = generator.dump() + "#include <string.h>\n", ""
+            if self.slopes is not None:
+                source += self.slopes.program.source(name)
+                at, out = self._place_in[TANGENT], self._place_out
+                columns = f"(const long long*)call_arg[{at + 1}]"
+                rows = f"{name}_rows(call_res[{out[FACTORS]}], call_arg[{at}], "
+                rows += f"call_res[{out[TANGENT + '_next']}], call_res[{out[SLOPES]}], {columns});"
+            source += LOOP.format(name=name, rows=rows)
             library = load_library(source, name, self.flags)
         except (CompilationError, OSError) as error:
             reason = " ".join(str(error).split())
@@ -155,21 +191,25 @@ class Scan:
         vectors have the shape (n_recorded, size).
         """
         packed, step = self.packed(n, values), self.step
-        recorded = set(self.carry) | set(self.outputs)
+        recorded = (set(self.carry) | set(self.outputs)) - {FACTORS}
         if ports is not None:
             if unknown := sorted(set(ports) - recorded):
                 raise ValueError(f"{step.name()} records no {unknown}, only {sorted(recorded)}")
             recorded &= set(ports)
         rows = -(-n // every)
         sizes = {p: (rows + 1, packed[p].size) for p in self.carry}
-        sizes |= {p: (rows, step.numel_out(p)) for p in self.outputs}
+        sizes |= {p: (rows, self._numel(p)) for p in self.outputs}
         record = {p: np.empty(size) for p, size in sizes.items() if p in recorded}
         now = [packed[p].copy() for p in self.carry]
         following = [np.empty_like(a) for a in now]
-        spare = [np.empty(step.numel_out(p)) for p in self.outputs]
+        spare = [np.empty(self._numel(p)) for p in self.outputs]
         self.runner(n, _Memory(packed, now, following, spare, record), every)()
         last = dict(zip(self.carry, following if n % 2 else now, strict=True))
         return self._shape_all(record, last)
+
+    def _numel(self, output: str) -> int:
+        rows, columns = self._size_out[output]
+        return rows * columns
 
     def packed(self, n: int, values: Mapping[str, Array]) -> dict[str, Array]:
         """Check shapes; flatten matrices by columns, as CasADi stores them.
@@ -216,26 +256,34 @@ class Scan:
         packed, now, following, spare, record = memory
         carry, outputs = self.carry, self.outputs
         work = np.empty(max(step.sz_iw(), 1), dtype=np.int64), np.empty(max(step.sz_w(), 1))
-        strides = [step.numel_in(p) if p in self.over else 0 for p in self._size_in]
+        given: list[tuple[int, NDArray[Any], bool]] = [
+            (self._place_in[p], packed[p], p in self.over) for p in self._size_in
+        ]
+        if self.slopes is not None:
+            given.append((self._place_in[TANGENT] + 1, self._columns, False))
+        begins: list[NDArray[Any] | None] = [None] * (max(place for place, *_ in given) + 1)
+        strides = [0] * len(begins)
+        for place, values, each in given:
+            begins[place], strides[place] = values, values.shape[1] if each else 0
         arguments: list[object] = [
             ctypes.c_long(n),
             ctypes.c_long(every),
-            _pointers([packed[p] for p in self._size_in]),
+            _pointers(begins),
             _longs([*strides, -1]),
             ctypes.c_long(len(carry)),
-            _longs([step.index_in(p) for p in carry]),
-            _longs([step.index_out(f"{p}_next") for p in carry]),
-            _longs([step.numel_in(p) for p in carry]),
+            _longs([self._place_in[p] for p in carry]),
+            _longs([self._place_out[f"{p}_next"] for p in carry]),
+            _longs([packed[p].size for p in carry]),
             _pointers(now),
             _pointers(following),
             _pointers([record.get(p) for p in carry]),
             ctypes.c_long(len(outputs)),
-            _longs([step.index_out(p) for p in outputs]),
-            _longs([step.numel_out(p) for p in outputs]),
+            _longs([self._place_out[p] for p in outputs]),
+            _longs([self._numel(p) for p in outputs]),
             _pointers([record.get(p) for p in outputs]),
             _pointers(spare),
-            (ctypes.c_void_p * max(step.sz_arg(), step.n_in()))(),
-            (ctypes.c_void_p * max(step.sz_res(), step.n_out()))(),
+            (ctypes.c_void_p * (max(step.sz_arg(), step.n_in()) + _BEYOND))(),
+            (ctypes.c_void_p * (max(step.sz_res(), step.n_out()) + _BEYOND))(),
             *(one.ctypes.data_as(ctypes.c_void_p) for one in work),
         ]
 
@@ -260,14 +308,20 @@ class Scan:
                     value = packed[port][k] if port in self.over else packed[port]
                     buffer.set_arg(step.index_in(port), value.data)
                 for port, before, after in zip(self.carry, now, following, strict=True):
-                    buffer.set_arg(step.index_in(port), before.data)
-                    buffer.set_res(step.index_out(f"{port}_next"), after.data)
+                    if port != TANGENT:
+                        buffer.set_arg(step.index_in(port), before.data)
+                        buffer.set_res(step.index_out(f"{port}_next"), after.data)
                     if not skipped and port in record:
                         record[port][row] = before
-                for port, other in zip(self.outputs, spare, strict=True):
-                    here = record[port][row] if not skipped and port in record else other
-                    buffer.set_res(step.index_out(port), here.data)
+                out = dict(zip(self.outputs, spare, strict=True))
+                out |= {port: record[port][row] for port in out if port in record and not skipped}
+                for port, here in out.items():
+                    if port != SLOPES:
+                        buffer.set_res(step.index_out(port), here.data)
                 evaluate()
+                if self.slopes is not None:  # its tangent is carried last
+                    program, c = self.slopes.program, out[FACTORS]
+                    program.follow(c, now[-1], following[-1], out[SLOPES], self._columns)
                 now, following = following, now
 
         return run

@@ -71,18 +71,17 @@ def rng() -> np.random.Generator:
 
 
 # What takes longest in a command is to draw its figures; who reads files and words need not wait.
-PNG, SVG = b"\x89PNG\r\n\x1a\n", b"<?xml"
+PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def without_ink(patch) -> None:
     """Leave out what takes longest in a figure, for what a module's tests share, too."""
     patch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)
-    patch.setattr("tireid.figures.style.figure_svg", lambda _: SVG)
 
 
 @pytest.fixture
 def undrawn(monkeypatch):
-    """Figures are made as ever; on paper and on the page they are empty."""
+    """Figures are made as ever; on paper they are empty."""
     without_ink(monkeypatch)
 
 

@@ -1,6 +1,7 @@
 """The command line: one subcommand each for what a person wants to do."""
 
 import argparse
+import gc
 import io
 import os
 import shlex
@@ -26,6 +27,7 @@ from tireid.commands import (
 from tireid.progress import complain, flush_out, listen_to_library, unwritten
 
 _LONGEST_LINE = 900  # characters of a message, command and option not counted
+_CYCLES = 50_000  # objects between searches for garbage: imports and figures make many that stay
 
 
 class _Parser(argparse.ArgumentParser):
@@ -130,6 +132,7 @@ def one_line(error: Exception | str) -> str:
 
 def entry() -> NoReturn:
     """Run as a program: a termination cleans up as Ctrl-C does."""
+    gc.set_threshold(_CYCLES)
     _open_streams()
     os.environ["MPLBACKEND"] = "agg"  # nothing is shown, and that of a notebook may not be here
 

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from identifier.doctor import Diagnosis, Finding
 from identifier.doctor.diagnosis import WITHOUT_V_Y
 from identifier.measured import with_doubt
@@ -18,7 +16,7 @@ from models.recordings.reader import repair_text
 from models.vehicle import Vehicle
 from tireid import report as page
 from tireid.output import text_table
-from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.reports.common import READ, REPORT, origin
 
 _HEADER = ("found", "size", "confidence", "repair")
 NAMES = {  # of findings by their code, where the code is not the word
@@ -169,7 +167,7 @@ def write_doctor_report(
     vehicle: Vehicle,
     diagnosis: Diagnosis,
     after: Diagnosis | None,
-    figure: Figure,
+    figure: bytes,
     *,
     command: str,
 ) -> None:
@@ -177,7 +175,8 @@ def write_doctor_report(
 
     after : that of the repaired log, None where nothing was repaired.
     """
-    drawn = drawing(figure, "Force over slip angle, as logged and repaired.", READ["doctor"])
+    caption = "Force over slip angle, as logged and repaired."
+    drawn = page.Picture(image=figure, caption=caption, read=READ["doctor"])
     sections = [
         diagnosis_section(diagnosis),
         page.Section(heading="Tire curves", blocks=[drawn]),

@@ -190,7 +190,7 @@ class Results:
             "version": __version__,
         }
 
-    def write(self, folder: Path, progress: Progress | None = None) -> dict[str, Figure]:
+    def write(self, folder: Path, progress: Progress | None = None) -> dict[str, bytes]:
         """Write everything into a folder; return the figures by the name of their file.
 
         progress : informed how far it is; None informs nobody.
@@ -308,7 +308,8 @@ def _curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[st
     force = model.force(slip)
     columns = {"slip_rad": slip, **axle_columns("Fy{}_N", force)}
     if known is not None:
-        inside = (np.abs(slip)[:, None] <= known).astype(np.float64)
+        # A point of the curve is the known slip itself, up to rounding.
+        inside = (np.abs(slip)[:, None] <= known * (1.0 + 1e-9)).astype(np.float64)
         columns |= {"front_known": inside[:, 0], "rear_known": inside[:, 1]}
     if model.band is not None:
         for side, bound in zip(("low", "high"), model.band.at(slip), strict=True):

@@ -1,8 +1,7 @@
 """A report: headline numbers, text, tables and figures in ONE HTML file that needs nothing else.
 
-Pictures are embedded, drawings as SVG that stays crisp; a figure fills the window when clicked
-on, by its own anchor. Styles are inline, without scripts or links to other files, so that it can be
-mailed, archived and printed.
+Pictures are embedded; a figure fills the window when clicked on, by its own anchor. Styles are
+inline, without scripts or links to other files, so that it can be mailed, archived and printed.
 """
 
 import math

@@ -59,6 +59,17 @@ class Accelerometer:
             box(thinned(one.needed("a_y"), drive.every), round(width / drive.dt) | 1)
             for one, drive in zip(segments, drives, strict=True)
         ]
+        self._kept = [np.flatnonzero(one.counts[:: _every(one)]) * _every(one) for one in drives]
+        self._on_time = self._felt(0.0)
+
+    def _felt(self, late: float) -> list[tuple[Array, Array]]:
+        """Return a_y and its slope where they are kept, by drive, a_y being read later."""
+        found = []
+        for one, measured, kept in zip(self.drives, self.measured, self._kept, strict=True):
+            at = np.arange(measured.size)
+            felt = box(np.interp(at + late / one.dt, at, measured), _FILTERED / one.dt)
+            found.append((felt[kept], gradient(felt, one.dt)[kept]))
+        return found
 
     def line(self, p: Array, wide: Mapping[str, float]) -> Line:
         """Return how well a_y follows from the motion without the sensors' faults p.
@@ -76,19 +87,15 @@ class Accelerometer:
     def _line(self, p: Array, sd: Array, late: float) -> tuple[Line, float]:
         """Return the line where a_y is read later, and by how much more it is late."""
         y, X, seconds = [], [], 0.0
-        for one, measured in zip(self.drives, self.measured, strict=True):
+        felts = self._felt(late) if late else self._on_time
+        for one, kept, felt in zip(self.drives, self._kept, felts, strict=True):
             v_x, v_y, r = _motion(one, p)
             count = _FILTERED / one.dt
-            K = box(gradient(box(v_y, count / 3), one.dt) + v_x * r, count)
-            at = np.arange(measured.size)
-            felt = box(np.interp(at + late / one.dt, at, measured), count)
-            slope = gradient(felt, one.dt)
-            turning = gradient(box(r, count), one.dt)
-            every = max(1, round(_STRIDE / one.dt))
-            kept = np.flatnonzero(one.counts[::every]) * every
-            y.append((K - GRAVITY * p[INDEX["bank"]])[kept])
-            X.append(np.column_stack([-np.ones(K.size), felt, slope, -turning, slope])[kept])
-            seconds += kept.size * every * one.dt
+            K = box(gradient(box(v_y, count / 3), one.dt) + v_x * r, count)[kept]
+            turning = gradient(box(r, count), one.dt)[kept]
+            y.append(K - GRAVITY * p[INDEX["bank"]])
+            X.append(np.column_stack([-np.ones(K.size), *felt, -turning, felt[1]]))
+            seconds += kept.size * _every(one) * one.dt
         moved, rows = np.concatenate(y), np.concatenate(X)
         mean = self.mean.copy()
         mean[2] = -late
@@ -111,6 +118,11 @@ class Accelerometer:
         loss = 2.5 * np.log1p(e**2 / (4.0 * S2)).sum() + 0.5 * moved.size * math.log(S2)
         cost = float(n * loss + 0.5 * away @ away)
         return Line(cost, theta, np.sqrt(np.diag(np.linalg.inv(H)))), float(theta[2])
+
+
+def _every(one: Drive) -> int:
+    """Return how many samples a mean is behind the one before."""
+    return max(1, round(_STRIDE / one.dt))
 
 
 def _motion(one: Drive, p: Array) -> tuple[Array, Array, Array]:

@@ -397,6 +397,8 @@ def read(
         good = best is not before and best.left < equations * _DEEPER
         beam = [best] if good else sorted(longer, key=lambda one: one.cost)[:_KEPT]
     ranked = sorted(tried, key=lambda one: (one.cost, len(one.changes)))
+    if ranked[0] is as_declared and len(ranked) > _JUDGED and admissible(()):
+        return Read(best=as_declared, other=ranked[-1])  # whatever laws the others break
     lawful = [one for one in ranked[:_JUDGED] if admissible(one.changes)]
     ranked = lawful + [one for one in ranked if one not in lawful]
     found = _chosen(ranked)

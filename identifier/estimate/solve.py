@@ -169,7 +169,7 @@ class Problem:
         p : parameters, and behind them ln of the friction of other roads.
         """
         many, slopes = [], []
-        ports = ("residual", "residual_slopes")
+        ports = ("residual", "slopes")
         for k, (stride, kept) in enumerate(zip(self._strides, self._kept, strict=True)):
             residual, J = _simulated(self._driven(k, p), p, self._car, self._scan, ports, stride)
             many.append(residual[kept])

@@ -17,11 +17,10 @@ Force over the static load:   F_i = λ_i G_i φ_i(x_i) cos δ_i.
 Balance of an axle (`axle.car`):   ξ_i' + v_x r/g - F_i - bank = 0. Missed, through a filter of
 time 1/κ and without a derivative:   z' = (what is missed) - κ z,   e = κ z.
 
-Slopes run along by the chain rule from stage to stage (forward differentiation): each stage has
-few inputs, so that no stage but the last knows all parameters.
+Slopes run along by the chain rule from stage to stage (forward differentiation, `codegen.slopes`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -29,6 +28,8 @@ import casadi as ca
 
 from codegen import Scan
 from codegen.compiler import FLAGS
+from codegen.scan import FACTORS, Slopes
+from codegen.slopes import Dual, Program, Tape
 from identifier.axle.car import step_function, symbols
 from identifier.axle.gate import GateState, Plausibility, gate
 from identifier.axle.slip import SHORTEST, beyond_play
@@ -41,9 +42,8 @@ DAMPING = 0.3  # ζ of the sway
 RATE = 4.0  # κ [1/s]: what is missed is a mean over a quarter of a second
 _LAG_OF_A_X = 0.2  # [s] of the washout that tells a_x
 
-# Slopes over all parameters are thousands of lines: to optimize them further takes the compiler
-# longer than they run.
-QUICK = tuple("-O1" if flag == "-O2" else flag for flag in FLAGS)
+# Rows of slopes are loops over columns, several of which a processor computes at once.
+_SIMD = (*FLAGS, "-ftree-vectorize", "-fvect-cost-model=dynamic")
 
 Columns = tuple[str, ...]
 SIGNALS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_x", "bank", "road", "on")
@@ -74,27 +74,6 @@ class CarNumbers(NamedTuple):
     drag: Any
 
 
-class _Dual(NamedTuple):
-    """A value and its slopes over the parameters, (1, n)."""
-
-    value: Any
-    slopes: Any
-
-
-def _staged(equations: Callable[..., Sequence[Any]], *inputs: _Dual) -> list[_Dual]:
-    """Return what equations make of a few inputs, differentiated once, and its slopes.
-    equations : of symbols in place of the inputs, and of others, which have no slopes.
-    """
-    symbols = [ca.SX.sym(f"stage_{i}") for i in range(len(inputs))]
-    x, y = ca.vertcat(*symbols), ca.vertcat(*equations(*symbols))
-    names = {one.name() for one in symbols}
-    free = ca.vertcat(*(one for one in ca.symvar(y) if one.name() not in names))
-    stage = ca.Function("stage", [x, free], [y, ca.jacobian(y, x)])
-    value, J = stage(ca.vertcat(*(one.value for one in inputs)), free)
-    slopes = ca.mtimes(J, ca.vertcat(*(one.slopes for one in inputs)))
-    return [_Dual(value[i], slopes[i, :]) for i in range(value.shape[0])]
-
-
 @cache
 def motion_scan(columns: Columns = ()) -> Scan:
     """Return the model as a compiled loop.
@@ -102,10 +81,19 @@ def motion_scan(columns: Columns = ()) -> Scan:
     Its ports: `state` (16,) and `tangent` are carried, `signals` (9,) and `rates` (3,) have a row
     a sample, `parameters` (p,), `car` (7,) and `dt` are constant; `force` (2,) [static loads],
     `residual` e (2,) [static loads], `slip` (2,) [rad] and, where slopes are asked for,
-    `residual_slopes` (2, n) come out.
+    `slopes` (2, n) of the residual come out.
     columns : names of the parameters over which slopes are asked for, (n,).
     """
-    n = len(columns)
+    step, program = _motion_step(bool(columns))
+    of = [NAMES.index(name) for name in columns]
+    slopes = None if program is None else Slopes(program, of)
+    carry, over = ("state", "was_on"), ("signals", "rates")
+    return Scan(step, carry=carry, over=over, flags=_SIMD, slopes=slopes)
+
+
+@cache
+def _motion_step(sloped: bool) -> tuple[ca.Function, Program | None]:
+    """Return the model as a step, and how its slopes run along where they do."""
     ports, s = symbols(
         state=len(CARRIED),
         was_on=1,
@@ -115,25 +103,14 @@ def motion_scan(columns: Columns = ()) -> Scan:
         car=CarNumbers,
         dt=1,
     )
-    old = _by_name(CARRIED, s.state)
-    duals = {
-        name: _Dual(value, _unit(name, columns))
-        for name, value in _by_name(NAMES, s.parameters).items()
-    }
-    fixed = _constant((*SIGNALS, *RATES), ca.vertsplit(ca.vertcat(s.signals, s.rates)), n)
+    tape, old, p = Tape(len(NAMES)), ca.vertsplit(s.state), ca.vertsplit(s.parameters)
+    before, duals = _constant(tape, CARRIED, old), _constant(tape, NAMES, p)
+    if sloped:
+        before = {name: tape.state(k, old[k]) for k, name in enumerate(CARRIED)}
+        duals = {name: tape.parameter(k, p[k]) for k, name in enumerate(NAMES)}
+    fixed = _constant(tape, (*SIGNALS, *RATES), ca.vertsplit(ca.vertcat(s.signals, s.rates)))
     on = fixed["on"].value
-    first = 1 - s.was_on * on
-    pattern = {name: ca.Sparsity(1, n) for name in CARRIED}
-    while True:  # which parameters each state can depend on
-        tangents = {name: ca.SX.sym(f"t_{name}", pattern[name]) for name in CARRIED}
-        before = {name: _Dual(old[name], tangents[name]) for name in CARRIED}
-        after, out = _step(_At(before, fixed, duals, s.car, s.dt, first))
-        grown = {
-            name: pattern[name] + ca.sparsify(after[name].slopes).sparsity() for name in CARRIED
-        }
-        if all(grown[name].nnz() == pattern[name].nnz() for name in CARRIED):
-            break
-        pattern = grown
+    after, out = _step(_At(tape, before, fixed, duals, s.car, s.dt, 1 - s.was_on * on))
     outputs = {
         "state_next": ca.vertcat(*(ca.if_else(on > 0, after[name].value, 0) for name in CARRIED)),
         "was_on_next": on,
@@ -142,37 +119,22 @@ def motion_scan(columns: Columns = ()) -> Scan:
             for port, name in (("force", "F"), ("residual", "e"), ("slip", "x"))
         },
     }
-    carry: tuple[str, ...] = ("state", "was_on")
-    if n:
-        kept = ca.vertcat(*(ca.vec(tangents[name].nz[:]) for name in CARRIED))
-        ports["tangent"] = ca.SX.sym("tangent", kept.numel())
-        outputs["tangent_next"] = ca.vertcat(
-            *(on * ca.vec(ca.project(after[name].slopes, pattern[name]).nz[:]) for name in CARRIED)
-        )
-        outputs["residual_slopes"] = on * ca.vertcat(*(ca.densify(one.slopes) for one in out["e"]))
-        exchanged = ca.substitute(list(outputs.values()), [kept], [ports["tangent"]])
-        outputs = dict(zip(outputs, exchanged, strict=True))
-        carry = (*carry, "tangent")
-    dense = [ca.densify(one) for one in outputs.values()]
-    step = ca.Function(f"motion_{n}", list(ports.values()), dense, list(ports), list(outputs))
-    return Scan(step, carry=carry, over=("signals", "rates"), flags=QUICK)
+    program = None
+    if sloped:
+        factors, program = tape.finished([after[name] for name in CARRIED], out["e"])
+        outputs[FACTORS] = ca.vertcat(on, factors)
+    name = "motion_slopes" if sloped else "motion"
+    dense = ca.cse([ca.densify(one) for one in outputs.values()])
+    return ca.Function(name, list(ports.values()), dense, list(ports), list(outputs)), program
 
 
 def _by_name(names: tuple[str, ...], vector: Any) -> dict[str, Any]:
     return dict(zip(names, ca.vertsplit(vector), strict=True))
 
 
-def _constant(names: tuple[str, ...], values: Sequence[Any], n: int) -> dict[str, _Dual]:
-    """Return values that depend on none of n parameters, by name."""
-    return {name: _Dual(value, ca.SX(1, n)) for name, value in zip(names, values, strict=True)}
-
-
-def _unit(name: str, columns: Columns) -> Any:
-    """Return the slopes of a parameter over the columns: one at its own, (1, n)."""
-    slopes = ca.SX(1, len(columns))
-    if name in columns:
-        slopes[0, columns.index(name)] = 1
-    return slopes
+def _constant(tape: Tape, names: tuple[str, ...], values: Sequence[Any]) -> dict[str, Dual]:
+    """Return values that depend on no parameter, by name."""
+    return {name: tape.constant(value) for name, value in zip(names, values, strict=True)}
 
 
 class _At(NamedTuple):
@@ -180,19 +142,20 @@ class _At(NamedTuple):
     whether nothing is known of the sample before.
     """
 
-    before: dict[str, _Dual]
-    signals: dict[str, _Dual]
-    p: dict[str, _Dual]
+    tape: Tape
+    before: dict[str, Dual]
+    signals: dict[str, Dual]
+    p: dict[str, Dual]
     car: CarNumbers
     dt: Any
     first: Any
 
 
-def _step(at: _At) -> tuple[dict[str, _Dual], dict[str, tuple[_Dual, _Dual]]]:
+def _step(at: _At) -> tuple[dict[str, Dual], dict[str, tuple[Dual, Dual]]]:
     """Return the state after a sample, and F, e, x of both axles."""
     v_x, v_y, r, delta = _sensors(at)
     after, sway = _sway(at, v_x, r)
-    found: dict[str, list[_Dual]] = {"F": [], "e": [], "x": []}
+    found: dict[str, list[Dual]] = {"F": [], "e": [], "x": []}
     for axle, angle in (("f", delta), ("r", at.signals["delta_r"])):
         slips, x = _slip(axle, at, v_x, v_y, r, angle, sway)
         after |= slips
@@ -219,23 +182,23 @@ def true_signals(signals: Sequence[Any], p: Sequence[Any]) -> tuple[Any, Any, An
     return true_v_x, true_v_y, true_r, true_delta
 
 
-def _sensors(at: _At) -> list[_Dual]:
+def _sensors(at: _At) -> list[Dual]:
     """Return v_x, v_y, r and δ_f without the sensors' errors."""
 
     def true(*given: Any) -> tuple[Any, ...]:
         return true_signals(given[: len(SENSED)], given[len(SENSED) :])
 
     logged, errors = (at.signals[name] for name in SENSED), (at.p[name] for name in SENSORS)
-    return _staged(true, *logged, *errors)
+    return at.tape.staged(true, *logged, *errors)
 
 
-def _sway(at: _At, v_x: _Dual, r: _Dual) -> tuple[dict[str, _Dual], _Dual]:
+def _sway(at: _At, v_x: Dual, r: Dual) -> tuple[dict[str, Dual], Dual]:
     """Return ρ' and ρ, and -ρ'/(ω² v_x), semi-implicit in ρ' (as `axle.slip.sway`)."""
     car, dt, first = at.car, at.dt, at.first
 
     def equations(
         rho: Any, rate: Any, f_f: Any, f_r: Any, C_f: Any, C_r: Any, k_f: Any, k_r: Any,
-        ln_sway: Any, shift: Any, speed: Any, yaw: Any,
+        ln_sway: Any, shift: Any, speed: Any,
     ) -> list[Any]:  # fmt: skip
         L = car.l_f + car.l_r
         front, rear = (car.l_r + shift) / L, (car.l_f - shift) / L
@@ -243,15 +206,21 @@ def _sway(at: _At, v_x: _Dual, r: _Dual) -> tuple[dict[str, _Dual], _Dual]:
         a = GRAVITY * (front * f_f + rear * f_r)
         eased = 1 + dt * GRAVITY * (front * C_f * k_f + rear * C_r * k_r) / speed
         moved = (rate * eased + dt * omega**2 * (a - rho)) / (eased + dt * 2 * DAMPING * omega)
-        moved = ca.if_else(first > 0, 0, moved)
-        place = ca.if_else(first > 0, speed * yaw, rho + dt * moved)
-        return [moved, place, -moved / (omega**2 * speed)]
+        return [ca.if_else(first > 0, 0, moved)]
+
+    def place(rho: Any, moved: Any, speed: Any, yaw: Any) -> list[Any]:
+        return [ca.if_else(first > 0, speed * yaw, rho + dt * moved)]
+
+    def slip(moved: Any, ln_sway: Any, speed: Any) -> list[Any]:
+        return [-moved / ((car.omega * ca.exp(ln_sway)) ** 2 * speed)]
 
     names = ("rho", "rate", "force_f", "force_r", "slope_f", "slope_r")
     of = ("sway_share_f", "sway_share_r", "ln_sway", "cg_shift")
-    inputs = [*(at.before[name] for name in names), *(at.p[name] for name in of), v_x, r]
-    rate, rho, slip = _staged(equations, *inputs)
-    return {"rate": rate, "rho": rho}, slip
+    inputs = [*(at.before[name] for name in names), *(at.p[name] for name in of), v_x]
+    (rate,) = at.tape.staged(equations, *inputs)
+    (rho,) = at.tape.staged(place, at.before["rho"], rate, v_x, r)
+    (away,) = at.tape.staged(slip, rate, at.p["ln_sway"], v_x)
+    return {"rate": rate, "rho": rho}, away
 
 
 def _curve(ln_C: Any, ln_mu: Any, c: Any, E: Any, *others: Any) -> tuple[Any, Any]:
@@ -331,8 +300,8 @@ def slope_function() -> ca.Function:
 
 
 def _slip(
-    axle: str, at: _At, v_x: _Dual, v_y: _Dual, r: _Dual, delta: _Dual, sway: _Dual
-) -> tuple[dict[str, _Dual], _Dual]:
+    axle: str, at: _At, v_x: Dual, v_y: Dual, r: Dual, delta: Dual, sway: Dual
+) -> tuple[dict[str, Dual], Dual]:
     """Return slip and lagged slip of an axle after the sample, and the latter by itself."""
     car, p = at.car, at.p
 
@@ -350,13 +319,13 @@ def _slip(
 
     play = [p["steering_play"]] if axle == "f" else []
     share, shift = p[f"sway_share_{axle}"], p["cg_shift"]
-    (alpha,) = _staged(slip, delta, v_y, v_x, r, share, sway, shift, *play)
+    (alpha,) = at.tape.staged(slip, delta, v_y, v_x, r, share, sway, shift, *play)
     last, was, slope = (at.before[f"{name}_{axle}"] for name in ("x", "alpha", "slope"))
-    (x,) = _staged(lagged, last, was, alpha, slope, p[f"compliance_{axle}"], v_x)
+    (x,) = at.tape.staged(lagged, last, was, alpha, slope, p[f"compliance_{axle}"], v_x)
     return {f"x_{axle}": x, f"alpha_{axle}": alpha}, x
 
 
-def _force(axle: str, at: _At, v_x: _Dual, x: _Dual) -> tuple[dict[str, _Dual], _Dual]:
+def _force(axle: str, at: _At, v_x: Dual, x: Dual) -> tuple[dict[str, Dual], Dual]:
     """Return slope and force at a lagged slip, of curve, load and ellipse; the latter by itself."""
     car, p, road = at.car, at.p, at.p["ln_road"]
 
@@ -365,17 +334,17 @@ def _force(axle: str, at: _At, v_x: _Dual, x: _Dual) -> tuple[dict[str, _Dual], 
         load, left = load_and_ellipse(axle, car, numbers, a_x, speed)
         return [phi * load * left]
 
-    ln_m = _Dual(road.value + at.signals["road"].value, road.slopes)
+    ln_m = Dual(road.value + at.signals["road"].value, road.slopes)
     numbers = [p[name] for name in curve_names(axle)]
-    value, slope = _staged(carcass_curve, *numbers, ln_m, x)
+    value, slope = at.tape.staged(carcass_curve, *numbers, ln_m, x)
     given = (p[name] for name in pushed_names(axle))
-    (force,) = _staged(pushes, value, *given, at.signals["a_x"], v_x)
+    (force,) = at.tape.staged(pushes, value, *given, at.signals["a_x"], v_x)
     return {f"slope_{axle}": slope, f"force_{axle}": force}, force
 
 
 def _residual(
-    axle: str, at: _At, v_x: _Dual, v_y: _Dual, r: _Dual, delta: _Dual, force: _Dual
-) -> tuple[dict[str, _Dual], _Dual, _Dual]:
+    axle: str, at: _At, v_x: Dual, v_y: Dual, r: Dual, delta: Dual, force: Dual
+) -> tuple[dict[str, Dual], Dual, Dual]:
     """Return the states of the balance of an axle after the sample, F, and e."""
     car, dt, p = at.car, at.dt, at.p
 
@@ -392,13 +361,14 @@ def _residual(
         mean = (1 - fall) / (RATE * dt)
         z = fall * z0 + mean * (xi - xi0) - (u + u0) / 2 * dt * mean
         z = ca.if_else(at.first > 0, 0, z)
-        return [z, xi, u, across, RATE * z]
+        return [z, xi, u, across]
 
-    bank = _Dual(at.signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
+    bank = Dual(at.signals["bank"].value / GRAVITY + p["bank"].value, p["bank"].slopes)
     names = [f"{name}_{axle}" for name in ("z", "xi", "u")]
     last = (at.before[name] for name in names)
     inputs = (force, delta, p["ln_inertia"], bank, v_x, v_y, r, p["cg_shift"])
-    *kept, across, e = _staged(balance, *last, *inputs)
+    *kept, across = at.tape.staged(balance, *last, *inputs)
+    (e,) = at.tape.staged(lambda z: [RATE * z], kept[0])
     return dict(zip(names, kept, strict=True)), across, e
 
 
@@ -429,10 +399,11 @@ def _replay_step() -> ca.Function:
     a_x = (g.v_x - slow) / _LAG_OF_A_X - g.v_y * g.r
     following = g.v_x + (slow - g.v_x) * ca.exp(-s.dt / _LAG_OF_A_X)
     values = [g.v_x, g.v_y, g.r, g.delta[0], g.delta[1], a_x, 0, 0, g.on]
-    fixed = _constant((*SIGNALS, *RATES), [*values, 0, 0, 0], 0)
-    duals = _constant(NAMES, ca.vertsplit(s.parameters), 0)
-    before = _constant(CARRIED, [old.get(name, 0) for name in CARRIED], 0)
-    after, out = _step(_At(before, fixed, duals, s.car, s.dt, g.first))
+    tape = Tape(len(NAMES))
+    fixed = _constant(tape, (*SIGNALS, *RATES), [*values, 0, 0, 0])
+    duals = _constant(tape, NAMES, ca.vertsplit(s.parameters))
+    before = _constant(tape, CARRIED, [old.get(name, 0) for name in CARRIED])
+    after, out = _step(_At(tape, before, fixed, duals, s.car, s.dt, g.first))
     slip = ca.vertcat(*(axis.value for axis in out["x"]))
     alpha = ca.vertcat(after["alpha_f"].value, after["alpha_r"].value)
     motion = [ca.if_else(g.on, after[name].value, 0) for name in CARRIED[:10]]

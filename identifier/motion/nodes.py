@@ -16,10 +16,10 @@ from typing import Any
 import casadi as ca
 
 from codegen import Scan
+from codegen.compiler import FLAGS
 from identifier.axle.car import step_function, symbols
 from identifier.axle.slip import SHORTEST, beyond_play
 from identifier.motion.model import (
-    QUICK,
     CarNumbers,
     Columns,
     carcass_curve,
@@ -28,6 +28,10 @@ from identifier.motion.model import (
 )
 from identifier.motion.parameters import NAMES, curve_names
 from models.vehicle import GRAVITY
+
+# Parts of the matrix are thousands of lines: to optimize them further takes the compiler longer
+# than they run.
+_QUICK = tuple("-O1" if flag == "-O2" else flag for flag in FLAGS)
 
 STATES = ("v_y", "r", "x_f", "x_r", "e_f", "e_r", "bank", "bank_rate")
 GIVEN = ("v_x", "delta_f", "delta_r", "a_x", "turning", "rho", "rho_rate", "jerk")
@@ -99,7 +103,7 @@ def node_scan(columns: Columns = ()) -> Scan:
         }  # fmt: skip
     dense = {name: ca.densify(one) for name, one in out.items()}
     step = step_function(f"nodes_{len(columns)}", ports, {}, dense)
-    return Scan(step, carry=carry, over=over, flags=QUICK)
+    return Scan(step, carry=carry, over=over, flags=_QUICK)
 
 
 class _Instant:

@@ -39,9 +39,12 @@ def is_used(path: Path) -> bool:
     return "pyarrow" in sys.modules or path.stat().st_size > _WORTH
 
 
-def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict[int, Any] | None:
+def columns_of(
+    block: bytes, lines: int, layout: Layout, wanted: Mapping[int, Kind]
+) -> dict[int, Any] | None:
     """Return columns of a text; None where anything in it is not plain, which Python decides on.
-    block : whole lines in UTF-8.   wanted : column from 0 -> how its cells are read.
+    block : whole lines in UTF-8, and their number.   wanted : column from 0 -> how its cells are
+    read.
     """
     import pyarrow
     import pyarrow.csv
@@ -74,7 +77,7 @@ def columns_of(block: bytes, layout: Layout, wanted: Mapping[int, Kind]) -> dict
                 decimal_point=layout.decimal,
             ),
         )
-        if table.num_rows != block.count(b"\n") + (not block.endswith(b"\n")):
+        if table.num_rows != lines:
             return None
         columns: dict[int, Any] = {}
         for column, kind in wanted.items():

@@ -48,7 +48,7 @@ class Growing:
 
     def extend(self, values: NDArray[Any]) -> None:
         """Add numbers at the end.   values : (n,), which are copied."""
-        part = np.array(values, dtype=self._dtype)
+        part = np.asarray(values, dtype=self._dtype)
         self._size += part.size
         self._parts.append(part)
         if self._file is None and self._size <= LONGEST_IN_MEMORY:

@@ -136,8 +136,9 @@ def noted_errors(figure):
 
 
 @pytest.mark.heavy
-def test_figures_say_the_errors_of_the_tables(study, tmp_path):
+def test_figures_say_the_errors_of_the_tables(study, tmp_path, monkeypatch):
     """Both count from the onset on: before it there is no force to miss."""
+    monkeypatch.setattr("tireid.commands.paper.save_figures", lambda _, figures: figures)
     drawn = write_study(tmp_path, study)
     for name, maneuver in (("fig3", "step_steer"), ("fig5", "slalom")):
         trial = study.typical(maneuver, "integral")
@@ -227,7 +228,7 @@ def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(tireid.commands.demo, "SEEDS", 2)
     monkeypatch.setattr("tireid.exporting.measure", lambda *_: [])  # has tests of its own
     monkeypatch.setattr("tireid.commands.demo.drive_story", lambda *_: {})  # so has this
-    monkeypatch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)  # a page has SVG
+    monkeypatch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)
     assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
     page = (tmp_path / "demo" / "report.html").read_text()
     assert page.count("data:image/") >= 8

@@ -8,7 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from tests.pages import faults_of, outline
-from tireid.figures.style import figure_png, figure_svg
+from tireid.figures.style import figure_png
 from tireid.report import (
     Headline,
     Marked,
@@ -169,9 +169,7 @@ def test_commands_are_written_letter_by_letter_and_our_letters_with_their_index(
 
 
 def test_a_film_and_a_drawing_are_embedded_as_what_they_are() -> None:
-    drawings = [figure_svg(Figure(figsize=(1.0, 1.0))) for _ in range(2)]
-    assert drawings[0] == drawings[1], "the same bytes each time"
-    for content, kind in ((drawings[0], "svg+xml"), (b"GIF89a and more", "gif")):
+    for content, kind in ((b"<?xml and more", "svg+xml"), (b"GIF89a and more", "gif")):
         picture = Picture(image=content, caption="c", read="how")
         parser = outline(page_of("t", [Section(heading="h", blocks=[picture])]))
         (image,) = (attributes["src"] for tag, attributes in parser.tags if tag == "img")

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from codegen.writing import naming, write_file
 from identifier.compare.course import INFINITE, same_and_other
@@ -125,7 +124,7 @@ def _text(title: str, lines: list[list[str]]) -> str:
 
 def write_comparison(
     folder: Path, comparison: Comparison, verdicts: Mapping[str, Verdict]
-) -> dict[str, Figure]:
+) -> dict[str, bytes]:
     """Write everything that was found out into a folder; return the figures by their file's name.
 
     verdicts : on what the default learns, by recording.
@@ -204,7 +203,7 @@ def _error_rows(comparison: Comparison) -> Iterator[tuple[str | float, ...]]:
 def write_compare_report(
     folder: Path,
     comparison: Comparison,
-    figures: Mapping[str, Figure],
+    figures: Mapping[str, bytes],
     verdicts: Mapping[str, Verdict],
     command: str,
 ) -> None:

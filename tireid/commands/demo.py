@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from codegen import find_compiler
 from identifier.export.compiled import CompiledPackage
@@ -38,7 +37,7 @@ from tireid.figures.film import FORMATS
 from tireid.figures.paper import SCHEME
 from tireid.output import output_folder
 from tireid.progress import Progress, Stopwatch, tell
-from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.reports.common import READ, REPORT, drawings, origin
 from tireid.reports.identify import (
     curve_drawing,
     identify_headlines,
@@ -78,7 +77,7 @@ class Driven(NamedTuple):
     """Drives along one path, and their figures."""
 
     drives: Drives
-    figures: Mapping[str, Figure]
+    figures: Mapping[str, bytes]
 
 
 def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
@@ -137,7 +136,7 @@ def _scores(one: Driven, caption: str) -> list[page.Block]:
     case = f"{headline(one.drives.conditions)}."
     return [
         page.Table(caption=case, header=SCORES, rows=score_rows(one.drives.runs)),
-        drawing(one.figures["errors"], caption, READ["errors"]),
+        *drawings(one.figures, {"errors": caption}),
     ]
 
 
@@ -231,7 +230,7 @@ def _demo_report(
     shipped: Shipped,
     study: Study,
     driven: Mapping[str, Driven],
-    figures: Mapping[str, Mapping[str, Figure]],
+    figures: Mapping[str, Mapping[str, bytes]],
     folder: Path,
     command: str,
 ) -> page.Report:
@@ -260,7 +259,7 @@ def _demo_report(
     )
 
 
-def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) -> page.Section:
+def _learn(figures: Mapping[str, bytes], model: TireModel, verdict: Verdict) -> page.Section:
     return page.Section(
         heading="Identified tires",
         blocks=[
@@ -281,17 +280,18 @@ def _learn(figures: Mapping[str, Figure], model: TireModel, verdict: Verdict) ->
             ),
             curve_drawing(figures, verdict),
             *learnt_blocks("the axle identifier", model, figures)[1:],
-            drawing(
-                figures["forces"],
-                "Axle forces: online above, and below replayed with the weights frozen at "
-                f"{FREEZE:g} s.",
-                READ["forces"],
+            *drawings(
+                figures,
+                {
+                    "forces": "Axle forces: online above, and below replayed with the weights "
+                    f"frozen at {FREEZE:g} s."
+                },
             ),
         ],
     )
 
 
-def _predict(story: Story, figures: Mapping[str, Figure]) -> page.Section:
+def _predict(story: Story, figures: Mapping[str, bytes]) -> page.Section:
     columns = ["frozen", "of rms"]
     blocks: list[page.Block] = [
         page.Paragraph(
@@ -308,11 +308,12 @@ def _predict(story: Story, figures: Mapping[str, Figure]) -> page.Section:
     ]
     for name in list(STORY)[1:]:
         caption = f"The axle identifier, frozen after the slalom, on the {name.replace('_', ' ')}."
-        blocks.append(drawing(figures[f"replay_{name}"], caption, READ["replay"]))
+        image = figures[f"replay_{name}"]
+        blocks.append(page.Picture(image=image, caption=caption, read=READ["replay"]))
     return page.Section(heading="Prediction of validation drives", blocks=blocks)
 
 
-def _paper_study(story: Story, study: Study, figures: Mapping[str, Figure]) -> page.Section:
+def _paper_study(story: Story, study: Study, figures: Mapping[str, bytes]) -> page.Section:
     seeds = len(study.errors["slalom"]["integral"])
     certified = certificate_table.verdict_line(story.certificate)
     captions = {
@@ -341,7 +342,7 @@ def _paper_study(story: Story, study: Study, figures: Mapping[str, Figure]) -> p
         blocks.append(study_table(maneuver, study, caption))
         if f"{maneuver}_errors" in figures:  # a law that diverged on every seed has none
             what = "The table as a picture; hollow marks are the paper's values."
-            blocks.append(drawing(figures[f"{maneuver}_errors"], what))
+            blocks.append(page.Picture(image=figures[f"{maneuver}_errors"], caption=what))
     said = (MEANING, settings(GAINS, NETWORK).splitlines()[0])
     blocks += [page.Paragraph(text=page.printed(one)) for one in said]
     return page.Section(heading="The paper's study", blocks=blocks, folded=True)
@@ -383,7 +384,7 @@ def run(options: argparse.Namespace) -> None:
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
             one.mkdir()
-        figures: dict[str, Mapping[str, Figure]] = {
+        figures: dict[str, Mapping[str, bytes]] = {
             "identify": story.axle.write(folders["identify"]),
             "paper_network": story.paper.write(folders["paper_network"]),
         }

@@ -163,7 +163,7 @@ _FIGURES = {  # number of the paper's figure, by maneuver and law
 }
 
 
-def write_study(folder: Path, study: paper_study.Study) -> dict[str, Figure]:
+def write_study(folder: Path, study: paper_study.Study) -> dict[str, bytes]:
     """Write tables.json, diverged.json, tables.txt and figures of a study; return the figures."""
     write_json(folder / "tables.json", study.tables())
     write_json(folder / "diverged.json", study.diverged())

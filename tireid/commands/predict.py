@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from codegen.arrays import Array
 from codegen.escape import visible
@@ -28,7 +27,7 @@ from tireid.figures.tires import slip_figure
 from tireid.identified import error_cells
 from tireid.learning import replay
 from tireid.progress import say, tell
-from tireid.reports.common import READ, REPORT, drawing, origin
+from tireid.reports.common import READ, REPORT, origin
 from tireid.reports.identify import (
     band_sentence,
     curve_drawing,
@@ -97,9 +96,9 @@ def run(options: argparse.Namespace) -> int:
             figures["motion"] = motion_figure(verdict.forces, model.vehicle)
         if friction is not None:
             figures["friction"] = friction_figure(friction)
-        save_figures(folder, figures)
+        images = save_figures(folder, figures)
         write_predict_report(
-            folder, prediction, figures, lines, source=options.model, command=options.words
+            folder, prediction, images, lines, source=options.model, command=options.words
         )
     error, table = prediction.against_truth, ""
     if error is not None:
@@ -219,7 +218,7 @@ def _prediction_text(prediction: Prediction, facts: Mapping[str, Any]) -> str:
 def write_predict_report(
     folder: Path,
     prediction: Prediction,
-    figures: Mapping[str, Figure],
+    figures: Mapping[str, bytes],
     lines: str,
     *,
     source: Path,
@@ -244,7 +243,11 @@ def write_predict_report(
         "friction": "Friction of the road over that of the identification drive.",
     }
     found += [
-        drawing(figures[name], caption, READ["replay" if name == "forces" else name])
+        page.Picture(
+            image=figures[name],
+            caption=caption,
+            read=READ["replay" if name == "forces" else name],
+        )
         for name, caption in captions.items()
         if name in figures
     ]

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from codegen.arrays import Array
 from identifier.frozen import vehicle_numbers
@@ -121,7 +120,7 @@ class Drives(NamedTuple):
             "seed": conditions.seed,
         }
 
-    def write(self, folder: Path, film: str) -> dict[str, Figure]:
+    def write(self, folder: Path, film: str) -> dict[str, bytes]:
         """Write everything about the drives; return the figures by the name of their file.
 
         film : webp, gif or none.
@@ -150,12 +149,12 @@ class Drives(NamedTuple):
         }
         if first.drive.estimates:
             figures["lateral"] = drive_lateral_figure(first.drive)
-        save_figures(folder, figures)
+        images = save_figures(folder, figures)
         if film != NO_FILM:
             title = f"{first.drive.path.name}: {first.label} tires"
             drawn = Film(title, drives, curves, setup.drops, first.known, first.model)
             write_film(folder / f"drive.{film}", drawn)
-        return figures
+        return images
 
     def text(self) -> str:
         lines = [headline(self.conditions), text_table([SCORES, *score_rows(self.runs)], "<>><>>")]
@@ -254,7 +253,7 @@ def _known_curves(
 
 
 def write_drive_report(
-    folder: Path, drives: Drives, figures: Mapping[str, Figure], film: Path | None, command: str
+    folder: Path, drives: Drives, figures: Mapping[str, bytes], film: Path | None, command: str
 ) -> None:
     """Write the report of drives along one path."""
     runs = drives.runs
@@ -319,7 +318,7 @@ def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
 
 
 def _drive_blocks(
-    runs: Sequence[ClosedLoop], figures: Mapping[str, Figure], film: Path | None
+    runs: Sequence[ClosedLoop], figures: Mapping[str, bytes], film: Path | None
 ) -> list[Block]:
     blocks: list[Block] = [
         Table(caption="Scores of the drives.", header=SCORES, rows=score_rows(runs))
@@ -335,7 +334,7 @@ def _drive_blocks(
     return [*blocks, *drawings(figures, captions)]
 
 
-def known_blocks(runs: Sequence[ClosedLoop], figures: Mapping[str, Figure]) -> list[Block]:
+def known_blocks(runs: Sequence[ClosedLoop], figures: Mapping[str, bytes]) -> list[Block]:
     """Return what trackers believed of the tires, and what they were given on the way."""
     captions = {
         "tires": "Forces of the first drive, and the tire models of the trackers.",

@@ -44,9 +44,7 @@ def drive_solve_figure(drive: "Drive") -> Figure:
     times = 1e3 * drive.solve_time  # ms
     figure = style.new_figure(2.5)
     axes = figure.subplots()
-    axes.plot(
-        drive.t, times, ".", ms=2.2, mew=0.0, color=style.BLUE, rasterized=True, label="a step"
-    )
+    axes.plot(drive.t, times, ".", ms=2.2, mew=0.0, color=style.BLUE, label="a step")
     failed = drive.status != 0
     if failed.any():
         label = f"failed ({np.count_nonzero(failed)})"

@@ -24,11 +24,7 @@ from tireid.figures import style
 from tireid.figures.thinned import drawn_samples, drawn_times
 
 _Curve = tuple[Array, Mapping[str, Any]]  # forces of both axles (n, 2) [N], and their look
-_RESIDUAL: Mapping[str, Any] = {  # noise for the most part, which would make a drawing large
-    "linewidth": 0.8,
-    "linestyle": "-",
-    "rasterized": True,
-}
+_RESIDUAL: Mapping[str, Any] = {"linewidth": 0.8, "linestyle": "-"}
 
 
 def _force_panels(
@@ -164,18 +160,19 @@ def inputs_figure(recording: Recording) -> Figure:
     """Draw the signals of a recording; rear steering and a_y only where there are any."""
     require_kind(Recording, "as of read_recording, or run.recording", recording=recording)
     ends = recording.t[0], recording.t[-1]
-    estimated = ", estimated" if recording.estimated else ""
+    estimated = "estimated " if recording.estimated else ""
     logged = {
-        "$v_x$ [m/s]": recording.v_x,
-        "steering [deg]": np.degrees(recording.delta_f),
-        f"$v_y$ [m/s]{estimated}": recording.v_y,
-        "$r$ [deg/s]": np.degrees(recording.r),
-        "$a_y$ [m/s²]": recording.a_y,
+        "speed\n[m/s]": recording.v_x,
+        "steering\n[deg]": np.degrees(recording.delta_f),
+        f"lateral speed\n{estimated}[m/s]": recording.v_y,
+        "yaw rate\n[deg/s]": np.degrees(recording.r),
+        "lateral acc.\n[m/s²]": recording.a_y,
     }
     signals = {label: one for label, one in logged.items() if one is not None}
     part = drawn_samples(recording.t, ends, recording.delta_r, *signals.values())
     t = drawn_times(recording, recording.t[part])
-    figure = style.new_figure(0.5 + 1.05 * len(signals))
+    steers = bool(np.any(recording.delta_r))
+    figure = style.new_figure(0.5 + 1.05 * len(signals), plain=not steers)
     panels = figure.subplots(len(signals), 1, sharex=True)
     panels[0].set_xlim(ends)
     for axes, (label, signal) in zip(panels, signals.items(), strict=True):
@@ -186,13 +183,13 @@ def inputs_figure(recording: Recording) -> Figure:
         middle = float(values.min()) + span / 2
         if span < 0.05 * abs(middle):  # a speed that is held shows as held
             axes.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
-    if np.any(recording.delta_r):
+    if steers:
         panels[1].lines[0].set_label(r"front $\delta_f$")
         rear = np.degrees(recording.delta_r[part])
         panels[1].plot(t, rear, color=style.ORANGE, linewidth=0.9, label=r"rear $\delta_r$")
         style.legend_beside(panels[1])
+        figure.align_ylabels()
     style.label_time(panels[-1], recording.t)
-    figure.align_ylabels()
     return figure
 
 

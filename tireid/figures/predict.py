@@ -11,7 +11,7 @@ from identifier.verdict import RoadFriction, WindowForces
 from models.vehicle import Vehicle
 from tireid.figures import style
 
-_POINTS: Mapping[str, Any] = {"linestyle": "", "marker": ".", "markersize": 3.0, "rasterized": True}
+_POINTS: Mapping[str, Any] = {"linestyle": "", "marker": ".", "markersize": 3.0}
 
 
 @style.styled

@@ -17,9 +17,11 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine, LayoutEngine
 from matplotlib.legend import Legend
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
+from PIL import Image
 
 from codegen.arrays import Array
 from codegen.writing import write_file
@@ -29,7 +31,10 @@ from identifier.run import History
 
 PAGE = 7.16  # width of both columns of a paper [in]
 RESOLUTION = 200  # [dots per inch]
-CLOUDS = 130  # dots per inch of what is pixels in a drawing
+_LINE, _ENTRY = 0.15, 0.19  # of text, and of a legend [in]
+_NUMBERS = 0.46  # of the left axis, and their distances [in]
+_NEAR = 0.07  # [in]
+_WHITE = {254: 255}  # as it comes out of a palette
 # s: of a clock that begins later, as a Unix time does, only the last digits are shown
 FAR = 1e5
 CLOCK_STEP = 100.0  # s
@@ -78,12 +83,47 @@ class _NotebookFigure(Figure):
         return figure_png(self, resolution=100)
 
 
-def new_figure(height: float) -> Figure:
+class _Margins(LayoutEngine):
+    """Room for titles, numbers and labels as large as ours are, which is not measured anew."""
+
+    _adjust_compatible, _colorbar_gridspec = True, False
+    entries = 0  # rows of the legend
+
+    def execute(self, fig: Figure) -> None:
+        grid = fig.axes[0].get_gridspec()
+        assert grid is not None
+        width, height = fig.get_size_inches()
+        titles = [one.get_title(side) for one in fig.axes for side in ("left", "right")]
+        lines = _LINE * max(1 + text.count("\n") if text else 0 for text in titles)
+        numbered = any(one.get_xlabel() for one in fig.axes[: -grid.ncols])
+        names = _LINE * max(1 + one.get_ylabel().count("\n") for one in fig.axes)
+        left, below = _NUMBERS + names, 2.0 * _LINE + _NEAR
+        gap = lines + 1.5 * _NEAR + (below if numbered else 0.0)
+        top = lines + _NEAR + self.entries * _ENTRY
+        each = (height - top - below - _NEAR - (grid.nrows - 1) * gap) / grid.nrows
+        fig.subplots_adjust(
+            left=left / width,
+            right=1.0 - 1.5 * _NEAR / width,
+            top=1.0 - top / height,
+            bottom=(below + _NEAR) / height,
+            hspace=gap / each,
+            wspace=0.06,
+        )
+        for axes in fig.axes:
+            box = axes.get_position()
+            axes.xaxis.set_label_coords(0.5, (_LINE + _NEAR) / (-height * box.height))
+            axes.yaxis.set_label_coords((names + _NEAR - left) / (width * box.width), 0.5)
+
+
+def new_figure(height: float, *, plain: bool = False) -> Figure:
     """Return an empty figure that fits its labels into its size when drawn.
 
     height : of the figure [in].
+    plain : rows of panels with nothing beside them, of which the room for labels is known.
     """
-    figure = _NotebookFigure(figsize=(PAGE, height), layout="constrained")
+    figure = _NotebookFigure(
+        figsize=(PAGE, height), layout=_Margins() if plain else ConstrainedLayoutEngine()
+    )
     FigureCanvasAgg(figure)
     return figure
 
@@ -95,7 +135,7 @@ def axle_panels(
 
     room : above and below them [in].
     """
-    figure = new_figure(room + sum(heights))
+    figure = new_figure(room + sum(heights), plain=True)
     panels = figure.subplots(
         len(heights), 2, sharex=sharex, sharey="row", height_ratios=heights, squeeze=False
     )
@@ -129,30 +169,30 @@ def laid_out(figure: Figure) -> Iterator[None]:
 
 
 def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
-    buffer = BytesIO()
+    """Return a figure as PNG of few colors: a third of the bytes, written in half the time."""
+    buffer, dpi = BytesIO(), figure.dpi
     with laid_out(figure):
-        figure.savefig(buffer, format="png", dpi=resolution, metadata={"Software": None})
+        figure.dpi = resolution
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.draw()
+        figure.dpi = dpi
+    drawn = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    drawn = drawn.quantize(method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    drawn.putpalette([_WHITE.get(one, one) for one in drawn.getpalette() or ()])
+    drawn.save(buffer, "png", dpi=(resolution, resolution))
     return buffer.getvalue()
 
 
-def figure_svg(figure: Figure) -> bytes:
-    """Return a figure as SVG, the same bytes for the same figure; dense clouds in it are pixels."""
-    buffer = BytesIO()
-    with laid_out(figure):
-        figure.savefig(buffer, format="svg", dpi=CLOUDS, metadata={"Date": None, "Creator": None})
-    return buffer.getvalue()
+def save_figure(figure: Figure, path: Path) -> bytes:
+    """Write a figure as PNG, and return it."""
+    image = figure_png(figure)
+    write_file(path, image)
+    return image
 
 
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG."""
-    write_file(path, figure_png(figure))
-
-
-def save_figures(folder: Path, figures: dict[str, Figure]) -> dict[str, Figure]:
-    """Write figures as PNG under their names, and return them."""
-    for name, figure in figures.items():
-        save_figure(figure, folder / f"{name}.png")
-    return figures
+def save_figures(folder: Path, figures: Mapping[str, Figure]) -> dict[str, bytes]:
+    """Write figures as PNG under their names; return these, which a report shows, too."""
+    return {name: save_figure(one, folder / f"{name}.png") for name, one in figures.items()}
 
 
 TIME = "time [s]"
@@ -237,6 +277,9 @@ def legend_above(figure: Figure, *, columns: int | None = None, last: Sequence[s
             entries[label] = entries.pop(label)
     if entries:
         columns = columns or (len(entries) if len(entries) < 6 else 3)
+        engine = figure.get_layout_engine()
+        if isinstance(engine, _Margins):
+            engine.entries = -(-len(entries) // columns)
         _bolder(
             figure.legend(
                 list(entries.values()),

@@ -24,13 +24,12 @@ if TYPE_CHECKING:
 
 _UNKNOWN = "slip not known"
 _BAND = "band of 90 %"
-_CLOUD: Mapping[str, Any] = {  # thousands of points: pixels where the rest of a drawing is lines
+_CLOUD: Mapping[str, Any] = {
     "linestyle": "",
     "marker": ".",
     "markersize": 2.2,
     "markeredgewidth": 0.0,
     "alpha": 0.8,
-    "rasterized": True,
 }
 
 
@@ -78,14 +77,14 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
                 for panel in panels[:, axle] if low < high else ():
                     panel.axvspan(low, high, color="#EFE9DD", label=_UNKNOWN, **look)
         axes.set(xlim=ends, ylim=limits)
-        _label_slip(lowest, axle)
+        _label_slip(lowest)
     style.label_forces(panels, unit, residual=known is not None)
     style.legend_above(figure, last=(_UNKNOWN,))
     return figure
 
 
-def _label_slip(axes: Axes, axle: int) -> None:
-    axes.set_xlabel(rf"slip angle $\alpha_{'fr'[axle]}$ [deg]")
+def _label_slip(axes: Axes) -> None:
+    axes.set_xlabel("slip angle [deg]")
     axes.xaxis.set_major_locator(MaxNLocator(nbins=8, steps=[1, 2, 5, 10]))
 
 
@@ -161,7 +160,7 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
             look = tire_look(curve.label)
             axes.plot(np.rad2deg(curve.alpha), drawn, label=curve.label, **look)
         axes.set(xlim=(-reach, reach), ylim=limits)
-        _label_slip(axes, axle)
+        _label_slip(axes)
     style.label_forces(panels, unit, residual=False)
     return figure
 

@@ -9,15 +9,12 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from matplotlib.figure import Figure
-
 from codegen.arrays import LONG, blocks
 from identifier.frozen import vehicle_numbers
 from models.files import digest, digest_of_bytes
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
-from tireid.figures import style
 from tireid.report import Picture, Section, Table
 
 REPORT = "report.html"
@@ -26,13 +23,13 @@ with Path(__file__).with_name("read.toml").open("rb") as file:
     READ: dict[str, str] = tomllib.load(file)  # how to read each figure, in one line
 
 
-def drawing(figure: Figure, caption: str, read: str = "") -> Picture:
-    return Picture(image=style.figure_svg(figure), caption=caption, read=read)
-
-
-def drawings(figures: Mapping[str, Figure], captions: Mapping[str, str]) -> list[Picture]:
+def drawings(figures: Mapping[str, bytes], captions: Mapping[str, str]) -> list[Picture]:
     """Return the figures that there are of some, by their captions."""
-    return [drawing(figures[n], text, READ[n]) for n, text in captions.items() if n in figures]
+    return [
+        Picture(image=figures[name], caption=text, read=READ[name])
+        for name, text in captions.items()
+        if name in figures
+    ]
 
 
 def _recording_digest(recording: Recording) -> str:

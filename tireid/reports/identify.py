@@ -5,7 +5,6 @@ from dataclasses import astuple
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from identifier.doctor import Diagnosis
 from identifier.measured import with_doubt
@@ -26,7 +25,7 @@ from tireid import report as page
 from tireid import verdicts
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
 from tireid.identified import Results
-from tireid.reports.common import READ, REPORT, drawing, drawings, origin
+from tireid.reports.common import READ, REPORT, drawings, origin
 
 _EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
 
@@ -34,7 +33,7 @@ _EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth
 def write_identify_report(
     folder: Path,
     found: Results,
-    figures: Mapping[str, Figure],
+    figures: Mapping[str, bytes],
     diagnosis: Diagnosis,
     command: str,
 ) -> None:
@@ -139,11 +138,11 @@ def _evaluated_headlines(evaluated: Mapping[str, Verdict]) -> list[page.Headline
     return numbers
 
 
-def curve_drawing(figures: Mapping[str, Figure], verdict: Verdict) -> page.Picture:
+def curve_drawing(figures: Mapping[str, bytes], verdict: Verdict) -> page.Picture:
     """Return the learnt curve with its band, the first figure of a report."""
     word = "" if verdict.valid else f"{verdict.word[0].upper()}{verdict.word[1:]}. "
     caption = f"{word}Axle force over slip angle: drive, curve and its band."
-    return drawing(figures["slip"], caption, READ["slip"])
+    return page.Picture(image=figures["slip"], caption=caption, read=READ["slip"])
 
 
 def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
@@ -182,7 +181,7 @@ def _extrapolated(model: TireModel, recording: Recording) -> list[str]:
     ]
 
 
-def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, Figure]) -> list[page.Block]:
+def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, bytes]) -> list[page.Block]:
     facts = [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
     blocks: list[page.Block] = [
         page.Paragraph(
@@ -237,7 +236,7 @@ def _evaluated(evaluated: Mapping[str, Verdict]) -> list[page.Block]:
     ]
 
 
-def _errors(found: Results, figures: Mapping[str, Figure]) -> list[page.Block]:
+def _errors(found: Results, figures: Mapping[str, bytes]) -> list[page.Block]:
     learnt, *others = found.runs
     rows, online = list[list[page.Cell]](), learnt.online
     for run in (learnt, *found.parts, *others):
@@ -253,11 +252,11 @@ def _errors(found: Results, figures: Mapping[str, Figure]) -> list[page.Block]:
     if "forces" in figures:
         caption = f"Axle forces over time: {'online, and ' * online}replayed with frozen weights."
         read = READ["forces" if online else "replay"]
-        blocks.append(drawing(figures["forces"], caption, read))
-    for name, figure in figures.items():
+        blocks.append(page.Picture(image=figures["forces"], caption=caption, read=read))
+    for name, image in figures.items():
         if name.startswith("replay_"):
             caption = f"The frozen model on {name.removeprefix('replay_')}."
-            blocks.append(drawing(figure, caption, READ["replay"]))
+            blocks.append(page.Picture(image=image, caption=caption, read=READ["replay"]))
     return blocks
 
 

@@ -143,7 +143,7 @@ def test_slopes_over_faults_and_the_road_are_finite_differences(drive):
     def run(p, port):
         return scan(len(drive.signals), {**inputs, "parameters": p}, ports=(port,))[port]
 
-    slopes = run(p, "residual_slopes")
+    slopes = run(p, "slopes")
     for column, name in enumerate(names):
         step = 1e-5 * np.eye(len(p))[INDEX[name]]
         expected = (run(p + step, "residual") - run(p - step, "residual")) / 2e-5

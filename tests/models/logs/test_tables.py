@@ -303,5 +303,5 @@ def test_no_thread_of_pyarrow_is_left_with_bytes_of_pythons(tmp_path):
     block = path.read_bytes().partition(b"\n")[2]
     before = sys.getrefcount(block)
     for _ in range(200):
-        assert columns_of(block, layout, dict.fromkeys((0, 1), Kind.NUMBER)) is not None
+        assert columns_of(block, 300, layout, dict.fromkeys((0, 1), Kind.NUMBER)) is not None
         assert sys.getrefcount(block) == before
