@@ -47,7 +47,7 @@ class Tracker:
         tolerance: float | None = None,
         max_iterations: int = 40,
         linearizations: int = 1,
-        max_active_sets: int = 6,
+        max_active_sets: int = 10,
         single: bool = False,
         caution: float = 0.0,
         clock: Callable[[], float] = time.perf_counter,
