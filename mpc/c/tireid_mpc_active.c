@@ -3,11 +3,10 @@
  * Rows that are active hold as equations: of the input or of the angle behind it, so that the stage has
  * no choice left and is eliminated; soft ones as the quadratics 1/2 s^2 / regular. The next set is
  * what this solution says: rows that it breaks come in, rows that hold it back from less cost go.
- * Where nothing changes all conditions of optimality hold. Where a set asks for no fewer changes than all
- * before, so that sets may come again and again, the first stages alone change: what is behind them
- * follows (block pivoting, Judice and Pires, Computers & Operations Research 21, 1994; by Hintermueller,
- * Ito and Kunisch, SIAM J. Optim. 13, 2002, all change). Behind the last stage that changed the recursion
- * stays as it is. */
+ * Where nothing changes all conditions of optimality hold (Hintermueller, Ito and Kunisch, SIAM J. Optim.
+ * 13, 2002). Where a set asks for no fewer changes than one before, so that sets may come again and again,
+ * the first stage alone changes, until they are fewer (Judice and Pires, Computers & Operations Research
+ * 21, 1994). Behind the last stage that changed the recursion stays as it is. */
 #include "tireid_mpc_active.h"
 
 #include "tireid_mpc_equations.h"
@@ -18,8 +17,7 @@
 #define ROWS TIREID_MPC_ROWS
 #define RATE 0U              /* place of the rate among the rows of a stage */
 #define ANGLE 1U             /* of the angle; then soft ones */
-#define FEW_PRESSED (N / 5U) /* stages, so few that the limits of the way are those to begin with */
-#define FEW_STAGES 3U        /* that change, where all would not lead to less */
+#define FEW_PRESSED (N / 6U) /* stages, so few that the limits of the way are those to begin with */
 
 #define real tireid_mpc_real
 
@@ -122,21 +120,17 @@ static uint32_t choose(tireid_mpc_work *work, real tolerance)
     return changes;
 }
 
-/* Change the set in the first stages that are to change, at most so many; the last one of them. */
-static uint32_t change(tireid_mpc_work *work, uint32_t most)
+/* Change the set in all stages, or in the first that changes; the last stage that did. */
+static uint32_t change(tireid_mpc_work *work, bool first_only)
 {
-    uint32_t last = 0U;
-    uint32_t changed = 0U;
+    uint32_t last = N;
     uint32_t k;
     uint32_t i;
-    for (k = 0U; (k < N) && (changed < most); k++) {
-        bool moves = false;
+    for (k = 0U; (k < N) && (!first_only || (last == N)); k++) {
         for (i = k * ROWS; i < ((k + 1U) * ROWS); i++) {
-            moves = moves || (work->next[i] != work->active[i]);
+            last = (work->next[i] != work->active[i]) ? k : last;
             work->active[i] = work->next[i];
         }
-        last = moves ? k : last;
-        changed += moves ? 1U : 0U;
     }
     return last;
 }
@@ -171,14 +165,11 @@ tireid_mpc_status tireid_mpc_active_set(
         changes = choose(work, params->tolerance);
         if (changes == 0U) {
             status = TIREID_MPC_OK;
-        } else if (tried < tries) {
-            const uint32_t last = change(work, (changes < fewest) ? N : FEW_STAGES);
-            fewest = (changes < fewest) ? changes : fewest;
-            if (!tireid_mpc_prepare_set(work, params->cost_rate, last)) {
-                status = TIREID_MPC_QP_FAILED;
-            }
+        } else if ((tried < tries)
+            && !tireid_mpc_prepare_set(work, params->cost_rate, change(work, changes >= fewest))) {
+            status = TIREID_MPC_QP_FAILED;
         } else {
-            /* the last one */
+            fewest = (changes < fewest) ? changes : fewest;
         }
     }
     return status;

@@ -15,9 +15,10 @@
 #include "tireid_mpc_riccati.h"
 
 #define N TIREID_MPC_HORIZON
-#define SIDE (N * TIREID_MPC_ROWS) /* rows of all stages */
-#define CLOSE TIREID_MPC_C(0.1)    /* mean product l t from which on the set is looked at */
-#define SETTLED ((2U * N) / 5U)    /* rows that may change yet, so that the set is tried */
+#define SIDE (N * TIREID_MPC_ROWS)     /* rows of all stages */
+#define CLOSE TIREID_MPC_C(0.1)        /* mean product l t from which on the set is looked at */
+#define SETTLED ((2U * N) / 5U)        /* rows that may change yet, so that the set is tried */
+#define SETS_CLOSE 2U                  /* then: mostly its own is right, or far off */
 #define SMALLEST_GAP TIREID_MPC_C(0.1) /* to begin with */
 #define NEAR TIREID_MPC_C(10.0)        /* products l t to begin with */
 #define FAR TIREID_MPC_C(1e4)          /* the same, where the first way was blocked */
@@ -256,7 +257,7 @@ static tireid_mpc_status advance(
     *mu = mean_product(work, TIREID_MPC_C(0.0), TIREID_MPC_C(0.0));
     if ((params->max_active_sets > 0U) && (*mu <= CLOSE) && (find_set(work) <= SETTLED)) {
         if (tireid_mpc_prepare_set(work, params->cost_rate, N - 1U)) {
-            status = tireid_mpc_active_set(work, params, params->max_active_sets / 2U);
+            status = tireid_mpc_active_set(work, params, SETS_CLOSE);
         }
         if (status == TIREID_MPC_ITERATION_LIMIT) {
             let_all_go(work);
