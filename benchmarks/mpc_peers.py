@@ -147,7 +147,7 @@ class Ours:
     """The tracker, one iteration a step."""
 
     def __init__(
-        self, tire: PredictionTire, *, prepared: bool = False, max_active_sets: int = 6
+        self, tire: PredictionTire, *, prepared: bool = False, max_active_sets: int = 16
     ) -> None:
         self.tracker = Tracker(
             tire,

@@ -152,6 +152,8 @@ def main() -> int:
         print(f"{name}: {seconds:.2f} s")
     targets.at_most("steps that failed", last["tireid"].failures, 0, "")
     if not options.quick:
+        slow = float(targets.values["noisy/p99"]) / float(targets.values["noisy/median"])
+        targets.at_most("99 % under noise over the median", slow, 2.0, "-")
         ours, best = (float(targets.values[f"{name}/median"]) for name in ("tireid", "hpipm"))
         targets.at_most("median over that of HPIPM", ours / best, 1.0, "-")
         loss = 100.0 * (last["tireid"].cost / last["ipopt"].cost - 1.0)

@@ -81,7 +81,7 @@ typedef struct {
     tireid_mpc_real tolerance; /* of the solver, in parts: 1e-8, in float 1e-5 */
     uint32_t max_iterations;   /* of the solver */
     uint32_t linearizations;   /* a step, 1 in real time */
-    uint32_t max_active_sets;  /* of limits tried in a row; 0: interior point alone */
+    uint32_t max_active_sets;  /* of limits tried before the interior point; 0: none */
 } tireid_mpc_params;
 
 typedef struct {
@@ -118,7 +118,6 @@ typedef struct {
     uint32_t iterations;                  /* of the last solution */
     uint32_t shifted;  /* 1: the plan is where the next step begins, before that */
     uint32_t prepared; /* 1: work memory is prepared for the next solution */
-    uint32_t switched; /* rows whose limits it reached or left against the plan before */
     uint32_t age;      /* steps since the plan was new */
     uint32_t planned;  /* 0 until there is a plan */
     uint32_t guessed;  /* 1: x and u without a solution */
@@ -171,7 +170,6 @@ typedef struct {
     tireid_mpc_real slope[TIREID_MPC_HORIZON * TIREID_MPC_ROWS];
     int32_t active[TIREID_MPC_HORIZON * TIREID_MPC_ROWS]; /* 1 at its limit, -1 at the other, 0 */
     int32_t next[TIREID_MPC_HORIZON * TIREID_MPC_ROWS];   /* after what is reached */
-    int32_t begun[TIREID_MPC_HORIZON * TIREID_MPC_ROWS];  /* the same, along the plan */
     tireid_mpc_sides gap;
     tireid_mpc_sides multiplier;
     tireid_mpc_sides gap_step;

@@ -2,24 +2,22 @@
  *
  * Rows that are active hold as equations: of the input or of the angle behind it, so that the stage has
  * no choice left and is eliminated; soft ones as the quadratics 1/2 s^2 / regular. The next set is
- * what this solution says: rows that it breaks come in, rows that hold it back from less cost go
- * (Hintermueller, Ito and Kunisch, SIAM J. Optim. 13, 2002). Where nothing changes all conditions of
- * optimality hold. Where a set changes more rows than the one before, so that sets may come again and
- * again, the first stage that changes does so alone from then on (Murty, Math. Programming 7, 1974).
- * Behind the last stage that changed the recursion stays as it is. */
+ * what this solution says: rows that it breaks come in, rows that hold it back from less cost go.
+ * Where nothing changes all conditions of optimality hold (Hintermueller, Ito and Kunisch, SIAM J. Optim.
+ * 13, 2002). Where a set asks for no fewer changes than one before, so that sets may come again and again,
+ * the first stage alone changes, until they are fewer (Judice and Pires, Computers & Operations Research
+ * 21, 1994). Behind the last stage that changed the recursion stays as it is. */
 #include "tireid_mpc_active.h"
 
 #include "tireid_mpc_equations.h"
-#include "tireid_mpc_iteration.h"
+#include "tireid_mpc_numbers.h"
 #include "tireid_mpc_riccati.h"
 
 #define N TIREID_MPC_HORIZON
 #define ROWS TIREID_MPC_ROWS
-#define SIDE (N * ROWS) /* rows of all stages */
-#define RATE 0U         /* place of the rate among the rows of a stage */
-#define ANGLE 1U        /* of the angle; then soft ones */
-
-#define MOST_CHANGES ((3U * N) / 10U) /* by a set, where it is worth to go on */
+#define RATE 0U              /* place of the rate among the rows of a stage */
+#define ANGLE 1U             /* of the angle; then soft ones */
+#define FEW_PRESSED (N / 6U) /* stages, so few that the limits of the way are those to begin with */
 
 #define real tireid_mpc_real
 
@@ -57,13 +55,33 @@ static void apply(tireid_mpc_work *work, uint32_t k)
     }
 }
 
-void tireid_mpc_begin_set(tireid_mpc_work *work, real tolerance, uint32_t stages)
+/* Whether the way is steered as fast as can be in many stages in which the plan is not. */
+static bool is_thrown(const tireid_mpc_work *work, real most, const real *plan, uint32_t stages)
 {
-    const real limit = TIREID_MPC_C(1.0) - tolerance;
-    uint32_t p;
-    for (p = 0U; p < (stages * ROWS); p++) {
-        work->begun[p] = side_of(work->value[p], limit);
-        work->active[p] = work->begun[p];
+    uint32_t pressed = 0U;
+    uint32_t k;
+    for (k = 0U; k < stages; k++) {
+        const bool here = !tireid_mpc_within(work->u[k], most);
+        pressed += (here && tireid_mpc_within(plan[k], most)) ? 1U : 0U;
+    }
+    return pressed > FEW_PRESSED;
+}
+
+void tireid_mpc_begin_set(
+    tireid_mpc_work *work, const tireid_mpc_params *params, const real *plan, uint32_t stages)
+{
+    const real limit = TIREID_MPC_C(1.0) - params->tolerance;
+    const bool thrown = is_thrown(work, params->max_rate * limit, plan, stages);
+    uint32_t k;
+    uint32_t i;
+    for (k = 0U; k < stages; k++) {
+        const uint32_t p = k * ROWS;
+        for (i = 0U; i < ROWS; i++) {
+            work->active[p + i] = thrown ? 0 : side_of(work->value[p + i], limit);
+        }
+        if (thrown) {
+            work->active[p + RATE] = side_of(plan[k] * work->scale[p + RATE], limit);
+        }
     }
 }
 
@@ -83,30 +101,38 @@ static void choose_held(tireid_mpc_work *work, uint32_t k, real tolerance)
     }
 }
 
-/* The next set, from what this one leads to, of all stages or of the first that changes alone; the count
- * of rows that are to change, and the last stage that does. */
-static uint32_t choose(tireid_mpc_work *work, real tolerance, bool first_only, uint32_t *last)
+/* Count of the rows that the solution of this set says to change; `next` is the set behind that. */
+static uint32_t choose(tireid_mpc_work *work, real tolerance)
 {
     const real limit[2] = { TIREID_MPC_C(1.0) + tolerance, TIREID_MPC_C(1.0) - tolerance };
     uint32_t changes = 0U;
     uint32_t k;
-    uint32_t i;
-    for (i = 0U; i < SIDE; i++) {
-        work->next[i] = side_of(work->reached[i], (work->active[i] == 0) ? limit[0] : limit[1]);
+    uint32_t p;
+    for (p = 0U; p < (N * ROWS); p++) {
+        work->next[p] = side_of(work->reached[p], (work->active[p] == 0) ? limit[0] : limit[1]);
     }
     for (k = 0U; k < N; k++) {
-        const uint32_t p = k * ROWS;
-        const bool moves = !first_only || (changes == 0U);
-        uint32_t differ = 0U;
         choose_held(work, k, tolerance);
-        for (i = 0U; i < ROWS; i++) {
-            differ += (work->next[p + i] != work->active[p + i]) ? 1U : 0U;
-            work->active[p + i] = moves ? work->next[p + i] : work->active[p + i];
-        }
-        *last = (moves && (differ > 0U)) ? k : *last;
-        changes += differ;
+    }
+    for (p = 0U; p < (N * ROWS); p++) {
+        changes += (work->next[p] != work->active[p]) ? 1U : 0U;
     }
     return changes;
+}
+
+/* Change the set in all stages, or in the first that changes; the last stage that did. */
+static uint32_t change(tireid_mpc_work *work, bool first_only)
+{
+    uint32_t last = N;
+    uint32_t k;
+    uint32_t i;
+    for (k = 0U; (k < N) && (!first_only || (last == N)); k++) {
+        for (i = k * ROWS; i < ((k + 1U) * ROWS); i++) {
+            last = (work->next[i] != work->active[i]) ? k : last;
+            work->active[i] = work->next[i];
+        }
+    }
+    return last;
 }
 
 bool tireid_mpc_prepare_set(tireid_mpc_work *work, real R, uint32_t last)
@@ -123,30 +149,27 @@ bool tireid_mpc_prepare_set(tireid_mpc_work *work, real R, uint32_t last)
     return convex;
 }
 
-tireid_mpc_status tireid_mpc_active_set(tireid_mpc_work *work, const tireid_mpc_params *params)
+tireid_mpc_status tireid_mpc_active_set(
+    tireid_mpc_work *work, const tireid_mpc_params *params, uint32_t most)
 {
     tireid_mpc_status status = TIREID_MPC_ITERATION_LIMIT;
     const uint32_t left = params->max_iterations - work->iterations;
-    const uint32_t tries = (left < params->max_active_sets) ? left : params->max_active_sets;
-    bool first_only = false;
-    uint32_t most = MOST_CHANGES;
+    const uint32_t tries = (left < most) ? left : most;
+    uint32_t fewest = UINT32_MAX;
     uint32_t tried = 0U;
     while ((status == TIREID_MPC_ITERATION_LIMIT) && (tried < tries)) {
-        uint32_t last = 0U;
         uint32_t changes;
         work->iterations++;
         tried++;
         tireid_mpc_forward(work);
-        changes = choose(work, params->tolerance, first_only, &last);
+        changes = choose(work, params->tolerance);
         if (changes == 0U) {
             status = TIREID_MPC_OK;
-        } else if (changes > MOST_CHANGES) {
-            tried = tries;
-        } else if ((tried < tries) && !tireid_mpc_prepare_set(work, params->cost_rate, last)) {
+        } else if ((tried < tries)
+            && !tireid_mpc_prepare_set(work, params->cost_rate, change(work, changes >= fewest))) {
             status = TIREID_MPC_QP_FAILED;
         } else {
-            first_only = first_only || (changes > most);
-            most = changes;
+            fewest = (changes < fewest) ? changes : fewest;
         }
     }
     return status;

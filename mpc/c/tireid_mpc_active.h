@@ -8,16 +8,19 @@
 extern "C" {
 #endif
 
-/* Begin with the rows that are at their limits, or beyond, along the plan, in the first stages. */
-void tireid_mpc_begin_set(tireid_mpc_work *work, tireid_mpc_real tolerance, uint32_t stages);
+/* Begin with the rows that are at their limits, or beyond, along the way in the first stages; of a car
+ * that is thrown about, with the rates that are at theirs in the plan. */
+void tireid_mpc_begin_set(tireid_mpc_work *work, const tireid_mpc_params *params,
+    const tireid_mpc_real *plan, uint32_t stages);
 
 /* Take the set in `active` of the stages up to `last` into the program, and go backward. Behind them
  * all must be as it was. False where not convex. */
 bool tireid_mpc_prepare_set(tireid_mpc_work *work, tireid_mpc_real R, uint32_t last);
 
-/* Solve what `tireid_mpc_qp` states, beginning with the set that is prepared. OK: solved to rounding;
- * ITERATION_LIMIT: it is not, and needs another method. */
-tireid_mpc_status tireid_mpc_active_set(tireid_mpc_work *work, const tireid_mpc_params *params);
+/* Solve what `tireid_mpc_qp` states by at most so many sets, of which the first is prepared. OK: solved to
+ * rounding; ITERATION_LIMIT: it is not, and needs another method. */
+tireid_mpc_status tireid_mpc_active_set(
+    tireid_mpc_work *work, const tireid_mpc_params *params, uint32_t most);
 
 #ifdef __cplusplus
 }

@@ -12,7 +12,6 @@
 #define NX TIREID_MPC_STATES
 #define STEERING 4U                    /* place of the angle among the states */
 #define FRESH ((N + 2U) / 3U)          /* stages linearized anew where the others are prepared */
-#define FEW_PRESSED (N / 2U)           /* stages, so few that the plan's limits are believed */
 #define NEARLY_TURN TIREID_MPC_C(0.1)  /* lateral acceleration of a road [m/s^2] that is the same */
 #define NEARLY_SPEED TIREID_MPC_C(0.1) /* [m/s] */
 
@@ -35,7 +34,6 @@ void tireid_mpc_clear(tireid_mpc_state *state)
     }
     state->guessed = 1U;
     state->prepared = 0U;
-    state->switched = UINT32_MAX; /* no set to begin with */
 }
 
 bool tireid_mpc_on_map(const tireid_mpc_params *params, const real *x)
@@ -95,7 +93,6 @@ void tireid_mpc_guess(tireid_mpc_state *state, const tireid_mpc_params *params, 
     }
     state->guessed = 1U;
     state->prepared = 0U;
-    state->switched = UINT32_MAX;
     if (!finite || !tireid_mpc_carriable(state->u, N)) {
         tireid_mpc_clear(state);
     }
@@ -246,20 +243,6 @@ static void take(
     }
 }
 
-/* Whether the way from x0 is steered as fast as can be in many stages in which the plan is not. */
-static bool is_thrown(const tireid_mpc_state *state, const tireid_mpc_params *params,
-    const tireid_mpc_work *work, uint32_t stages)
-{
-    const real most = params->max_rate * (TIREID_MPC_C(1.0) - params->tolerance);
-    uint32_t pressed = 0U;
-    uint32_t k;
-    for (k = 0U; k < stages; k++) {
-        const bool here = !tireid_mpc_within(work->u[k], most);
-        pressed += (here && tireid_mpc_within(state->u[k], most)) ? 1U : 0U;
-    }
-    return pressed > FEW_PRESSED;
-}
-
 /* All of a solution that does not ask for more than x0, of the first stages. */
 static void prepare_stages(const tireid_mpc_state *state, const tireid_mpc_params *params,
     tireid_mpc_work *work, const real *x0, const real *kappa, const real *v_x, uint32_t stages)
@@ -274,8 +257,7 @@ static void prepare_stages(const tireid_mpc_state *state, const tireid_mpc_param
         tireid_mpc_tighten(state, params, work);
     }
     measure_rows(state, params, work, stages);
-    tireid_mpc_prepare_qp(work, params,
-        is_thrown(state, params, work, stages) ? UINT32_MAX : state->switched, stages);
+    tireid_mpc_prepare_qp(work, params, state->u, stages);
 }
 
 void tireid_mpc_prepare_from(tireid_mpc_state *state, const tireid_mpc_params *params,
@@ -312,7 +294,7 @@ tireid_mpc_status tireid_mpc_solve(tireid_mpc_state *state, const tireid_mpc_par
         for (i = 0U; i < NX; i++) {
             work->dx[0][i] = TIREID_MPC_C(0.0);
         }
-        status = tireid_mpc_qp(work, params, &state->switched);
+        status = tireid_mpc_qp(work, params);
         state->iterations = work->iterations;
         if ((status != TIREID_MPC_QP_FAILED) && !is_plan(work)) {
             status = TIREID_MPC_QP_FAILED;

@@ -5,10 +5,8 @@
  * whole, and they are the answer once all l t are small. Predictor and corrector, after Mehrotra,
  * share one factorization.
  *
- * Before it, and once it comes close, the set of active rows alone is tried, which takes half an
- * iteration where it is right. At first only where the solution before left few rows otherwise than
- * it found them, and the way from here presses few that the plan does not: a car that is thrown about pays for no set
- * that is not. Where no sets are wanted, nothing is factorized for one. */
+ * Before it, and once it comes close, sets of active rows alone are tried, each at most a third of an
+ * iteration. Where no sets are wanted, nothing is factorized for one. */
 #include "tireid_mpc_qp.h"
 
 #include "tireid_mpc_active.h"
@@ -17,10 +15,10 @@
 #include "tireid_mpc_riccati.h"
 
 #define N TIREID_MPC_HORIZON
-#define SIDE (N * TIREID_MPC_ROWS) /* rows of all stages */
-#define FEW_SWITCHED (N / 5U)      /* rows, of the solution before: so few that sets are tried */
-#define CLOSE TIREID_MPC_C(0.1)    /* mean product l t from which on the set is looked at */
-#define SETTLED ((2U * N) / 5U)    /* rows that may change yet, so that the set is tried */
+#define SIDE (N * TIREID_MPC_ROWS)     /* rows of all stages */
+#define CLOSE TIREID_MPC_C(0.1)        /* mean product l t from which on the set is looked at */
+#define SETTLED ((2U * N) / 5U)        /* rows that may change yet, so that the set is tried */
+#define SETS_CLOSE 2U                  /* then: mostly its own is right, or far off */
 #define SMALLEST_GAP TIREID_MPC_C(0.1) /* to begin with */
 #define NEAR TIREID_MPC_C(10.0)        /* products l t to begin with */
 #define FAR TIREID_MPC_C(1e4)          /* the same, where the first way was blocked */
@@ -259,7 +257,7 @@ static tireid_mpc_status advance(
     *mu = mean_product(work, TIREID_MPC_C(0.0), TIREID_MPC_C(0.0));
     if ((params->max_active_sets > 0U) && (*mu <= CLOSE) && (find_set(work) <= SETTLED)) {
         if (tireid_mpc_prepare_set(work, params->cost_rate, N - 1U)) {
-            status = tireid_mpc_active_set(work, params);
+            status = tireid_mpc_active_set(work, params, SETS_CLOSE);
         }
         if (status == TIREID_MPC_ITERATION_LIMIT) {
             let_all_go(work);
@@ -297,30 +295,23 @@ static tireid_mpc_status interior_point(tireid_mpc_work *work, const tireid_mpc_
 }
 
 void tireid_mpc_prepare_qp(
-    tireid_mpc_work *work, const tireid_mpc_params *params, uint32_t switched, uint32_t stages)
+    tireid_mpc_work *work, const tireid_mpc_params *params, const real *plan, uint32_t stages)
 {
-    tireid_mpc_begin_set(work, params->tolerance, stages);
-    work->ready = (params->max_active_sets > 0U) && (switched <= FEW_SWITCHED)
-        && ((stages == N) || work->ready)
+    tireid_mpc_begin_set(work, params, plan, stages);
+    work->ready = (params->max_active_sets > 0U) && ((stages == N) || work->ready)
         && tireid_mpc_prepare_set(work, params->cost_rate, stages - 1U);
 }
 
-tireid_mpc_status tireid_mpc_qp(
-    tireid_mpc_work *work, const tireid_mpc_params *params, uint32_t *switched)
+tireid_mpc_status tireid_mpc_qp(tireid_mpc_work *work, const tireid_mpc_params *params)
 {
     tireid_mpc_status status = TIREID_MPC_ITERATION_LIMIT;
-    uint32_t p;
     work->iterations = 0U;
     if (work->ready) {
-        status = tireid_mpc_active_set(work, params);
+        status = tireid_mpc_active_set(work, params, params->max_active_sets);
     }
     if (status == TIREID_MPC_ITERATION_LIMIT) {
         let_all_go(work);
         status = interior_point(work, params);
-    }
-    *switched = 0U;
-    for (p = 0U; p < SIDE; p++) {
-        *switched += (work->active[p] != work->begun[p]) ? 1U : 0U;
     }
     return status;
 }

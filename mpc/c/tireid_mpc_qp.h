@@ -13,16 +13,12 @@ extern "C" {
  * steering angle hard; deviation and slip angles soft, at the cost 1/2 s^2 / regular of breaking
  * one by s. Everything is the difference from the plan that was linearized at.
  *
- * `switched` is how many rows the solution before made active or not against the plan that it began
- * with, and becomes that of this one: where they were many, the next are too.
- *
  * Return what became of it, with du, dx and the count of iterations in `work`. */
-tireid_mpc_status tireid_mpc_qp(
-    tireid_mpc_work *work, const tireid_mpc_params *params, uint32_t *switched);
+tireid_mpc_status tireid_mpc_qp(tireid_mpc_work *work, const tireid_mpc_params *params);
 
-/* What comes before the first set is tried, anew of the first stages alone. */
-void tireid_mpc_prepare_qp(
-    tireid_mpc_work *work, const tireid_mpc_params *params, uint32_t switched, uint32_t stages);
+/* What comes before the first set is tried, anew of the first stages alone.   plan: its inputs. */
+void tireid_mpc_prepare_qp(tireid_mpc_work *work, const tireid_mpc_params *params,
+    const tireid_mpc_real *plan, uint32_t stages);
 
 #ifdef __cplusplus
 }

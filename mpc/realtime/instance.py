@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from codegen import load_library
 from codegen.arrays import Array
-from codegen.compiler import keep, kept
+from codegen.compiler import keep, kept, wide_vectors
 from codegen.errors import TireidError
 from mpc.prediction import state_size
 from mpc.problem import Guards, Problem
@@ -168,7 +168,8 @@ class Instance:
     """State, parameters, input and work memory, which the C reads and writes in place."""
 
     def __init__(self, structure: TireStructure, horizon: int, *, single: bool) -> None:
-        library = load_library(tracker_source(structure, horizon, single=single), "tracker", FLAGS)
+        source = tracker_source(structure, horizon, single=single)
+        library = load_library(source, "tracker", (*FLAGS, *wide_vectors()))
         if library is None:
             raise NoCompilerError("no C compiler found: the tracker cannot be built")
         self._library: Any = library

@@ -29,8 +29,8 @@ class Tracker:
     tolerance : of the solver, in parts: mean product of gap and multiplier against the largest
         multiplier, where gaps count limits as 1; None takes 1e-8, in float 1e-5.
     linearizations : a step; 1 in real time, some 10 to convergence.
-    max_active_sets : sets of active limits that are tried in a row, each at half an iteration of
-        the interior point, before it and once it comes close; 0 takes that alone.
+    max_active_sets : sets of active limits that are tried before the interior point, each at most a
+        third of its iteration; 0 takes that alone.
     caution : share of what is not known of the tires that is feared, from 0 to 1: see
         `mpc.realtime.caution`.
     clock : of the solve times [s].
@@ -45,9 +45,9 @@ class Tracker:
         delay: float = 0.0,
         guards: Guards | None = None,
         tolerance: float | None = None,
-        max_iterations: int = 40,
+        max_iterations: int = 50,
         linearizations: int = 1,
-        max_active_sets: int = 6,
+        max_active_sets: int = 16,
         single: bool = False,
         caution: float = 0.0,
         clock: Callable[[], float] = time.perf_counter,

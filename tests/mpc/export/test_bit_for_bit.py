@@ -5,6 +5,7 @@ from functools import cache
 
 import pytest
 
+from codegen.compiler import wide_vectors
 from codegen.processor import Cost, missing_tools, replay, with_figures
 from mpc.export.processor import PROCESSOR, mpc_figures_text, time_here, vectors_program
 
@@ -29,6 +30,12 @@ def test_clang_computes_the_bits_of_gcc(law, single, here, packages):
         pytest.skip("needs clang")
     found = run(packages[law], "clang", single=single)
     assert found.hash == here(law, single).hash
+
+
+@pytest.mark.heavy
+def test_wide_vectors_compute_the_same_bits(here, packages):
+    words = ["-std=c99", "-O3", "-ffp-contract=off", *wide_vectors()]
+    assert run(packages["axle"], "gcc", single=False, flags=words).hash == here("axle", False).hash
 
 
 @pytest.mark.heavy
