@@ -306,8 +306,12 @@ def estimate(
     problem = Problem(drives, vehicle, priors, labels)
     if begin is None:
         coarse = problem.thinned()
-        found = [descend(coarse, one, enough=_COARSELY) for one in starts(problem)]
-        begin = min(found, key=lambda one: one.cost).p
+        each = enough if coarse is problem else _COARSELY
+        tried = [descend(coarse, one, enough=each) for one in starts(problem)]
+        best = min(tried, key=lambda one: one.cost)
+        if coarse is problem:
+            return best
+        begin = best.p
     begin = np.concatenate([begin[: len(NAMES)], np.zeros(problem.roads)])
     return descend(problem, begin, enough=enough)
 
