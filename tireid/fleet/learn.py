@@ -318,7 +318,11 @@ def learn_fleet(
     there = {row.file for row in index}
     failed = {row.file for row in index if row.error and again}
     names = {row.file: row.log for row in index if row.file not in failed}
-    stamps = {(row.setting, row.log, row.stamp): row.file for row in index if row.file in names}
+    stamps = {
+        (row.setting, row.log, row.stamp): row.file
+        for row in sorted(index, key=lambda row: not row.error)
+        if row.file in names
+    }
     holds: dict[str, str] = {}  # files of rows, by the names of these logs
     left = []
     for task in tasks:
@@ -334,9 +338,9 @@ def learn_fleet(
             store.write(rows)
             names[file] = task.log
             learnt.add(file)
-            unread = work.row(task).file
-            if unread in there and unread != file:
-                store.drop(unread)
+        unread = work.row(task).file
+        if unread in there and unread != file:
+            store.drop(unread)
         holds[task.log] = file
         done(len(holds))
     return len(learnt), set(holds.values())
