@@ -12,7 +12,6 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.day import ENOUGH as ENOUGH_DRIVEN
-from identifier.estimate.day import days_of
 from identifier.estimate.drive import FASTEST, Drive, hardest
 from identifier.estimate.information import CHANGES, Information
 from identifier.estimate.latent import Learnt, lateness, latent_priors, learn_latent
@@ -157,7 +156,7 @@ def fit(
             return loose
     if days == "found" and sum(len(_alone(one)) for one in measured) > 1:
         apart = len({one.dt for one in measured}) == 1
-        apart = apart and len(days_of(joined(measured), vehicle, model.p, model.covariance)) > 1
+        apart = apart and len(model.days(joined(measured))) > 1
         share = 0.0 if apart else _missed(measured, model)
         if apart or share > _NOTHING_FITS:  # then tires tell no zeros apart
             each = fit(recordings, vehicle, priors, block=block, coarse=coarse, days="each")

@@ -26,10 +26,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from codegen.compiler import CompilationError
 from identifier.compare.work import Map, fresh_processes
+from identifier.day import ENOUGH, INSTALLED, NUMBERS, WHERE, Day, usual_errors
+from identifier.estimate.drive import SLOW
 from identifier.estimate.fit import fit
 from identifier.estimate.information import Information
+from identifier.estimate.model import FittedModel
 from identifier.estimate.poor import on_time
 from identifier.estimate.priors import Priors
 from identifier.frozen import vehicle_numbers
@@ -266,7 +271,7 @@ def learn_recording(row: LogRow, recording: Recording, vehicle: Vehicle) -> LogR
     recording = on_time(recording, vehicle)
     measured = replace(recording, estimated=())  # an estimated v_y is fitted as one of a sensor
     model, _, parts = fit([measured], vehicle, coarse=True)
-    verdict = judge_identification(model, recording)
+    verdict = judge_identification(_own_day(model, recording), recording)
     reach = (*model.reach[:3], model.reach.unexplained)
     return replace(
         row,
@@ -279,6 +284,20 @@ def learn_recording(row: LogRow, recording: Recording, vehicle: Vehicle) -> LogR
         reach=[float(value) for one in reach for value in one],
         **information_columns(sum((one for _, one in parts), Information.nothing())),
     )
+
+
+def _own_day(model: FittedModel, recording: Recording) -> FittedModel:
+    """Return a model with the errors of the sensors that it found in the log that taught it.
+
+    Where that may have several days, or shows no v_y, the verdict finds them anew.
+    """
+    if recording.breaks or recording.logged_v_y is None:
+        return model
+    car, found, v_x = model.vehicle, model.p[WHERE], recording.v_x
+    driven = v_x[v_x > SLOW * car.froude_speed]
+    expected = np.where([name in INSTALLED for name in NUMBERS], found, 0.0)
+    P, anew = model.covariance[np.ix_(WHERE, WHERE)], driven.size * recording.dt >= ENOUGH
+    return model.of_day(Day.of(found, P, (expected, usual_errors(car)), driven, anew=anew))
 
 
 @contextmanager
