@@ -12,7 +12,6 @@ computes the hash. A file whose name, size and time are those of a row is not re
 
 import hashlib
 import json
-import os
 import posixpath
 import re
 import tempfile
@@ -409,9 +408,7 @@ _WORK: list[LearnLog] = []  # of a process: given once, as it holds what the sto
 
 
 def _prepare_process(work: LearnLog) -> None:
-    """Keep a process to one thread; import pyarrow, which reads many short logs sooner."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ARROW_IO_THREADS"):
-        os.environ.setdefault(name, "1")
+    """Import pyarrow, which reads many short logs sooner."""
     arrow.is_installed()
     _WORK[:] = [work]
 
