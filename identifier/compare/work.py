@@ -29,7 +29,8 @@ def fresh_processes(workers: int, prepare: Callable[[], None] | None = None) -> 
     added = dict.fromkeys(set(_THREADS) - set(os.environ), "1")
     os.environ.update(added)  # which is read where a process loads NumPy
     try:
-        pool.submit(int)  # begins all
+        for _ in range(workers):
+            pool.submit(int)  # begins a process
     finally:
         for name in added:
             del os.environ[name]
