@@ -44,7 +44,7 @@ from identifier.verdict import judge_identification
 from models.logs import arrow
 from models.recordings import LogMap, Recording, RecordingError, read_repaired, runs
 from models.vehicle import Vehicle
-from tireid.fleet.store import INDEX, VERSION, LogRow, Store, information_columns, needed, protocols
+from tireid.fleet.store import INDEX, VERSION, LogRow, Store, information_columns, needed
 
 DT = 0.01  # [s] to which logs are brought
 _DATE = r"\d{4}-\d{2}-\d{2}(?:[T ][\d.:-]+(?:Z|[+-]\d{2}:?\d{2})?)?"
@@ -113,6 +113,7 @@ def find_logs(
         raise ValueError(f"--vehicle {vehicle}: {{{unknown[0]}}} is no tag of --tags")
     found: dict[str, Task] = {}
     left: dict[str, str] = {}
+    local = needed("fsspec.implementations.local").LocalFileSystem
     for pattern in patterns:
         fs, path = needed("fsspec.core").url_to_fs(pattern)
         try:
@@ -123,7 +124,7 @@ def find_logs(
         if not files:
             raise ValueError(f"{pattern}: names no log")
         for name, info in files.items():
-            log = name if "file" in protocols(fs) else str(fs.unstrip_protocol(name))
+            log = name if isinstance(fs, local) else str(fs.unstrip_protocol(name))
             said = shape.search(posixpath.normpath(log)) if shape is not None else None
             if shape is not None and said is None:
                 left[log] = f"its path is not like {tags}"

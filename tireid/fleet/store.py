@@ -251,10 +251,6 @@ class Store:
             fs.rm_file(posixpath.join(folder, file))
 
 
-def protocols(fs: Any) -> set[str]:
-    return {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)
-
-
 def schema() -> Any:
     pyarrow = needed("pyarrow")
     kinds: dict[Any, Any] = {
