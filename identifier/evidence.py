@@ -87,12 +87,14 @@ class Evidence:
     """Measured and modelled mean forces over the windows of a drive.
     measured, modelled : [static axle loads], (m, 2).
     noise : variance of white sensor noise in `measured` (2,).
+    predicted : the model's axle forces at each sample of the drive [N], (n, 2).
     """
 
     windows: Windows
     measured: Array
     modelled: Array
     noise: Array
+    predicted: Array
 
     @property
     def force(self) -> Array:
@@ -173,11 +175,13 @@ def evidence(model: TireModel, recording: Recording, road: Array | None = None) 
     windows = brisk_windows(recording, brisk_from(model))
     if len(windows) < FEWEST:
         return None
+    predicted = model.predict(recording)
     return Evidence(
         windows=windows,
         measured=measured_force(recording, vehicle, windows, road),
-        modelled=modelled_force(model, recording, windows),
+        modelled=windows.mean(predicted / np.array(vehicle.axle_loads)),
         noise=noise_variance(recording, vehicle, windows),
+        predicted=predicted,
     )
 
 

@@ -8,10 +8,13 @@ import pytest
 SEDAN = "import tireid as ti; print(ti.sedan().name)"
 # The other process unpickles a car before it has imported anything of tireid.
 SPAWNED = """
-import dataclasses
+import dataclasses, os
 import tireid as ti
 from identifier.compare.work import fresh_processes
+os.environ.pop("OPENBLAS_NUM_THREADS", None)
 with fresh_processes(2) as pool:
+    assert pool.submit(os.getenv, "OPENBLAS_NUM_THREADS").result() == "1"  # a thread a process
+    assert "OPENBLAS_NUM_THREADS" not in os.environ
     print(*(found["name"] for found in pool.map(dataclasses.asdict, [ti.sedan()])))
 """
 

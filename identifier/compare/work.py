@@ -17,16 +17,27 @@ Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 
 
 def fresh_processes(workers: int, prepare: Callable[[], None] | None = None) -> ProcessPoolExecutor:
-    """Return a pool of new processes that end with this one, however it ends.
+    """Return a pool of new processes, each of one thread, that end with this one, however it ends.
     prepare : what each does first; a function of a module.
     """
-    return ProcessPoolExecutor(
+    pool = ProcessPoolExecutor(
         workers,
         mp_context=multiprocessing.get_context("spawn"),
         initializer=exec,
         initargs=(BEGIN, {"prepare": prepare}),
     )
+    added = dict.fromkeys(set(_THREADS) - set(os.environ), "1")
+    os.environ.update(added)  # which is read where a process loads NumPy
+    try:
+        for _ in range(workers):
+            pool.submit(int)  # begins a process
+    finally:
+        for name in added:
+            del os.environ[name]
+    return pool
 
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "ARROW_IO_THREADS")
 
 # A new process knows no module yet: tireid is its first, which finds its own packages.
 BEGIN = """import tireid

@@ -196,7 +196,7 @@ class FittedModel(TireModel):
         days = self.days(recording)
         if part is not None:
             days = tuple((part.place(first), day) for first, day in days)
-        return replace(self, held=days)
+        return self if days == self.held else replace(self, held=days)
 
     def estimated_v_y(self, recording: Recording) -> LateralVelocity:
         """Return the v_y of a drive whose sensors show none, smoothed on these tires.

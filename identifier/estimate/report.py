@@ -1,6 +1,7 @@
 """What a fit tells of itself: rows of a report, notes on its drives, and its file."""
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -66,6 +67,7 @@ def estimates(model: Any) -> tuple[Estimate, ...]:
     )
 
 
+@lru_cache(maxsize=4)  # a verdict asks for it many times
 def stiffness_doubt(model: Any) -> tuple[list[Array], Array, Array]:
     """Return how unsure the stiffnesses of a `FittedModel` are [static loads/rad].
 

@@ -376,9 +376,8 @@ def _verdict(evaluated: _Evaluated, listed: list[Objection], whole: Recording) -
         listed.append(Objection("portion", None, text.format(*minutes), False))
     listed.sort(key=lambda finding: (not finding.refuses, not finding.silent))
     judged = drive_judges(listed)
-    motion = motion_error(
-        model.predict(recording), recording, model.vehicle, recording.v_x >= model.min_speed
-    )
+    counted = recording.v_x >= model.min_speed
+    motion = motion_error(found.predicted, recording, model.vehicle, counted)
     lateral, yaw = (None, None) if motion is None else motion.explained
     measures: dict[str, tuple[float, ...] | float | None] = {
         "force_missed": tuple(map(float, found.model_error)),

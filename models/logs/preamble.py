@@ -242,6 +242,8 @@ def _way(tail: list[str]) -> _Way | None:
             share = right / max(len(cells), 1) * often / len(rows)
             if share > 0.0 and (best is None or share > best.share + 1e-9):
                 best = _Way(delimiter, decimal, thousands, width, share)
+                if share >= 1.0:  # none is better
+                    return best
     return best if best is not None and best.share > 0.2 else None
 
 

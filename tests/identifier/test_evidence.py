@@ -92,7 +92,9 @@ def test_noise_leaves_the_variance_that_is_told(rng):
 def of(measured, modelled, noise=(0.0, 0.0)):
     starts = 15 * np.arange(len(measured))
     windows = Windows(starts=starts, n=30, duration=0.3)
-    return Evidence(windows=windows, measured=measured, modelled=modelled, noise=np.array(noise))
+    return Evidence(
+        windows=windows, measured=measured, modelled=modelled, noise=np.array(noise), predicted=None
+    )
 
 
 def test_what_is_missed_is_a_share_of_the_force_with_the_noise_taken_off():

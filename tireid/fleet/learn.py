@@ -12,7 +12,6 @@ computes the hash. A file whose name, size and time are those of a row is not re
 
 import hashlib
 import json
-import os
 import posixpath
 import re
 import tempfile
@@ -26,10 +25,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from codegen.compiler import CompilationError
 from identifier.compare.work import Map, fresh_processes
+from identifier.day import ENOUGH, INSTALLED, NUMBERS, WHERE, Day, usual_errors
+from identifier.estimate.drive import SLOW
 from identifier.estimate.fit import fit
 from identifier.estimate.information import Information
+from identifier.estimate.model import FittedModel
 from identifier.estimate.poor import on_time
 from identifier.estimate.priors import Priors
 from identifier.frozen import vehicle_numbers
@@ -40,7 +44,7 @@ from identifier.verdict import judge_identification
 from models.logs import arrow
 from models.recordings import LogMap, Recording, RecordingError, read_repaired, runs
 from models.vehicle import Vehicle
-from tireid.fleet.store import INDEX, VERSION, LogRow, Store, information_columns, needed, protocols
+from tireid.fleet.store import INDEX, VERSION, LogRow, Store, information_columns, needed
 
 DT = 0.01  # [s] to which logs are brought
 _DATE = r"\d{4}-\d{2}-\d{2}(?:[T ][\d.:-]+(?:Z|[+-]\d{2}:?\d{2})?)?"
@@ -109,6 +113,7 @@ def find_logs(
         raise ValueError(f"--vehicle {vehicle}: {{{unknown[0]}}} is no tag of --tags")
     found: dict[str, Task] = {}
     left: dict[str, str] = {}
+    local = needed("fsspec.implementations.local").LocalFileSystem
     for pattern in patterns:
         fs, path = needed("fsspec.core").url_to_fs(pattern)
         try:
@@ -119,7 +124,7 @@ def find_logs(
         if not files:
             raise ValueError(f"{pattern}: names no log")
         for name, info in files.items():
-            log = name if "file" in protocols(fs) else str(fs.unstrip_protocol(name))
+            log = name if isinstance(fs, local) else str(fs.unstrip_protocol(name))
             said = shape.search(posixpath.normpath(log)) if shape is not None else None
             if shape is not None and said is None:
                 left[log] = f"its path is not like {tags}"
@@ -266,7 +271,7 @@ def learn_recording(row: LogRow, recording: Recording, vehicle: Vehicle) -> LogR
     recording = on_time(recording, vehicle)
     measured = replace(recording, estimated=())  # an estimated v_y is fitted as one of a sensor
     model, _, parts = fit([measured], vehicle, coarse=True)
-    verdict = judge_identification(model, recording)
+    verdict = judge_identification(_own_day(model, recording), recording)
     reach = (*model.reach[:3], model.reach.unexplained)
     return replace(
         row,
@@ -279,6 +284,20 @@ def learn_recording(row: LogRow, recording: Recording, vehicle: Vehicle) -> LogR
         reach=[float(value) for one in reach for value in one],
         **information_columns(sum((one for _, one in parts), Information.nothing())),
     )
+
+
+def _own_day(model: FittedModel, recording: Recording) -> FittedModel:
+    """Return a model with the errors of the sensors that it found in the log that taught it.
+
+    Where that may have several days, or shows no v_y, the verdict finds them anew.
+    """
+    if recording.breaks or recording.logged_v_y is None:
+        return model
+    car, found, v_x = model.vehicle, model.p[WHERE], recording.v_x
+    driven = v_x[v_x > SLOW * car.froude_speed]
+    expected = np.where([name in INSTALLED for name in NUMBERS], found, 0.0)
+    P, anew = model.covariance[np.ix_(WHERE, WHERE)], driven.size * recording.dt >= ENOUGH
+    return model.of_day(Day.of(found, P, (expected, usual_errors(car)), driven, anew=anew))
 
 
 @contextmanager
@@ -318,7 +337,11 @@ def learn_fleet(
     there = {row.file for row in index}
     failed = {row.file for row in index if row.error and again}
     names = {row.file: row.log for row in index if row.file not in failed}
-    stamps = {(row.setting, row.log, row.stamp): row.file for row in index if row.file in names}
+    stamps = {
+        (row.setting, row.log, row.stamp): row.file
+        for row in sorted(index, key=lambda row: not row.error)
+        if row.file in names
+    }
     holds: dict[str, str] = {}  # files of rows, by the names of these logs
     left = []
     for task in tasks:
@@ -334,9 +357,9 @@ def learn_fleet(
             store.write(rows)
             names[file] = task.log
             learnt.add(file)
-            unread = work.row(task).file
-            if unread in there and unread != file:
-                store.drop(unread)
+        unread = work.row(task).file
+        if unread in there and unread != file:
+            store.drop(unread)
         holds[task.log] = file
         done(len(holds))
     return len(learnt), set(holds.values())
@@ -386,9 +409,7 @@ _WORK: list[LearnLog] = []  # of a process: given once, as it holds what the sto
 
 
 def _prepare_process(work: LearnLog) -> None:
-    """Keep a process to one thread; import pyarrow, which reads many short logs sooner."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ARROW_IO_THREADS"):
-        os.environ.setdefault(name, "1")
+    """Import pyarrow, which reads many short logs sooner."""
     arrow.is_installed()
     _WORK[:] = [work]
 

@@ -3,15 +3,17 @@
     STORE/<setting>/<content>.parquet   a row, or one for each run of the log
 
 The setting is a hash of the car, the method and the options; the content is a hash of the log. So
-the same log learnt twice is the same file, and two writers lose nothing. A file is written under a
-hidden name and renamed when it is whole; readers see whole files alone. A store lies in a folder or
-at any address of fsspec, as in s3://bucket/store.
+the same log learnt twice is the same file, and writers at a time lose nothing. A file is written
+under a hidden name and moved when it is whole, or in one put where a file system only copies.
+Readers pass over files that are not whole, or gone since they were listed. A store lies in a folder
+or at any address of fsspec, as in s3://bucket/store.
 """
 
 import importlib
 import io
 import json
 import posixpath
+import re
 import uuid
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -32,7 +34,8 @@ from models.extras import needs
 from models.vehicle import Vehicle, sedan
 
 VERSION = 5  # of rows
-BATCH = 512  # rows in memory at once
+_SETTING = re.compile(r"[0-9a-f]{16}")
+_MAGIC = b"PAR1"  # with which a whole Parquet file begins and ends
 _MOVES = Priors.of(sedan()).with_play().moves
 _MOVING = [name for name, moves in zip(NAMES, _MOVES, strict=True) if moves]
 OBSERVABLE = np.array([*range(FORCES), *(PLACE[name] for name in _MOVING if name in PLACE)])  # of u
@@ -160,9 +163,9 @@ class Store:
         return fs, path.rstrip("/") or "/"
 
     def files(self) -> list[str]:
-        """Return the paths of whole files, in order."""
+        """Return the paths of files, in order."""
         fs, path = self._place
-        fs.invalidate_cache(path)
+        fs.invalidate_cache()
         found = {
             name: info["type"]
             for name, info in sorted(fs.find(path, detail=True).items())
@@ -181,7 +184,9 @@ class Store:
         (fs, path), files = self._place, self.files()
         if begun and not files:
             raise StoreError(f"{self.address} is no store: tireid fleet learn LOGS --out makes one")
-        if fs.isfile(path) or (fs.isdir(path) and not files and fs.ls(path, detail=False)):
+        inside = [] if files or not fs.isdir(path) else fs.ls(path, detail=False)
+        names = [posixpath.basename(one.rstrip("/")) for one in inside]
+        if fs.isfile(path) or not all(map(_SETTING.fullmatch, names)):
             raise StoreError(
                 f"{self.address} holds something else: choose another folder for the store"
             )
@@ -189,67 +194,61 @@ class Store:
     def stream(
         self, columns: Sequence[str] = COLUMNS, files: Sequence[str] | None = None
     ) -> Iterator[LogRow]:
-        """Yield the rows in the order of their files, a few of them in memory.
+        """Yield the rows in the order of their files, those of a file in memory.
 
         columns : that are read, `INDEX` among them; others are as of a log without result.
         files : that are read; None reads those that are there now.
         """
-        pyarrow, dataset = needed("pyarrow"), needed("pyarrow.dataset")
-        fs, files = self._place[0], self.files() if files is None else files
-
-        def batches() -> Iterator[Any]:
-            """Threads of pyarrow's may outlive Python, and must hold nothing of Python's then."""
-            if "file" in protocols(fs):
-                local = pyarrow.fs.LocalFileSystem()
-                rows = dataset.dataset(files, schema=schema(), format="parquet", filesystem=local)
-                yield from rows.to_batches(list(columns), batch_size=BATCH, use_threads=False)
-                return
-            for name in files:
-                with fs.open(name, "rb") as opened:  # read at once, by this thread
-                    whole = pyarrow.BufferReader(opened.read())
-                yield from (
-                    needed("pyarrow.parquet")
-                    .ParquetFile(whole)
-                    .iter_batches(BATCH, columns=list(columns), use_threads=False)
-                )
-
-        try:
-            for batch in batches():
-                for row in batch.to_pylist():
-                    if row["version"] != VERSION:
-                        raise StoreError(
-                            f"{self.address}: holds rows of another version: learn its logs "
-                            "again, into a new store"
-                        )
-                    yield LogRow(**{name: one for name, one in row.items() if one is not None})
-        except (OSError, pyarrow.ArrowException) as error:
-            raise StoreError(f"{self.address}: {' '.join(str(error).split())}") from error
+        pyarrow, parquet = needed("pyarrow"), needed("pyarrow.parquet")
+        fs, known = self._place[0], schema()
+        for name in self.files() if files is None else files:
+            try:
+                data = fs.cat_file(name)
+                if not data.startswith(_MAGIC) or not data.endswith(_MAGIC):
+                    continue  # another run writes it
+                # Threads of pyarrow's may outlive Python, and must hold nothing of Python's then.
+                file = parquet.ParquetFile(pyarrow.BufferReader(data))
+                table = file.read(list(columns), use_threads=False)
+            except FileNotFoundError:
+                continue  # another run removed it
+            except (OSError, pyarrow.ArrowException) as error:
+                raise StoreError(f"{name}: {' '.join(str(error).split())}") from error
+            for row in table.to_pylist():
+                if file.schema_arrow != known or row["version"] != VERSION:
+                    raise StoreError(
+                        f"{self.address}: holds rows of another version: learn its logs "
+                        "again, into a new store"
+                    )
+                yield LogRow(**{name: one for name, one in row.items() if one is not None})
 
     def write(self, rows: Sequence[LogRow]) -> None:
         """Write the rows of a log, whole or not at all.
 
         rows : of one log and one setting.
         """
-        data = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
-        table = needed("pyarrow").table(data, schema())
+        columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
+        table = needed("pyarrow").table(columns, schema())
         buffer, (fs, folder) = io.BytesIO(), self._place
         needed("pyarrow.parquet").write_table(table, buffer, compression="zstd")
-        path = posixpath.join(folder, rows[0].file)
+        data, path = buffer.getvalue(), posixpath.join(folder, rows[0].file)
         hidden = posixpath.join(posixpath.dirname(path), f".{uuid.uuid4().hex}.part")
         with naming(path):
             fs.makedirs(posixpath.dirname(path), exist_ok=True)
-            fs.pipe_file(hidden, buffer.getvalue())
-            fs.mv(hidden, path)
+            if type(fs).mv is needed("fsspec").AbstractFileSystem.mv:  # copies, then removes
+                fs.pipe_file(path, data)
+                return
+            fs.pipe_file(hidden, data)
+            try:
+                fs.mv(hidden, path)
+            except OSError:  # where nothing is moved over a file
+                fs.pipe_file(path, data)
+                fs.rm_file(hidden)
 
     def drop(self, file: str) -> None:
         """Remove a file of rows."""
         fs, folder = self._place
         with suppress(FileNotFoundError):  # another run removed it
-            fs.rm(posixpath.join(folder, file))
-
-
-def protocols(fs: Any) -> set[str]:
-    return {fs.protocol} if isinstance(fs.protocol, str) else set(fs.protocol)
+            fs.rm_file(posixpath.join(folder, file))
 
 
 def schema() -> Any:
