@@ -185,7 +185,7 @@ class FittedModel(TireModel):
         if self.held is not None:
             return self.held
         if not recording.breaks or recording.logged_v_y is None:
-            return ((0, self.on(recording)),)
+            return _found(_LAST, _one, recording, self.on(recording))
         return self._known(recording, days_of)
 
     def of_day(self, day: Day) -> Self:
@@ -329,6 +329,11 @@ def _found(kept: deque[Any], find: Callable[..., _Found], log: Recording, *given
     found = find(log, *given)
     kept.append((key, about, found))
     return found
+
+
+def _one(recording: Recording, day: Day) -> tuple[tuple[int, Day], ...]:
+    del recording
+    return ((0, day),)
 
 
 def _driven(

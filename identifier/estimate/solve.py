@@ -354,26 +354,27 @@ def descend(
     p, damping = start.copy(), 1e-3 if memory is None else 1e-6  # then it is near
     # Far from the optimum all residuals are correlated: by their T they would count for nothing.
     T = np.full(2, _SHORTEST_MEMORY) if memory is None else memory
-    settled, ended, first = memory is not None, False, 0.0
+    settled, ended, moved, first = memory is not None, False, True, 0.0
     now, taken = problem.residuals(p), 1  # slopes; `first` of the steps on them gained so much
     for look in itertools.count():
         S2 = problem.scale(now.e)
         if memory is None and look:
-            before, T = T, np.sqrt(T * problem.memory(now.e))
-            settled = bool(np.abs(np.log(T / before)).max() < _SETTLED_MEMORY)
+            found = problem.memory(now.e)
+            before, T = T, np.sqrt(T * found) if moved else found
+            settled = bool(np.abs(np.log(T / before)).max() < _SETTLED_MEMORY) or not moved
         p, e, damping, gained = _better(problem, now, p, (S2, T), damping, enough, once=first > 0.0)
         now = now._replace(e=e)
         if gained > max(_SAME_SLOPES * first, enough):
-            first = first or gained
+            first, moved = first or gained, True
         elif not (first or gained or settled):
-            continue  # T alone moves
+            moved = False  # T alone does
         else:
             ended = not first and settled
             if not (ended and not gained):
                 now = problem.residuals(p)
             if ended or taken == iterations:
                 break
-            taken, first = taken + 1, 0.0
+            taken, moved, first = taken + 1, True, 0.0
     S2, T = problem.scale(now.e), problem.memory(now.e) if memory is None else memory
     H, gradient = normal(problem, now, S2, T)
     slope, curvature = _of_drives(problem, H, gradient)
