@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from codegen.arrays import Array, thinning
+from codegen.arrays import Array, blocks, thinning
 from codegen.escape import visible
 from identifier.compare.course import side_slip
 from identifier.frozen import vehicle_numbers
@@ -206,7 +206,8 @@ class Results:
         learnt, progress = self.runs[0], progress or Progress("curves")
         for k, run in enumerate(self.runs):
             end = "" if run is learnt else f"_{file_name(run.recording)}"
-            write_csv(folder / f"forces{end}.csv", self._force_columns(run))
+            parts = (self._force_columns(run, part) for part in blocks(len(run.recording)))
+            write_long_csv(folder / f"forces{end}.csv", parts)
             progress(_WRITING * (k + 1) / len(self.runs))
         if _OBSERVED in learnt.outputs:
             found = (
@@ -223,23 +224,26 @@ class Results:
         say("drawing figures")
         return save_figures(folder, self._figures())
 
-    def _force_columns(self, run: History) -> dict[str, Array]:
+    def _force_columns(self, run: History, part: slice) -> dict[str, Array]:
         """Return the columns of forces.csv: slip angles, true, online and frozen forces."""
         recording, car, outputs = run.recording, run.vehicle, run.outputs
         forces = {"true": recording.axle_force, "online": run.axle_force if run.online else None}
         for key, by_name in self.frozen.items():
             forces[f"frozen_{key}s"] = by_name[recording.name].axle_force
-        return {
+        given = {
             "t_s": recording.t,
             "v_x_m_s": recording.v_x,
             "v_y_m_s": recording.needed("v_y"),
             "r_rad_s": recording.r,
             "delta_f_rad": recording.delta_f,
             "delta_r_rad": recording.delta_r,
-            **axle_columns("alpha_{}_rad", recording.alpha(car.l_f, car.l_r)),
-            **{name: outputs[port].ravel() for name, port in _ESTIMATED.items() if port in outputs},
-            **force_columns(forces),
         }
+        columns = {name: signal[part] for name, signal in given.items()}
+        columns |= axle_columns("alpha_{}_rad", recording.alpha(car.l_f, car.l_r, part))
+        for name, port in _ESTIMATED.items():
+            if port in outputs:
+                columns[name] = outputs[port][part].ravel()
+        return columns | {name: force[part] for name, force in force_columns(forces).items()}
 
     def _figures(self) -> dict[str, Figure]:
         learnt, model = self.runs[0], self.model
@@ -301,8 +305,9 @@ def _curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[st
     car, known = model.vehicle, model.known_slip
     reach = [0.0 if known is None else float(known.max())]
     for one in recordings:
-        moving = one.v_x >= model.min_speed
-        reach.append(float(np.abs(one.alpha(car.l_f, car.l_r)[moving]).max(initial=0.0)))
+        for part in blocks(len(one)):
+            slip = one.alpha(car.l_f, car.l_r, part)[one.v_x[part] >= model.min_speed]
+            reach.append(float(np.abs(slip).max(initial=0.0)))
     end = min(_FARTHER * max(reach) or 0.1, 0.5)
     slip = np.linspace(-end, end, _CURVE_POINTS)
     force = model.force(slip)

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import Array, thinning
 from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
 from models.recordings.record import ALL
@@ -239,6 +239,13 @@ def hardest(recording: Recording, seconds: float) -> slice:
     seconds : how long it is at most [s].
     """
     n = min(round(seconds / recording.dt), len(recording))
-    power = np.cumsum(np.concatenate([[0.0], (recording.v_x * recording.r) ** 2]))
-    first = int(np.argmax(power[n:] - power[:-n])) if n < len(recording) else 0
+    if n == len(recording):
+        return slice(0, n)
+    each = thinning(len(recording))
+    power = recording.v_x * recording.r
+    power *= power
+    begins = np.arange(0, len(recording), each)
+    total = np.cumsum(np.concatenate([[0.0], np.add.reduceat(power, begins)]))
+    m = max(n // each, 1)
+    first = min(each * int(np.argmax(total[m:] - total[:-m])), len(recording) - n)
     return slice(first, first + n)

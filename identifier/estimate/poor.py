@@ -122,6 +122,8 @@ def _new_values(signal: Array) -> NDArray[np.intp]:
 
 
 def _interval(new: NDArray[np.intp]) -> float:
+    if new.size > 1 and new[-1] - new[0] == new.size - 1:
+        return 1.0
     return float(np.median(np.diff(new))) if new.size > 1 else np.inf
 
 

@@ -235,7 +235,11 @@ class Recording:
             [alpha_f, alpha_r] [rad], shape (n, 2).
         """
         names = ("v_x", "v_y", "r", "delta_f", "delta_r")
-        slip: Array = measured_slip(l_f, l_r, **{name: self.needed(name)[part] for name in names})
+        signals = {name: self.needed(name)[part] for name in names}
+        slip = large((len(signals["r"]), 2))
+        for some in blocks(len(slip)):
+            one = {name: signal[some] for name, signal in signals.items()}
+            slip[some] = measured_slip(l_f, l_r, **one)
         slip.setflags(write=False)
         return slip
 

@@ -48,10 +48,11 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
         known, color, label = online.axle_force, style.BLUE, "online"
     against = force if known is None else known
 
-    slip = np.rad2deg(recording.alpha(vehicle.l_f, vehicle.l_r))
-    part = cloud(recording.t, slip, force, against, force - against)
+    slip = recording.alpha(vehicle.l_f, vehicle.l_r)
+    signals = (slip, force) if known is None else (slip, force, known, force - known)
+    part = cloud(recording.t, *signals)
     part = part[recording.v_x[part] >= model.min_speed]
-    alpha, frozen, reference = slip[part], force[part], against[part]
+    alpha, frozen, reference = np.rad2deg(slip[part]), force[part], against[part]
     unit = style.force_unit_of(reference)
     frozen, reference = frozen / unit.newtons, reference / unit.newtons
     limits = style.force_range(reference, frozen)
