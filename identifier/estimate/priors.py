@@ -66,8 +66,8 @@ OF_AXLES: dict[str, _Belief] = {
     },
     "compliance": _Belief(0.008, 0.008, 0.0, 0.1, "L"),  # relaxation of about a tenth wheelbase
     "sway_share": _Belief(0.2, 0.6, 0.0, 1.0, ""),  # roll center low to high; firmer, steps err
-    "braking": _Belief(0.65, 0.3, 0.02, 2.0, ""),  # all four wheels brake; none is unused
-    "driving": _Belief(0.35, 0.4, 0.02, 3.0, ""),  # which axle drives is not known
+    "braking": _Belief(0.65, 0.3, 0.0, 2.0, ""),  # all four wheels brake
+    "driving": _Belief(0.35, 0.4, 0.0, 3.0, ""),  # which axle drives is not known
 }
 OF_CAR: dict[str, _Belief] = {
     "load_transfer": _Belief(0.18, 0.08, 0.0, 0.5, ""),  # height 0.5 m, less what tires lose

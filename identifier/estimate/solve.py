@@ -46,7 +46,7 @@ _SETTLING = 60  # iterations at most where no drive is looked at
 _SETTLED = 1e-4  # [nats] of improvement, below which these end
 
 _GOOD = 0.5  # of what a step promised, that it gains where the next is damped less
-_LEAST_USE = 1e-3  # of the ellipse, of which its second slope is told
+_LEAST_USE = 0.002  # of the ellipse, down to which a descent goes: at none there is no slope
 _USES = [INDEX[f"{use}_{axle}"] for use in ("braking", "driving") for axle in "fr"]
 DELAYS = [INDEX[name] for name in ("v_y_delay", "r_delay", "steering_delay")]
 
@@ -474,7 +474,8 @@ def _trials(
 ) -> Iterator[tuple[Array, float]]:
     """Yield where steps with more and more of Levenberg's damping end, and that damping."""
     index = np.flatnonzero(priors.moves)
-    low, high = priors.low[index], priors.high[index]
+    least = np.where(np.isin(index, _USES), _LEAST_USE, -np.inf)
+    low, high = np.maximum(priors.low[index], least), priors.high[index]
     for _ in range(8):
         step = bounded_step(H + damping * np.diag(np.diag(H)), gradient, p[index], low, high)
         trial = p.copy()
