@@ -217,6 +217,10 @@ def _scaled(channel: str, size: float) -> SensorFault:
     return SensorFault(channel=channel, kind="scaled", size=size)
 
 
+def _any(rng: np.random.Generator) -> str:
+    return str(rng.choice(["v_y", "r", "delta_f"]))
+
+
 def _always(fault: Fault, *right: tuple[str, str]) -> Draw:
     return lambda *_: Gross(Case(fault), right)
 
@@ -240,7 +244,7 @@ def _sideslip(per_rad: float) -> Draw:
 
 
 def _zero(_: Vehicle, rng: np.random.Generator) -> Gross:
-    channel = str(rng.choice(["v_y", "r", "delta_f"]))
+    channel = _any(rng)
     return Gross(Case(SensorFault(channel=channel, kind="zero")), (("frozen", channel),))
 
 
@@ -253,7 +257,7 @@ def _ratio(per_rad: float) -> Draw:
 
 
 def _stuck(_: Vehicle, rng: np.random.Generator) -> Gross:
-    channel, length = str(rng.choice(["v_y", "r", "delta_f"])), rng.uniform(1.0, 6.0)
+    channel, length = _any(rng), rng.uniform(1.0, 6.0)
     start = rng.uniform(10.0, 45.0)
     fault = SensorFault(channel=channel, kind="stuck", start=start, duration=length)
     return Gross(Case(fault), (("frozen", channel),))
@@ -261,14 +265,14 @@ def _stuck(_: Vehicle, rng: np.random.Generator) -> Gross:
 
 def _spiking(vehicle: Vehicle, rng: np.random.Generator) -> Gross:
     by = Scale.of(vehicle)
-    channel = str(rng.choice(["v_y", "r", "delta_f"]))
+    channel = _any(rng)
     size = {"v_y": 1.0 * by.speed, "r": 0.2 / by.time, "delta_f": 0.1}[channel]
     fault = SensorFault(channel=channel, kind="spiking", size=size)
     return Gross(Case(fault), (("spikes", channel),))
 
 
 def _held(_: Vehicle, rng: np.random.Generator) -> Gross:
-    channel = str(rng.choice(["v_y", "r", "delta_f"]))
+    channel = _any(rng)
     fault = Held(channels=(channel,), every=0.5, lasts=math.exp(rng.uniform(-3.5, -0.9)))
     return Gross(Case(fault), (("held", channel),))
 

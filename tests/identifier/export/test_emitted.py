@@ -192,7 +192,7 @@ def test_raceline_planners_read_the_table(tmp_path):
 # Understeer.
 
 
-def steering_slope(model, i, a_y, ratio=1.0):
+def steering_slope(model, i, a_y, ratio):
     """∂α/∂a_y of an axle [rad/(m/s²)], of a Magic Formula with E = 0 turned round by hand."""
     stiff, grip, c = (model[f"{name}_{'fr'[i]}"] for name in ("ln_stiffness", "ln_grip", "shape"))
     K, mu = math.exp(stiff), math.exp(grip)
