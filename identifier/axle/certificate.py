@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 from functools import cache
 from itertools import combinations, product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +20,11 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from identifier.axle.covariance import LEAST_VARIANCE
 from identifier.axle.curve import unit_slopes
-from identifier.axle.learning import FLOAT, LEAN, Bounds
+from identifier.axle.learning import FLOAT, LEAN, Bounds, Regression, RoadChange
+from identifier.axle.prior import Prior
 from identifier.certificate import Property, at_least, at_most, statement
 from identifier.driving import Driving
 from models.vehicle import Vehicle
-
-if TYPE_CHECKING:  # it asks for the proofs
-    from identifier.axle.design import AxleIdentifier
 
 _LARGEST_SLIP = 1.5  # rad
 _CELLS = 2000  # of slip, each a part wider than the one before
@@ -36,6 +34,34 @@ _LONGEST = 60.0  # s, beyond which a drop is not followed
 _FORGETS = (0.5, 0.9)  # share of its own information that a sample may forget: good, bad
 SLOW_Q = 4.0  # the slow mean does not follow a change
 MOST_SLOW = 4.0  # squared errors: above twice the declared they are no noise to get used to
+
+
+class Design(Protocol):
+    """What of an `AxleIdentifier` the proofs follow from; words and units are of its fields."""
+
+    @property
+    def prior(self) -> Prior:
+        """What is believed before the first sample."""
+
+    @property
+    def bounds(self) -> Bounds:
+        """Limits of what is learnt."""
+
+    @property
+    def regression(self) -> Regression:
+        """Filter, error model and memory."""
+
+    @property
+    def change(self) -> RoadChange:
+        """When another friction is believed."""
+
+    @property
+    def ladder(self) -> tuple[float, ...]:
+        """Slip scales of the units [rad]."""
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s]."""
 
 
 @cache
@@ -154,7 +180,7 @@ class FrictionDrop:
     slope: float = 20.0
     errors: float = 1.0
 
-    def time(self, design: "AxleIdentifier", friction: float, v_x: float) -> float:
+    def time(self, design: Design, friction: float, v_x: float) -> float:
         """Return for how long at most both axles stay wrong by more than `left` of it [s].
 
         While both are, evidence of the drop grows at least as fast as here, where errors are the
@@ -185,7 +211,7 @@ class FrictionDrop:
         return math.inf
 
 
-def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> tuple[Property, ...]:
+def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Property, ...]:
     """Return what is proven of a design, whatever is measured unless a title says more.
 
     Of a car with downforce without the time that a drop of friction takes.
@@ -251,7 +277,7 @@ def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> t
     return proven if vehicle.has_downforce else (*proven, _drop(design, driving))
 
 
-def _drop(design: "AxleIdentifier", driving: Driving) -> Property:
+def _drop(design: Design, driving: Driving) -> Property:
     """Return how long the drop of friction of a car takes whose loads are the static ones."""
     follows = FrictionDrop().time(design, driving.friction, driving.v_x)
     by_memory = design.regression.memory * math.log(2.0)
@@ -267,7 +293,7 @@ def _drop(design: "AxleIdentifier", driving: Driving) -> Property:
     )
 
 
-def jump_by_learning(design: "AxleIdentifier") -> float:
+def jump_by_learning(design: Design) -> float:
     """Return by how much learning changes a force in one sample at most [static axle loads].
 
     The step that is let through, and its lean to the center: no partial sum of weights is further
@@ -277,7 +303,7 @@ def jump_by_learning(design: "AxleIdentifier") -> float:
     return design.regression.rate * design.dt + LEAN * n * (b.weight + b.most_grip)
 
 
-def _lean_over_rounding(design: "AxleIdentifier") -> float:
+def _lean_over_rounding(design: Design) -> float:
     """Return how far a limited step leans inwards, over what rounding in float may do to it."""
     n, b = len(design.ladder), design.bounds
     inside = b.of_ladder(design.ladder)
