@@ -128,8 +128,8 @@ def bounds(problem: Problem, x0: ArrayLike) -> dict[str, Array]:
 
 
 @cache
-def _solver(structure: TireStructure, horizon: int, tolerance: float) -> ca.Function:
-    quiet: dict[str, Any] = {"print_level": 0, "sb": "yes", "tol": tolerance, "max_iter": 500}
+def _solver(structure: TireStructure, horizon: int) -> ca.Function:
+    quiet: dict[str, Any] = {"print_level": 0, "sb": "yes", "tol": 1e-9, "max_iter": 500}
     options: dict[str, Any] = {"print_time": False, "error_on_fail": False, "ipopt": quiet}
     return ca.nlpsol("converged", "ipopt", build_nlp(structure, horizon), options)
 
@@ -140,18 +140,14 @@ def solve_converged(
     x0: ArrayLike,
     kappa: ArrayLike,
     v_x: ArrayLike,
-    guess: tuple[Array, Array] | None = None,
-    *,
-    tolerance: float = 1e-9,
 ) -> Solution:
-    """Solve the problem from a state.
+    """Solve the problem from a state, beginning at x0 held.
 
     Parameters
     ----------
     x0 : state at the beginning (n_x,).
     kappa : curvature of each stage [1/m], (N,) or a number.
     v_x : speed of each stage [m/s], (N,) or a number.
-    guess : x (N + 1, n_x) and u (N,) to begin with; None begins at x0 held.
 
     Raises
     ------
@@ -159,9 +155,8 @@ def solve_converged(
         Where IPOPT gives up.
     """
     N, n_x = problem.horizon, state_size(tire.structure)
-    x, u = guess if guess is not None else (np.tile(np.asarray(x0), (N + 1, 1)), np.zeros(N))
-    solver = _solver(tire.structure, N, tolerance)
-    start = np.concatenate([np.ravel(x), u, np.zeros(N_SOFT * N)])
+    solver = _solver(tire.structure, N)
+    start = np.concatenate([np.tile(np.asarray(x0), N + 1), np.zeros((1 + N_SOFT) * N)])
     answer = solver(x0=start, p=numbers(problem, tire, kappa, v_x), **bounds(problem, x0))
     said = solver.stats()
     if not said["success"]:

@@ -16,6 +16,7 @@ from benchmarks.faults import (
     AnotherCar,
     Bank,
     ClockJump,
+    Fault,
     Held,
     Jitter,
     Lagging,
@@ -54,14 +55,22 @@ class Planted(NamedTuple):
 Plant = Callable[[Vehicle, float], Planted]  # of a car and a size of a sedan, with sign
 
 
-def _offset(channel: str, shape: str) -> Plant:
+def _of(make: Callable[[float], Fault], code: str, channel: str, unit: str = "") -> Plant:
+    """A fault whose size grows with a unit of the car."""
+
     def plant(vehicle: Vehicle, size: float) -> Planted:
-        by = Scale.of(vehicle)
-        size *= {"": 1.0, "speed": by.speed, "rate": 1.0 / by.time}[shape]
-        fault = SensorFault(channel=channel, kind="biased", size=size)
-        return Planted(Case(fault), "offset", channel, size)
+        by = Scale.of(vehicle)._asdict()
+        size *= {"": 1.0, "rate": 1.0 / by["time"], **by}[unit]
+        return Planted(Case(make(size)), code, channel, size)
 
     return plant
+
+
+def _offset(channel: str, unit: str) -> Plant:
+    def make(size: float) -> Fault:
+        return SensorFault(channel=channel, kind="biased", size=size)
+
+    return _of(make, "offset", channel, unit)
 
 
 def _factor(channel: str) -> Plant:
@@ -73,32 +82,17 @@ def _factor(channel: str) -> Plant:
 
 
 def _late(channel: str) -> Plant:
-    def plant(vehicle: Vehicle, size: float) -> Planted:
-        size *= Scale.of(vehicle).time
-        return Planted(Case(Late(channels=(channel,), delay=size)), "delay", channel, size)
-
-    return plant
+    return _of(lambda size: Late(channels=(channel,), delay=size), "delay", channel, "time")
 
 
 def _lagging(channel: str) -> Plant:
-    def plant(vehicle: Vehicle, size: float) -> Planted:
-        size *= Scale.of(vehicle).time
-        fault = Lagging(channels=(channel,), time_constant=size)
-        return Planted(Case(fault), "lag", channel, size)
-
-    return plant
+    return _of(
+        lambda size: Lagging(channels=(channel,), time_constant=size), "lag", channel, "time"
+    )
 
 
 def _elsewhere(sensor: str, code: str, channel: str) -> Plant:
-    def plant(vehicle: Vehicle, size: float) -> Planted:
-        size *= Scale.of(vehicle).length
-        return Planted(Case(SensorElsewhere(sensor=sensor, x=size)), code, channel, size)
-
-    return plant
-
-
-def _misaligned(_: Vehicle, size: float) -> Planted:
-    return Planted(Case(Misaligned(angle=size)), "velocity_sensor_angle", "v_y", size)
+    return _of(lambda size: SensorElsewhere(sensor=sensor, x=size), code, channel, "length")
 
 
 def _center(vehicle: Vehicle, size: float) -> Planted:
@@ -132,7 +126,10 @@ KINDS: Mapping[str, tuple[Plant, float, float, bool]] = {
     "lag r": (_lagging("r"), 0.05, 0.3, False),
     "lag delta_f": (_lagging("delta_f"), 0.05, 0.3, False),
     "lag a_y": (_lagging("a_y"), 0.05, 0.3, False),
-    "misaligned": (_misaligned, 0.5 * DEGREE, 3.0 * DEGREE, True),
+    "misaligned": (
+        _of(lambda size: Misaligned(angle=size), "velocity_sensor_angle", "v_y"),
+        0.5 * DEGREE, 3.0 * DEGREE, True,
+    ),
     "velocity sensor": (_elsewhere("velocity", "velocity_sensor_x", "v_y"), 0.2, 1.5, True),
     "accelerometer": (
         _elsewhere("accelerometer", "acceleration_sensor_x", "a_y"), 0.2, 1.5, True,
@@ -220,52 +217,35 @@ def _scaled(channel: str, size: float) -> SensorFault:
     return SensorFault(channel=channel, kind="scaled", size=size)
 
 
-def _of_one(kind: str, code: str) -> Draw:
-    """A fault of a kind of v_y, r or the steering, drawn."""
+def _any(rng: np.random.Generator) -> str:
+    return str(rng.choice(["v_y", "r", "delta_f"]))
 
-    def draw(_: Vehicle, rng: np.random.Generator) -> Gross:
-        channel = str(rng.choice(["v_y", "r", "delta_f"]))
-        return Gross(Case(SensorFault(channel=channel, kind=kind)), ((code, channel),))
 
-    return draw
+def _always(fault: Fault, *right: tuple[str, str]) -> Draw:
+    return lambda *_: Gross(Case(fault), right)
 
 
 def _flipped(channel: str) -> Draw:
-    def draw(_: Vehicle, __: np.random.Generator) -> Gross:
-        fault = SensorFault(channel=channel, kind="flipped")
-        return Gross(Case(fault), (("sign", channel),))
-
-    return draw
+    return _always(SensorFault(channel=channel, kind="flipped"), ("sign", channel))
 
 
 def _mirrored(*channels: str) -> Draw:
     """One half of the axes: it cannot be told from the other half."""
-
-    def draw(_: Vehicle, __: np.random.Generator) -> Gross:
-        return Gross(Case(Mirrored(channels=channels)), (("sign", "v_y"), ("sign", "r")))
-
-    return draw
+    return _always(Mirrored(channels=channels), ("sign", "v_y"), ("sign", "r"))
 
 
 def _unit(channel: str, unit: str) -> Draw:
-    def draw(_: Vehicle, __: np.random.Generator) -> Gross:
-        return Gross(Case(WrongUnit(channel=channel, unit=unit)), (("unit", channel),))
-
-    return draw
-
-
-def _both_in_kmh(_: Vehicle, __: np.random.Generator) -> Gross:
-    faults = (_scaled("v_x", 3.6), _scaled("v_y", 3.6))
-    return Gross(Case(Together(faults=faults)), (("unit", "v_x"),))
+    return _always(WrongUnit(channel=channel, unit=unit), ("unit", channel))
 
 
 def _sideslip(per_rad: float) -> Draw:
     """At a constant speed the angle is v_y in some unit of speed."""
+    return _always(Sideslip(per_rad=per_rad), ("sideslip", "v_y"), ("unit", "v_y"))
 
-    def draw(_: Vehicle, __: np.random.Generator) -> Gross:
-        return Gross(Case(Sideslip(per_rad=per_rad)), (("sideslip", "v_y"), ("unit", "v_y")))
 
-    return draw
+def _zero(_: Vehicle, rng: np.random.Generator) -> Gross:
+    channel = _any(rng)
+    return Gross(Case(SensorFault(channel=channel, kind="zero")), (("frozen", channel),))
 
 
 def _ratio(per_rad: float) -> Draw:
@@ -277,7 +257,7 @@ def _ratio(per_rad: float) -> Draw:
 
 
 def _stuck(_: Vehicle, rng: np.random.Generator) -> Gross:
-    channel, length = str(rng.choice(["v_y", "r", "delta_f"])), rng.uniform(1.0, 6.0)
+    channel, length = _any(rng), rng.uniform(1.0, 6.0)
     start = rng.uniform(10.0, 45.0)
     fault = SensorFault(channel=channel, kind="stuck", start=start, duration=length)
     return Gross(Case(fault), (("frozen", channel),))
@@ -285,21 +265,16 @@ def _stuck(_: Vehicle, rng: np.random.Generator) -> Gross:
 
 def _spiking(vehicle: Vehicle, rng: np.random.Generator) -> Gross:
     by = Scale.of(vehicle)
-    channel = str(rng.choice(["v_y", "r", "delta_f"]))
+    channel = _any(rng)
     size = {"v_y": 1.0 * by.speed, "r": 0.2 / by.time, "delta_f": 0.1}[channel]
     fault = SensorFault(channel=channel, kind="spiking", size=size)
     return Gross(Case(fault), (("spikes", channel),))
 
 
 def _held(_: Vehicle, rng: np.random.Generator) -> Gross:
-    channel = str(rng.choice(["v_y", "r", "delta_f"]))
+    channel = _any(rng)
     fault = Held(channels=(channel,), every=0.5, lasts=math.exp(rng.uniform(-3.5, -0.9)))
     return Gross(Case(fault), (("held", channel),))
-
-
-def _stairs(_: Vehicle, __: np.random.Generator) -> Gross:
-    fault = Held(channels=("v_x", "v_y"), every=0.1, lasts=0.1)
-    return Gross(Case(fault), (("held", "v_y"), ("held", "v_x")))
 
 
 def _late_at_random(vehicle: Vehicle, rng: np.random.Generator) -> Gross:
@@ -338,17 +313,21 @@ GROSS: Mapping[str, Draw] = {
     "r in degrees": _unit("r", "deg"),
     "steering in degrees": _unit("delta_f", "deg"),
     "v_x in km/h": _unit("v_x", "km/h"),
-    "speeds in km/h": _both_in_kmh,
+    "speeds in km/h": _always(
+        Together(faults=(_scaled("v_x", 3.6), _scaled("v_y", 3.6))), ("unit", "v_x")
+    ),
     "a_y in g": _unit("a_y", "g"),
     "sideslip in rad": _sideslip(1.0),
     "sideslip in degrees": _sideslip(math.degrees(1.0)),
     "steering wheel in rad": _ratio(1.0),
     "steering wheel in degrees": _ratio(math.degrees(1.0)),
-    "zero": _of_one("zero", "frozen"),
+    "zero": _zero,
     "stuck": _stuck,
     "spiking": _spiking,
     "held": _held,
-    "stairs": _stairs,
+    "stairs": _always(
+        Held(channels=("v_x", "v_y"), every=0.1, lasts=0.1), ("held", "v_y"), ("held", "v_x")
+    ),
     "late at random": _late_at_random,
     "time missing": _jump(1.0),
     "logged twice": _jump(-1.0),

@@ -33,14 +33,9 @@ WIDTH = 110
 Record = Mapping[str, Any]
 
 
-def records(folder: Path = RESULTS) -> dict[str, Record]:
-    """Return what every benchmark recorded, by script.
-
-    Parameters
-    ----------
-    folder : of the JSON files.
-    """
-    paths = sorted(folder.glob("*.json"))
+def records() -> dict[str, Record]:
+    """Return what every benchmark recorded, by script."""
+    paths = sorted(RESULTS.glob("*.json"))
     return {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in paths}
 
 
@@ -91,9 +86,7 @@ def _tables(script: str) -> Callable[[Values], dict[str, Table]]:
     return tables
 
 
-@cache
-def _code(script: str) -> str:
-    return fingerprint(script)
+_code = cache(fingerprint)
 
 
 def _state(script: str, record: Record) -> str:
@@ -158,14 +151,9 @@ def paper() -> Table:
     return Table(("RMSE [kN]", *head), rows)
 
 
-def documents(root: Path = ROOT) -> list[Path]:
-    """Return README.md and every Markdown file below docs.
-
-    Parameters
-    ----------
-    root : of the project.
-    """
-    return [root / "README.md", *sorted((root / "docs").rglob("*.md"))]
+def documents() -> list[Path]:
+    """Return README.md and every Markdown file below docs."""
+    return [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def main(argv: list[str] | None = None) -> int:

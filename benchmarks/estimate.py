@@ -135,15 +135,14 @@ def drives_of(kind: str, seed: int) -> Driven:
 
 
 @cache
-def random_cars(first: int = FIRST_SEED, count: int = CARS) -> tuple[Driven, ...]:
+def random_cars(count: int = CARS) -> tuple[Driven, ...]:
     """Return the drives of all random cars.
 
     Parameters
     ----------
-    first : seed of the first of each class.
     count : of each class.
     """
-    seeds = range(first, first + count)
+    seeds = range(FIRST_SEED, FIRST_SEED + count)
     return tuple(drives_of(kind, seed) for seed in seeds for kind in CLASSES)
 
 
@@ -182,7 +181,7 @@ def of_random_cars(count: int = CARS) -> dict[str, list[Taught]]:
     count : of cars of each class.
     """
     found: dict[str, list[Taught]] = defaultdict(list)
-    for one in random_cars(count=count):
+    for one in random_cars(count):
         asked = tuple((other,) for other in one.others)
         for kind, log in one.teach.items():
             found[kind].append(Taught(one.told, log, asked, since=CORNER))

@@ -18,6 +18,7 @@ from benchmarks.random_cars import (
     RandomDrive,
     is_good,
     random_car,
+    steering_gradient,
 )
 from codegen.arrays import Array
 from models.maneuvers import Maneuver, RandomSteer
@@ -87,13 +88,12 @@ def everyday_drive(car: RandomCar, kind: str, rng: np.random.Generator) -> Rando
         Where none of `DRAWS` drives is such.
     """
     begin, vehicle = Beginning(lead=0.0), car.vehicle
-    b, L = vehicle.bicycle, vehicle.wheelbase
-    understeer = b.m * (b.l_r * b.C_r - b.l_f * b.C_f) / (b.C_f * b.C_r * L)  # rad s^2/m
     for _ in range(DRAWS):
         speed = rng.uniform(2.6, 4.5) * vehicle.froude_speed
-        if L + 1.3**2 * understeer * speed**2 <= 0.0:
+        per_a_y = steering_gradient(vehicle, speed)
+        if per_a_y is None:
             continue
-        per_grip = min(car.friction) * GRAVITY * (L / speed**2 + understeer)
+        per_grip = min(car.friction) * GRAVITY * per_a_y
         gentle = min(rng.uniform(*GENTLE) * per_grip, 0.1)
         drive = Everyday(
             road=RandomSteer(

@@ -64,10 +64,6 @@ class StraightOnly:
     sensors: Sensors
     seed: int = 0
 
-    def __str__(self) -> str:
-        """Return it in words."""
-        return "straight driving only"
-
     def apply(self, recording: Recording) -> Recording:
         """Return the recording with next to no lateral motion, its forces shrunk alike.
 

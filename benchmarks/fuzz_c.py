@@ -132,7 +132,7 @@ def _boxes(package: Package) -> tuple[str, ...]:
     return (*boxes, f"OWN={own}")
 
 
-def build(subject: Subject, folder: Path, *, single: bool = False, compiler: str = "clang") -> Path:
+def build(subject: Subject, folder: Path, *, single: bool = False) -> Path:
     """Compile the harness with its package; return the program.
 
     Parameters
@@ -140,14 +140,13 @@ def build(subject: Subject, folder: Path, *, single: bool = False, compiler: str
     subject : what is fuzzed.
     folder : to write to.
     single : whether to compute in float.
-    compiler : clang.
 
     Raises
     ------
     NoFuzzerError
-        Where the compiler has no libFuzzer.
+        Where clang has no libFuzzer.
     """
-    if not has_fuzzer(compiler):
+    if not has_fuzzer():
         raise NoFuzzerError(MISSING)
     for path, text in subject.files.items():
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
@@ -159,20 +158,15 @@ def build(subject: Subject, folder: Path, *, single: bool = False, compiler: str
     left_out = ",".join(one for one in (LEFT_OUT, subject.left_out) if one)
     sanitized = [f"-fsanitize={SANITIZERS}", f"-fno-sanitize={left_out}"]
     words = [*FLAGS, *sanitized, *macros, "-Iinclude", "-Isrc", *sources, subject.harness]
-    command = [compiler, *words, "-lm", "-o", "fuzz"]
+    command = ["clang", *words, "-lm", "-o", "fuzz"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
     return folder / "fuzz"
 
 
 @cache
-def has_fuzzer(compiler: str = "clang") -> bool:
-    """Return whether a compiler links libFuzzer with its sanitizers.
-
-    Parameters
-    ----------
-    compiler : its command.
-    """
-    if shutil.which(compiler) is None:
+def has_fuzzer() -> bool:
+    """Return whether clang links libFuzzer with its sanitizers."""
+    if shutil.which("clang") is None:
         return False
     with tempfile.TemporaryDirectory() as scratch:
         empty = Path(scratch) / "empty.c"
@@ -182,7 +176,7 @@ def has_fuzzer(compiler: str = "clang") -> bool:
             "{ return (d == 0) && (n > 0); }\n",
             encoding="utf-8",
         )
-        words = [compiler, f"-fsanitize={SANITIZERS}", str(empty), "-o", str(empty.with_suffix(""))]
+        words = ["clang", f"-fsanitize={SANITIZERS}", str(empty), "-o", str(empty.with_suffix(""))]
         return subprocess.run(words, capture_output=True, check=False).returncode == 0
 
 

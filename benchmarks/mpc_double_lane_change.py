@@ -29,9 +29,9 @@ PULSES = ((2.0, 1.0), (4.6, -1.0), (8.5, 1.0), (11.1, -1.0))  # beginning [s], d
 PULSE = 1.8  # duration of a lane change [s]
 
 
-def network_fitted_to_curve(seed: int = 1) -> PredictionTire:
+def network_fitted_to_curve() -> PredictionTire:
     """Return the linear tire of the sedan plus a network fitted to what a tanh curve has less."""
-    car, rng = sedan(), np.random.default_rng(seed)
+    car, rng = sedan(), np.random.default_rng(1)
     _, _, l_f, l_r, C_f, C_r = car.bicycle
     structure = NetworkAxles(hidden=HIDDEN, inputs=INPUTS)
     C, load = np.array([C_f, C_r]), np.array(car.axle_loads)

@@ -78,7 +78,7 @@ CLASSES: Mapping[str, CarClass] = {
         height=(0.19, 0.24),
     ),
     "sedan": SEDAN,
-    "race": CarClass(
+    "race": SEDAN._replace(
         mass=(550.0, 900.0),
         wheelbase=(2.6, 3.2),
         front=(0.5, 0.6),
@@ -86,7 +86,6 @@ CLASSES: Mapping[str, CarClass] = {
         friction=(1.2, 1.8),
         height=(0.09, 0.12),
         relaxation=(0.06, 0.15),
-        inertia=(0.9, 1.1),
         roll=(20.0, 40.0),
         frequency=(0.5, 1.0),
     ),
@@ -403,6 +402,16 @@ def random_drive(
     raise PlantError(f"{DRAWS} drives of a {car.kind} did not excite both axles without a spin")
 
 
+def steering_gradient(car: Vehicle, speed: float) -> float | None:
+    """Return the steering per lateral acceleration [rad s^2/m]; None where it would be unstable.
+
+    car : that drives.   speed : in the corners [m/s].
+    """
+    b, L = car.bicycle, car.wheelbase
+    understeer = b.m * (b.l_r * b.C_r - b.l_f * b.C_f) / (b.C_f * b.C_r * L)
+    return None if L + 1.3**2 * understeer * speed**2 <= 0.0 else L / speed**2 + understeer
+
+
 def random_steering(
     car: RandomCar, speed: float, lead: float, rng: np.random.Generator
 ) -> RandomSteer | None:
@@ -415,12 +424,11 @@ def random_steering(
     lead : straight road before them [s].
     rng : source of the swings.
     """
-    b, L = car.vehicle.bicycle, car.vehicle.wheelbase
-    understeer = b.m * (b.l_r * b.C_r - b.l_f * b.C_f) / (b.C_f * b.C_r * L)  # rad s^2/m
-    if L + 1.3**2 * understeer * speed**2 <= 0.0:
+    per_a_y = steering_gradient(car.vehicle, speed)
+    if per_a_y is None:
         return None
     a_y = rng.uniform(0.7, 1.05) * min(car.friction) * GRAVITY
-    amplitude = min(1.5 * a_y * (L / speed**2 + understeer), 0.4)
+    amplitude = min(1.5 * a_y * per_a_y, 0.4)
     return RandomSteer(
         amplitude=amplitude,
         frequency=car.frequency,

@@ -20,6 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
+from operator import methodcaller
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -243,12 +244,11 @@ def pairs(*, quick: bool) -> list[Pair]:
     return found
 
 
-def _with(tire: TireModel, **added: float) -> TireModel:
-    """Return tires with something added to some parameters, within their bounds."""
+def _as_stiff(tire: TireModel, axle: str, times: float) -> TireModel:
+    """Return tires so many times as stiff at an axle, within their bounds."""
     assert isinstance(tire, FittedModel)
     p, beliefs = tire.p.copy(), Priors.of(tire.vehicle)
-    for name, more in added.items():
-        p[INDEX[name]] += more
+    p[INDEX[f"ln_stiffness_{axle}"]] += np.log(times)
     return replace(tire, p=np.clip(p, beliefs.low, beliefs.high))
 
 
@@ -261,18 +261,10 @@ def _swapped(tire: TireModel) -> TireModel:
     return replace(tire, p=p)
 
 
-def _on(ratio: float) -> Callable[[TireModel], TireModel]:
-    return lambda tire: tire.at_friction(ratio)
-
-
-def _as_stiff(axle: str, times: float) -> Callable[[TireModel], TireModel]:
-    return lambda tire: _with(tire, **{f"ln_stiffness_{axle}": float(np.log(times))})
-
-
-PLANTED = {
-    **{f"friction x {ratio:g}": _on(ratio) for ratio in (0.5, 0.7, 1.3)},
+PLANTED: Mapping[str, Callable[[TireModel], TireModel]] = {
+    **{f"friction x {ratio:g}": methodcaller("at_friction", ratio) for ratio in (0.5, 0.7, 1.3)},
     **{
-        f"stiffness {axle} x {times:g}": _as_stiff(axle, times)
+        f"stiffness {axle} x {times:g}": partial(_as_stiff, axle=axle, times=times)
         for axle in "fr"
         for times in (0.7, 1.42)
     },

@@ -45,12 +45,6 @@ class Finding(NamedTuple):
         return self.kind, self.place
 
 
-class Allowed(NamedTuple):
-    """What the command shows where all of its input is right: numbers that are not finite."""
-
-    places: frozenset[str] = frozenset()
-
-
 def files_of(folder: Path) -> dict[str, str]:
     """Return the files of a user below a folder, by name, with what identifies their content.
 

@@ -264,20 +264,17 @@ def steady_stiffness(model: TireModel, v_x: float) -> Array:
     return np.asarray((left - right) / (2.0 * SLIP))
 
 
-def only_compiler(
-    folder: Path, tools: Sequence[str] = ("gcc", "cc", "as", "ld", "collect2")
-) -> None:
+def only_compiler(folder: Path) -> None:
     """Let PATH hold the compiler alone: costs on boards, which take long, are not measured.
 
     Parameters
     ----------
     folder : which becomes PATH.
-    tools : that are put there.
     """
     import shutil
 
     folder.mkdir(parents=True, exist_ok=True)
-    for tool in tools:
+    for tool in ("gcc", "cc", "as", "ld", "collect2"):
         found = shutil.which(tool)
         if found and not (folder / tool).exists():
             (folder / tool).symlink_to(Path(found).resolve())

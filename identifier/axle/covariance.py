@@ -76,9 +76,13 @@ def per_variance(prior: Array, n: int, widest: float) -> Array:
     """Return 1/limit of the trace of the weights and of each other variance, (2, q - n + 1).
     prior : covariance before the first sample, (2, q, q).   widest : limit over the prior's [-].
     """
-    variances = np.einsum("aii->ai", prior)
-    sizes = np.column_stack([variances[:, :n].sum(axis=1), variances[:, n:]])
-    return np.asarray(1.0 / (widest * (1.0 - _ROUNDING) * sizes), dtype=np.float64)
+    return np.asarray(1.0 / (widest * (1.0 - _ROUNDING) * _sizes(prior, n)), dtype=np.float64)
+
+
+def _sizes(P: Array, n: int) -> Array:
+    """Return the trace of the weights and each other variance, (2, q - n + 1)."""
+    variances = np.einsum("aii->ai", P)
+    return np.column_stack([variances[:, :n].sum(axis=1), variances[:, n:]])
 
 
 def narrowed(P: Array, limits: Array) -> Array:
@@ -86,9 +90,7 @@ def narrowed(P: Array, limits: Array) -> Array:
     P : covariances (2, q, q).   limits : from `per_variance`.
     """
     n = P.shape[1] - limits.shape[1] + 1
-    variances = np.einsum("aii->ai", P)
-    sizes = np.column_stack([variances[:, :n].sum(axis=1), variances[:, n:]])
-    return np.asarray(P / np.maximum((sizes * limits).max(axis=1), 1.0)[:, None, None])
+    return np.asarray(P / np.maximum((_sizes(P, n) * limits).max(axis=1), 1.0)[:, None, None])
 
 
 def factors_of(packed: list[Any], q: int) -> Factors:

@@ -90,12 +90,11 @@ class Course:
             with np.errstate(over="ignore", invalid="ignore"):  # of a law that diverged
                 error = measured_force(recording, vehicle, windows) - windows.mean(force / loads)
                 front, rear = loads * clean_rms(error, noise_variance(recording, vehicle, windows))
-            return (
-                AxleRmse(front=front, rear=rear) if np.isfinite([front, rear]).all() else INFINITE
-            )
-        assert recording.axle_force is not None
-        counted = counted_samples(recording, self.min_speed)
-        found = axle_rms(force, counted, recording.axle_force)
+            found = AxleRmse(front=front, rear=rear)
+        else:
+            assert recording.axle_force is not None
+            counted = counted_samples(recording, self.min_speed)
+            found = axle_rms(force, counted, recording.axle_force)
         return found if np.isfinite([found.front, found.rear]).all() else INFINITE
 
     def replays(self, model: TireModel) -> dict[str, AxleRmse]:

@@ -229,10 +229,10 @@ def _by_rows(text: str, indent: str) -> str:
     return f"{indent}{{\n" + ",\n".join(_wrapped(line, f"{indent}    ") for line in lines) + " }"
 
 
-def _wrapped(text: str, indent: str, width: int = 100) -> str:
+def _wrapped(text: str, indent: str) -> str:
     return textwrap.fill(
         text,
-        width,
+        100,
         initial_indent=indent,
         subsequent_indent=indent + "  " * text.startswith("{"),
         break_long_words=False,

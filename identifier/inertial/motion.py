@@ -83,17 +83,13 @@ class Learnt(NamedTuple):
         E[:MOVING, :MOVING] = ca.SX.eye(MOVING)
         rest = MOVING + 2 * n
         for column, name in enumerate(self.names, start=MOVING):
-            if name == "grip":
-                for axle in range(2):
-                    first = MOVING + axle * n
-                    E[first : first + n, column] = curves[axle, :].T
-            elif name in CURVES:
-                axle = CURVES.index(name) % 2
-                first = MOVING + axle * n
-                E[first : first + n, column] = curves[CURVES.index(name), :].T
-            elif name == "compliance":
+            for k, curve in enumerate(CURVES):
+                if curve == name or (name == "grip" and k < 2):
+                    first = MOVING + k % 2 * n
+                    E[first : first + n, column] = curves[k, :].T
+            if name == "compliance":
                 E[rest : rest + 2, column] = compliance
-            else:
+            elif name in SENSORS:
                 E[rest + 2 + SENSORS.index(name), column] = 1
         return E
 

@@ -12,6 +12,7 @@
 """
 
 import math
+from cmath import phase
 from dataclasses import replace
 
 import numpy as np
@@ -85,8 +86,8 @@ def _loop_gain(a: float, law: DrivingError, dt: float) -> float:
     def excess(frequency: float) -> float:
         """Phase above PM - 180°, summed by factors so that it never wraps."""
         first, second, third, zero = factors(frequency)
-        lag = sum(math.atan2(pole.imag, pole.real) for pole in (first, second, third))
-        return math.pi - PHASE_MARGIN - lag + math.atan2(zero.imag, zero.real)
+        lag = phase(first) + phase(second) + phase(third)
+        return math.pi - PHASE_MARGIN - lag + phase(zero)
 
     highest = math.pi / dt * (1.0 - 1e-9)
     crossing = root(excess, 1e-9 * a, highest, xtol=1e-14 * a, rtol=1e-14)

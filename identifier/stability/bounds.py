@@ -18,7 +18,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.paper.laws import DrivingError
-from identifier.stability.lyapunov import sampled_peak_gain
+from identifier.stability.sampled_bound import error_gains
 
 
 def small_gain(
@@ -37,7 +37,7 @@ def small_gain(
     dt : step of explicit Euler [s].
     direction : (2, 2) D [s].
     """
-    peak, size = sampled_peak_gain(A_d, dt), float(np.linalg.norm(direction, 2))
+    peak, size = error_gains(A_d, dt).force, float(np.linalg.norm(direction, 2))
     gain: float = law.z * peak * eta_W * size * n_h / forgetting**2
     return gain
 

@@ -118,9 +118,7 @@ def growth_rate(matrices: ArrayLike, dt: float | None = None) -> Array:
 # the integral law (1/s³ for the instantaneous one) and for eta_V in 1/(U² s⁴) (1/(U² s³)).
 
 
-def worst_gain(
-    *, eta_W: float, eta_V: float, n_h: int, x_bar_max: float = 0.0, W_max: float = 0.0
-) -> float:
+def worst_gain(*, eta_W: float, eta_V: float, n_h: int, x_bar_max: float, W_max: float) -> float:
     """(n_h - 1) η_W + max(η_W, η_V x_bar_max² W_max²): no regressor, no |W| <= W_max exceeds it.
 
     A unit i adds η_W u + η_V |x_bar|² |W_i|² (1 - u)² with u = s_i² in [0, 1], convex in u and in

@@ -20,15 +20,14 @@ class LyapunovError(TireidError, ValueError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LyapunovPair:
-    """P and Q of A_dᵀ P + P A_d = -Q, with the residual found by substitution.
+    """P and Q of A_dᵀ P + P A_d = -Q.
     A_d : (2, 2) error dynamics [1/s].   P : (2, 2) solution [s, for Q without unit].
-    Q : (2, 2) right-hand side [-].   residual : |A_dᵀ P + P A_d + Q| / |Q| [-].
+    Q : (2, 2) right-hand side [-].
     """
 
     A_d: Array
     P: Array
     Q: Array
-    residual: float
 
 
 def lyapunov_residual(A_d: ArrayLike, P: ArrayLike, Q: ArrayLike) -> float:
@@ -52,7 +51,7 @@ def lyapunov(A_d: ArrayLike, Q: ArrayLike) -> LyapunovPair:
     residual = lyapunov_residual(A_d, P, Q)
     if not residual < 1e-9 or not np.linalg.eigvalsh(P)[0] > 0.0:
         raise LyapunovError(f"P = {P.tolist()} leaves a relative residual of {residual:.2e}")
-    return LyapunovPair(A_d=A_d, P=P, Q=Q, residual=residual)
+    return LyapunovPair(A_d=A_d, P=P, Q=Q)
 
 
 def peak_gain(A_d: ArrayLike) -> float:
@@ -82,13 +81,6 @@ def peak_gain(A_d: ArrayLike) -> float:
     early = np.geomspace(min(1e-2 / size, end / 2.0), end, 12)
     total = sum(quad(norm, a, b, epsabs=0.0, epsrel=1e-11)[0] for a, b in pairwise([0.0, *early]))
     return float(repeats * total)
-
-
-def sampled_peak_gain(A_d: ArrayLike, dt: float) -> float:
-    """γ of the Euler step: dt ∑ |(I + dt A_d)^k| [s]; equal to γ for A_d = -a I, a dt <= 1.
-    A_d : (2, 2) error dynamics [1/s], which the step keeps stable.   dt : step [s].
-    """
-    return dt * power_norms(np.eye(2) + dt * np.asarray(A_d), np.eye(2))[1]
 
 
 def power_norms(step: Array, entry: Array) -> tuple[float, float]:

@@ -19,7 +19,6 @@ from identifier.stability.lyapunov import (
     LyapunovError,
     LyapunovPair,
     lyapunov,
-    lyapunov_residual,
     peak_gain,
 )
 from identifier.stability.operation import Operation
@@ -56,7 +55,7 @@ def _canceling_pair(A_d: ArrayLike, *, eta_W: float, rho_W: float) -> LyapunovPa
     Q = -(matrix.T @ P + P @ matrix)
     if not (np.linalg.eigvalsh(P)[0] > 0.0 and np.linalg.eigvalsh(Q)[0] > 0.0):
         raise LyapunovError("A_d is too far from symmetric for P = -(eta/rho) sym(inv(A_d))")
-    return LyapunovPair(A_d=matrix, P=P, Q=Q, residual=lyapunov_residual(matrix, P, Q))
+    return LyapunovPair(A_d=matrix, P=P, Q=Q)
 
 
 def _bound_14(pair: LyapunovPair, *, w_bar: float, k_b: float) -> float:

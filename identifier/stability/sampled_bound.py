@@ -52,7 +52,8 @@ class SampledBounds:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorGains:
     """How large an error what acts on it can hold.
-    start : τ, largest growth of an error that is left alone [-].   force : γ of a force [s].
+    start : τ, largest growth of an error that is left alone [-].   force : γ of a force [s], that
+        of `peak_gain` for A_d = -a I, a dt <= 1.
     """
 
     start: float

@@ -165,7 +165,7 @@ def _evaluated(
     model: TireModel, recording: Recording, *, taught: bool, frozen: int | None = None
 ) -> _Evaluated | None:
     """Return what is judged; None where too little is driven."""
-    part = portion(recording) if frozen is None else portion(recording, frozen)
+    part = portion(recording, frozen)
     model = model.held_on(recording, part)
     found = evidence(model, part.recording, road_push(part.recording, model))
     if taught and found is not None:

@@ -108,11 +108,13 @@ def bicycle(car, t, v_x, delta, push, lag=None, fine=5):
     return v_y, r, np.column_stack(force)
 
 
-def steered(seed, duration, *, amplitude=0.08, onset=1.0, speed=20.0, car=None, **road):
+def steered(
+    seed, duration, *, amplitude=0.08, frequency=0.5, onset=1.0, speed=20.0, car=None, **road
+):
     """A run of the plant of a car, the sedan, that is steered at random."""
     maneuver = RandomSteer(
         amplitude=amplitude,
-        frequency=0.5,
+        frequency=frequency,
         seed=seed,
         onset=onset,
         rate_limit=1.0,

@@ -10,13 +10,9 @@ from identifier.paper.laws import LAWS
 from identifier.stability.bounds import steady_capacity
 from identifier.stability.loop import direction_matrix
 from identifier.stability.margins import phase_margin
-from identifier.stability.operation import Operation, proven_bounds, worst_loop
+from identifier.stability.operation import proven_bounds, worst_loop
 from identifier.stability.sampled_bound import Disturbance
-
-KNOWN = Operation(
-    n_h=10, dt=0.01, bandwidth=0.7, disturbance=Disturbance(residual=4.0), needed_force=4.0,
-    x_bar_max=2.5, input_feedback=None, V_start=12.0,
-)  # fmt: skip
+from tests.identifier.stability.test_certificate import CITY as KNOWN
 
 
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)

@@ -56,7 +56,7 @@ def waves():
     return Recording(name="waves", t=T, **wave)
 
 
-@pytest.mark.parametrize("fault", ALL, ids=str)
+@pytest.mark.parametrize("fault", ALL, ids=lambda fault: type(fault).__name__)
 def test_a_fault_is_pure_leaves_the_truth_and_changes_what_is_logged(drive, fault):
     before = {name: getattr(drive, name).copy() for name in CHANNELS}
     once, again = fault.apply(drive), fault.apply(drive)

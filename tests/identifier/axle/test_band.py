@@ -50,10 +50,10 @@ def a_model(run):
     return calibrated(run)
 
 
-def coverage(model, recording, level=0.9):
+def coverage(model, recording):
     """Share of samples whose true force lies in the band around the replayed one (2,)."""
     slip, loads = model.lagged_slip(recording), recording.axle_force
-    half = np.column_stack([model.band.half(slip[:, i], level)[:, i] for i in range(2)])
+    half = np.column_stack([model.band.half(slip[:, i], 0.9)[:, i] for i in range(2)])
     inside = np.abs(model.predict(recording) - loads) <= half
     return inside[recording.t > 1.5].mean(axis=0)
 

@@ -8,9 +8,9 @@ import pytest
 
 from benchmarks.faults import Bank
 from identifier.axle import AxleIdentifier
-from identifier.prediction import predict
 from identifier.run import OnlineIdentifier, identify
 from models.vehicle import GRAVITY
+from tests.identifier import conftest
 
 ROLL = 0.05  # rad per g, of the body that carries the sensor
 
@@ -28,13 +28,9 @@ def slalom(car, drive):
     return replace(level, a_y=felt + 0.3 * rng.standard_normal(len(level)), **noisy)
 
 
-def missed(car, log, judged=None):
+def missed(car, log):
     """Error of the frozen force of the worse axle [% of its rms value]."""
-    judged = log if judged is None else judged
-    model = identify(log, car, AxleIdentifier.for_vehicle(car)).freeze()
-    told = predict(model, judged)
-    wrong, size = told.against_truth, told.true_force
-    return 100.0 * max(wrong.front / size.front, wrong.rear / size.rear)
+    return 100.0 * conftest.missed(conftest.learnt(log, car), log).max()
 
 
 @pytest.mark.parametrize(

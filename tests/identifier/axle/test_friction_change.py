@@ -7,33 +7,34 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from benchmarks.random_cars import good_sensors
 from identifier.axle import AxleIdentifier
 from identifier.axle.car import larger, smaller, within
 from identifier.axle.learning import RoadChange, RoadState, believed, evidence
 from identifier.run import identify
 from models.faults import SensorFault
-from models.sensors import Sensor, Sensors
 from models.vehicle import sedan
 from tests.identifier.conftest import steered
 
 DT, RATE = 0.01, 30.0  # s, loads/s
-NOISE = Sensors(
-    v_x=Sensor(noise=0.03), v_y=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4)
-)
+NOISE = good_sensors(sedan())
 STARTS, LASTS, AGAIN = 14.0, 2.0, 3.0  # s
 
 
-def collected(e, *, g=(0.3, 0.2), seconds=2.0, holds=(1, 1), learns=1, state=None, rule=None):
+def collected(e, *, g=(0.3, 0.2), seconds=2.0, rule=None):
     """Evidence of errors e [loads] that last, with a variance of 0.03 squared."""
     numbers = (rule or RoadChange()).at(DT, RATE)
-    state = RoadState(0.0, 0.0, 0.0, 0.0) if state is None else state
-    V = ca.DM([0.03**2, 0.03**2])
+    state, V = RoadState(0.0, 0.0, 0.0, 0.0), 0.03**2
     for _ in range(round(seconds / DT)):
-        found = evidence(
-            numbers, state, 0.0, g=ca.DM(g), e=ca.DM(e), V=V, holds=ca.DM(holds), learns=learns
-        )
-        state = RoadState(*np.array(found).ravel())
+        state = RoadState(*followed(numbers, state, 0.0, g, e, V))
     return state
+
+
+def followed(numbers, state, change, g=(0.0, 0.0), e=(0.0, 0.0), V=1.0):
+    """The evidence after a sample that tells errors e."""
+    one = ca.DM.ones(2)
+    found = evidence(numbers, state, change, g=ca.DM(g), e=ca.DM(e), V=V * one, holds=one, learns=1)
+    return np.array(found).ravel()
 
 
 def change_of(state, rule=None):
@@ -61,19 +62,14 @@ def test_a_change_is_believed_where_it_explains_both_axles_and_not_where_one_con
 def test_evidence_is_that_of_about_a_second_and_gone_once_it_is_believed():
     assert collected([-0.1, -0.1], seconds=9.0).A < 1.6 * collected([-0.1, -0.1], seconds=1.0).A
     numbers, state = RoadChange().at(DT, RATE), collected([-0.1, -0.1])
-    none = ca.DM([0.0, 0.0])
-    V = ca.DM([1.0, 1.0])
-    after = evidence(numbers, state, -0.2, g=none, e=none, V=V, holds=ca.DM([1, 1]), learns=1)
-    np.testing.assert_allclose(np.array(after).ravel(), [0.0, 0.0, 0.0, -0.2])
+    np.testing.assert_allclose(followed(numbers, state, -0.2), [0.0, 0.0, 0.0, -0.2])
 
 
 def test_a_step_that_the_limit_of_a_sample_cuts_goes_on_with_the_errors_that_are_left():
     numbers, state = RoadChange().at(0.002, RATE), collected([-0.1, -0.08])
     change = float(believed(numbers, state)[0])
     assert change == pytest.approx(-0.06)  # 30 loads/s over 2 ms
-    none, V = ca.DM([0.0, 0.0]), ca.DM([1.0, 1.0])
-    after = evidence(numbers, state, change, g=none, e=none, V=V, holds=ca.DM([1, 1]), learns=1)
-    A, b, E, ln_friction = np.array(after).ravel()
+    A, b, E, ln_friction = followed(numbers, state, change)
     w = state.A / (0.3**2 + 0.2**2)  # the errors that remain, summed up by hand
     left = np.array([-0.1, -0.08]) - change * np.array([0.3, 0.2])
     expected = w * np.array([0.3**2 + 0.2**2, left @ [0.3, 0.2], left @ left])

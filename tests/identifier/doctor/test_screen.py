@@ -33,10 +33,11 @@ from identifier.doctor.readings import (
 from identifier.doctor.samples import sample_findings
 from identifier.doctor.screen import _unlike, screen, steering_finding
 from models.faults import SensorFault
-from models.maneuvers import RandomSteer, SampledSteer
+from models.maneuvers import SampledSteer
 from models.plant import Plant
 from models.recordings import joined, read_recording, runs
 from models.vehicle import sedan
+from tests.identifier.conftest import steered
 from tireid.driving.learn import sample_recording
 
 DEGREES = 180.0 / np.pi
@@ -268,9 +269,9 @@ def test_numbers_that_rounding_makes_alike_are_no_lost_samples(one):
     assert held.code == "held"
 
 
-def steered_by_hand(lost, *, ratio=16.0, step=0.1):
+def steered_by_hand(lost):
     """A sedan's drive, its wheel told in steps of 0.1 degrees by another clock, and held still."""
-    rng = np.random.default_rng(7)
+    rng, ratio, step = np.random.default_rng(7), 16.0, 0.1
     t = np.arange(0.0, 60.0, 0.1)
     swings = 0.05 * np.sin(0.9 * t) * np.maximum(np.sin(0.21 * t) - 0.1, 0.0)
     steering = SampledSteer(times=tuple(t), angles=tuple(swings), rate_limit=1.0, duration=60.0)
@@ -313,22 +314,18 @@ def test_a_slow_sampling_interval_is_a_clock_in_ms_and_nothing_else_is_asked(one
 def test_smooth_drives_without_noise_are_left_alone():
     """Of a simulator: channels that rest before the corners, no noise, a constant speed."""
     for seed in range(2):
-        steering = RandomSteer(
-            amplitude=0.06, frequency=0.6, seed=seed, onset=5.0, rate_limit=0.8, duration=24.0
-        )
-        log = Plant(sedan()).simulate(steering, speed=20.0, name="smooth").recording()
+        log = steered(seed, 24.0, amplitude=0.06, frequency=0.6, onset=5.0).recording()
         assert screen(log, sedan()).findings == ()
 
 
-def test_gaps_are_no_jumps_and_of_a_long_log_some_pieces_are_looked_at(one):
+def test_gaps_are_no_jumps_and_of_a_long_log_some_pieces_are_looked_at(one, long):
     car, log = one
     late = replace(log, t=log.t + 100.0)
     two = joined([log, late])
     assert screen(two, car).findings == ()
-    long = joined([replace(log, t=log.t + 100.0 * k) for k in range(20)])
-    pieces = looked_at(long)
+    pieces = looked_at(long[1])
     assert sum(one.duration for one in pieces) <= PIECE * PIECES
-    assert screen(long, car).findings == ()
+    assert screen(long[1], car).findings == ()
 
 
 def test_the_right_reading_leaves_least_and_a_standing_car_is_no_motion(one):

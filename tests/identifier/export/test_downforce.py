@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.export.compiled import CompiledPackage, samples_of
+from identifier.export.compiled import samples_of
 from identifier.export.onnx import onnx_bytes
-from identifier.export.package import build_package, run_in_virtual_machine
+from identifier.export.package import build_package
 from identifier.methods import make_method
 from identifier.run import identify
 from models.vehicle import sedan
+from tests.identifier.export.test_bit_for_bit import assert_the_bits_of_casadi
 
 RACER = replace(sedan(), downforce_area_front=1.5, downforce_area_rear=-0.4)
 AXLE = make_method("axle", RACER)
@@ -31,12 +32,7 @@ def rows(slalom, package):
 
 
 def test_c_computes_the_bits_of_casadi(package, rows):
-    told, state = run_in_virtual_machine(package.specialized, rows)
-    run = CompiledPackage.of(package, single=False)
-    shipped = run.run_samples(rows)
-    np.testing.assert_array_equal(np.column_stack(list(shipped.outputs.values())), told)
-    for name, value in run.weights.items():
-        np.testing.assert_array_equal(value, state[name].reshape(value.shape))
+    assert_the_bits_of_casadi(package, rows)
 
 
 def test_onnx_has_the_curves_of_the_static_loads_and_says_so(slalom):

@@ -70,9 +70,6 @@ class Master:
     def set(self, values):
         (self.fmu.setReal if self.two else self.fmu.setFloat64)(INPUTS, values)
 
-    def adapt(self, on):
-        self.fmu.setBoolean([ADAPTATION], [on])
-
     def step(self, t, h):
         self.fmu.doStep(t, h)
 
@@ -241,7 +238,7 @@ def test_instances_do_not_disturb_each_other(master):
 def test_without_adaptation_it_is_the_frozen_model(master):
     drive, one = swaying(600), master()
     one.run(rows(drive)[:400], 0.01)
-    one.adapt(False)
+    one.fmu.setBoolean([ADAPTATION], [False])
     forces = one.run(rows(drive)[400:], 0.01, first=400)
     history = identify(drive, CAR, design())
     frozen = history.freeze(drive.t[400]).predict(drive)[400:]

@@ -10,6 +10,7 @@ from identifier.export.package import run_in_virtual_machine
 from identifier.export.specialize import specialize
 from identifier.methods import make_method
 from models.vehicle import sedan
+from tests.identifier.export.test_fmu import Master
 from tests.kept import Kept
 from tests.rivals import needs_rivals
 
@@ -19,7 +20,7 @@ if not binaries.targets():
 
 CAR = sedan()
 TOLD = ("v_y_estimate", "v_y_sd", "side_slip_observable")
-REFERENCES = {"v_x": 1, "v_y": 2, "r": 3, "delta_f": 4, "delta_r": 5, "a_y": 13}
+REFERENCES = (1, 2, 3, 4, 5, 13)  # of v_x, v_y, r, delta_f, delta_r, a_y
 
 
 @pytest.fixture(scope="module")
@@ -41,33 +42,21 @@ def paths(step, tmp_path_factory):
     return Kept(make)
 
 
-def set_inputs(slave, values):
-    put = getattr(slave, "setFloat64", None) or slave.setReal
-    put([REFERENCES[name] for name in values], list(values.values()))
-
-
 @pytest.mark.parametrize("version", [2, 3])
-def test_what_is_told_is_to_the_last_bit_what_the_step_tells(paths, version, step, slalom):
+def test_what_is_told_is_to_the_last_bit_what_the_step_tells(
+    paths, version, step, slalom, tmp_path
+):
     """With holes in a_y, a v_y that comes and goes, and samples that are refused."""
     rows = samples_of(slalom, [port.name for port in step.inputs])[:600]
     rows[:300, 1], rows[400:450, 1], rows[450:, 1] = np.nan, 1e9, np.nan
     rows[200:260, 5], rows[350:360, 2], rows[500:560, 0] = np.nan, np.nan, np.inf
     expected, _ = run_in_virtual_machine(step, rows)
-    about = fmpy.read_model_description(str(paths[version]))
-    kind = fmpy.fmi2.FMU2Slave if version == 2 else fmpy.fmi3.FMU3Slave
-    slave = kind(
-        guid=about.guid,
-        unzipDirectory=fmpy.extract(str(paths[version])),
-        modelIdentifier="tireid",
-        instanceName="one",
-    )
-    slave.instantiate()
-    slave.enterInitializationMode()
-    slave.exitInitializationMode()
+    slave = Master(paths[version], tmp_path).fmu
     read = slave.getReal if version == 2 else slave.getFloat64
+    put = slave.setReal if version == 2 else slave.setFloat64
     told = np.empty_like(expected)
     for k, row in enumerate(rows):
-        set_inputs(slave, dict(zip(REFERENCES, row, strict=True)))
+        put(REFERENCES, row)
         slave.doStep(0.01 * k, 0.01)
         told[k] = [*read([6, 7, 14, 15]), *slave.getBoolean([16])]
     assert read([13]) == [rows[-1, 5]]

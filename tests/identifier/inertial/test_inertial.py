@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.random_cars import good_sensors
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.estimate.fit import fit
 from identifier.inertial import InertialIdentifier
@@ -12,15 +13,13 @@ from identifier.methods import continuing, make_method
 from identifier.run import identify, learn
 from models.friction import Friction, FrictionChange
 from models.recordings import RecordingError
-from models.sensors import Sensor, Sensors
+from models.sensors import Sensor
 from models.vehicle import GRAVITY, Vehicle, sedan
 from tests.identifier.conftest import missed, steered
 
 CAR = sedan()
 METHOD = InertialIdentifier.for_vehicle(CAR)
-NOISE = Sensors(
-    v_x=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4), v_y=Sensor(noise=0.0)
-)
+NOISE = replace(good_sensors(CAR), v_y=Sensor())
 
 
 def drive_of(seed=3, bank=0.0, friction=None, duration=40.0):
@@ -29,10 +28,10 @@ def drive_of(seed=3, bank=0.0, friction=None, duration=40.0):
     )
 
 
-def as_shown(run, seed=1, bias=0.1):
+def as_shown(run):
     """What a body-fixed accelerometer and noisy sensors show; v_y is left out."""
-    rng, exact = np.random.default_rng(seed), run.recording()
-    felt = exact.a_y + GRAVITY * np.sin(run.roll) + bias + 0.15 * rng.normal(size=len(exact))
+    rng, exact = np.random.default_rng(1), run.recording()
+    felt = exact.a_y + GRAVITY * np.sin(run.roll) + 0.1 + 0.15 * rng.normal(size=len(exact))
     shown = NOISE.apply(exact, rng)
     return replace(shown, a_y=felt, v_y=np.zeros(len(exact)), axle_force=None)
 
@@ -65,8 +64,8 @@ def alarms(history):
     return fast > METHOD.trust.alarm
 
 
-def degrees(error, speed=20.0):
-    return float(np.degrees(np.sqrt(np.mean(error**2)) / speed))
+def degrees(error):
+    return float(np.degrees(np.sqrt(np.mean(error**2)) / 20.0))
 
 
 def test_side_slip_is_told_on_a_banked_road_with_an_honest_deviation(history, banked):

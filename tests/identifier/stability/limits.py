@@ -6,8 +6,6 @@ Explicit Euler: the same with s = (w - 1)/T (Jury).   g = λ_max(G), l = leakage
 
 import math
 
-from models.rules import require_positive
-
 
 def integral_limit(a: float, lam: float, leakage: float = 0.0) -> float:
     """G below which the integral law is stable: a (l + a)(l + λ)(a + λ); l = 0: a² λ (a + λ).
@@ -18,7 +16,6 @@ def integral_limit(a: float, lam: float, leakage: float = 0.0) -> float:
     lam : forgetting factor λ [1/s].
     leakage : l [1/s].
     """
-    require_positive(ValueError, a=a, lam=lam)
     return a * (leakage + a) * (leakage + lam) * (a + lam)
 
 
@@ -31,7 +28,6 @@ def critical_frequency(a: float, lam: float, leakage: float = 0.0) -> float:
     lam : forgetting factor λ [1/s].
     leakage : l [1/s].
     """
-    require_positive(ValueError, a=a, lam=lam)
     return math.sqrt(leakage * a + leakage * lam + a * lam)
 
 
@@ -50,15 +46,7 @@ def integral_euler_limit(a: float, lam: float, dt: float, leakage: float = 0.0) 
     lam : forgetting factor λ [1/s].
     dt : step T [s].
     leakage : l [1/s].
-
-    Raises
-    ------
-    ValueError
-        If a pole alone leaves the unit circle (a dt, λ dt or l dt not below 2).
     """
-    require_positive(ValueError, a=a, lam=lam, dt=dt)
-    if not max(a, lam, leakage) * dt < 2.0:
-        raise ValueError(f"a dt, lam dt and l dt must be below 2: {a * dt}, {lam * dt}")
     al, be, ga = 1.0 - a * dt, 1.0 - lam * dt, 1.0 - leakage * dt
     total, pairs = al + be + ga, al * be + al * ga + be * ga
     pair_on_circle = al * be * ga + (-total + math.sqrt(total**2 - 4.0 * pairs + 4.0)) / 2.0
@@ -77,7 +65,6 @@ def instantaneous_damping(a: float, g: float, leakage: float = 0.0) -> float:
     g : loop gain λ_max(G).
     leakage : l [1/s].
     """
-    require_positive(ValueError, a=a, g=g)
     return (a + leakage) / (2.0 * math.sqrt(a * leakage + g / a))
 
 
@@ -92,7 +79,4 @@ def instantaneous_euler_limit(a: float, dt: float, leakage: float = 0.0) -> floa
     dt : step T [s].
     leakage : l [1/s].
     """
-    require_positive(ValueError, a=a, dt=dt)
-    if not max(a, leakage) * dt < 2.0:
-        raise ValueError(f"a dt and l dt must be below 2: {a * dt}, {leakage * dt}")
     return a * (a + leakage - a * leakage * dt) / dt

@@ -16,9 +16,10 @@ SKEWED = np.array([[-4.0, 6.0], [-0.5, -3.0]])
 LEAD = 0.75  # s: along P positive real from 0.735 on
 
 
-def weight_error_after(a, lam, eta, frequency, law=INTEGRAL, duration=400.0, dt=2e-3):
+def weight_error_after(a, lam, eta, frequency, law=INTEGRAL):
     """|W_t| of one weight under a regressor s = sin(frequency t), from 1, no residual."""
-    s = np.sin(frequency * np.arange(round(duration / dt)) * dt)
+    dt = 2e-3
+    s = np.sin(frequency * dt * np.arange(200_000))
     error, z, weight = 0.0, 0.0, 1.0
     for regressor in s.tolist():
         drive = law.drive(z, error)
@@ -56,12 +57,6 @@ def test_for_skewed_error_dynamics_only_the_lyapunov_direction_is_positive_real(
     law = DrivingError(1.0, LEAD)
     assert drift_frequency(A_d=SKEWED, forgetting=3.0, law=law) < 1e4
     assert drift_frequency(A_d=SKEWED, forgetting=3.0, law=law, direction=pair.P) == np.inf
-
-
-def test_the_lead_removes_the_gain_limit_that_the_integral_law_has():
-    for law, limited in ((INTEGRAL, True), (DrivingError(1.0, 0.25), False)):
-        loop = Loop(A_d=-4.0 * np.eye(2), forgetting=3.0, law=law, G=np.eye(2))
-        assert np.isfinite(gain_margin(loop).factor) is np.bool_(limited)
 
 
 def test_with_skewed_error_dynamics_the_printed_direction_has_a_limit_even_with_lead():

@@ -10,8 +10,7 @@ CAR = {"m": 1500.0, "I_z": 2500.0, "l_f": 1.15, "l_r": 1.55}
 STIFFNESS = (127700.0, 106000.0)
 
 
-def saturated_car_feedback(v_x):
-    return estimated_input_feedback(**CAR, stiffness_lost=STIFFNESS, v_x=v_x)
+SATURATED = estimated_input_feedback(**CAR, stiffness_lost=STIFFNESS, v_x=20.0)
 
 
 def test_the_feedback_is_the_jacobian_of_what_the_linear_tire_misses():
@@ -35,16 +34,14 @@ def test_the_coupling_is_symmetric_and_positive_so_that_the_decay_it_takes_is_a_
     N = estimated_input_feedback(**CAR, stiffness_lost=(1.0, 1.0), v_x=1.0)
     np.testing.assert_allclose(N, N.T)
     assert np.linalg.eigvalsh(N)[0] > 0.0
-    feedback = saturated_car_feedback(20.0)
-    assert np.abs(np.linalg.eigvals(feedback).imag).max() == 0.0
-    assert 5.0 < np.linalg.eigvals(feedback).real.max() < 12.0
+    assert np.abs(np.linalg.eigvals(SATURATED).imag).max() == 0.0
+    assert 5.0 < np.linalg.eigvals(SATURATED).real.max() < 12.0
 
 
 def test_below_the_decay_that_it_takes_no_learning_rate_saves_the_loop_that_reads_the_estimate():
-    feedback = saturated_car_feedback(20.0)
-    least = np.linalg.eigvals(feedback).real.max()
+    least = np.linalg.eigvals(SATURATED).real.max()
     for a, stable in ((0.95 * least, False), (1.3 * least, True)):
         loop = Loop(
-            A_d=-a * np.eye(2), forgetting=a, law=INTEGRAL, G=np.eye(2), input_feedback=feedback
+            A_d=-a * np.eye(2), forgetting=a, law=INTEGRAL, G=np.eye(2), input_feedback=SATURATED
         )
         assert (gain_margin(loop).factor > 0.0) is stable

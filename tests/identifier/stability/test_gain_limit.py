@@ -27,7 +27,7 @@ def random_cases(n, seed):
 @pytest.mark.parametrize(
     ("law", "dt", "limit_of"),
     [
-        (INTEGRAL, None, lambda a, lam, leakage: integral_limit(a, lam, leakage)),
+        (INTEGRAL, None, integral_limit),
         (INTEGRAL, 0.01, lambda a, lam, leakage: integral_euler_limit(a, lam, 0.01, leakage)),
         (INSTANTANEOUS, 0.01, lambda a, _, leakage: instantaneous_euler_limit(a, 0.01, leakage)),
     ],
@@ -43,7 +43,6 @@ def test_the_limits_of_the_formulas_are_where_eigenvalues_leave_stability(law, d
         for share, stable in ((0.999, True), (1.001, False)):
             loop = scalar(a, lam, share * limit, leakage, law)
             assert (growth_rate(loop.matrix(), dt) < 0.0) is np.bool_(stable)
-    assert instantaneous_euler_limit(3.0, 0.01) == pytest.approx(900.0)
 
 
 def test_the_euler_limit_holds_for_steps_so_long_that_a_real_root_leaves_first():
@@ -53,23 +52,9 @@ def test_the_euler_limit_holds_for_steps_so_long_that_a_real_root_leaves_first()
     assert gain_margin(scalar(a, lam, limit, 1.8), dt).factor == pytest.approx(1.0, rel=1e-6)
 
 
-def test_at_ten_milliseconds_euler_costs_a_part_of_the_limit():
-    for a in (5.0, 10.0, 15.0):
-        ratio = integral_euler_limit(a, a, 0.01) / integral_limit(a, a)
-        assert 0.6 < ratio < 0.9
-
-
 def test_the_instantaneous_law_is_damped_as_the_formula_says_and_has_no_limit():
     for a, _, leakage in random_cases(20, 3):
         g = 7.0 * a**3
         loop = scalar(a, 4.0, g, leakage, INSTANTANEOUS)
         assert _worst_damping(loop) == pytest.approx(instantaneous_damping(a, g, leakage), rel=1e-9)
         assert gain_margin(loop).factor == np.inf
-
-
-@pytest.mark.parametrize("bad", [0.0, -1.0, np.nan, np.inf])
-def test_rates_that_are_not_positive_are_refused(bad):
-    with pytest.raises(ValueError, match="a must be positive"):
-        integral_limit(bad, 1.0)
-    with pytest.raises(ValueError, match="below 2"):
-        integral_euler_limit(250.0, 1.0, 0.01)

@@ -16,7 +16,7 @@ from identifier.stability.loop import (
 A_D = np.array([[-6.0, 2.5], [-0.7, -4.0]])
 
 
-def frozen_identifier(law, leakage_rate, feedback):
+def frozen_identifier(law, feedback):
     """The identifier's own laws at an equilibrium of f_hat, differentiated by CasADi.
 
     Returns the (6, 6) Jacobian of (ξ̃, z, p)' with p = f_hat(x_bar frozen), and the G it must show.
@@ -51,7 +51,7 @@ def frozen_identifier(law, leakage_rate, feedback):
     filter_jacobian = ca.Function("F", [state], [ca.jacobian(filter_rate(3.0, z, xi_tilde), state)])
     top = np.hstack([A_D + feedback, np.zeros((2, 2)), -np.eye(2)])
     middle = np.hstack([np.array(filter_jacobian(np.zeros(4))), np.zeros((2, 2))])
-    bottom = np.hstack([learning, -leakage_rate * np.eye(2)])
+    bottom = np.hstack([learning, -0.4 * np.eye(2)])
     s = np.tanh(V @ x_bar)
     slope = W * (1.0 - s**2)
     G = eta_W * (s @ s) * np.eye(2) + eta_V * (x_bar @ x_bar) * slope @ slope.T
@@ -61,7 +61,7 @@ def frozen_identifier(law, leakage_rate, feedback):
 @pytest.mark.parametrize("law", LAWS.values())
 def test_the_loop_matrix_is_the_jacobian_of_the_laws_of_the_identifier(law):
     feedback = np.array([[0.3, -0.1], [0.2, 0.5]])
-    jacobian, G = frozen_identifier(law, 0.4, feedback)
+    jacobian, G = frozen_identifier(law, feedback)
     loop = Loop(
         A_d=A_D, forgetting=3.0, law=law.error(0.3), G=G, leakage=0.4, input_feedback=feedback
     )
@@ -69,7 +69,7 @@ def test_the_loop_matrix_is_the_jacobian_of_the_laws_of_the_identifier(law):
 
 
 def test_a_transpose_forgotten_in_the_gradient_would_be_seen():
-    jacobian, G = frozen_identifier(LAWS["integral"], 0.4, np.zeros((2, 2)))
+    jacobian, G = frozen_identifier(LAWS["integral"], np.zeros((2, 2)))
     loop = Loop(A_d=A_D, forgetting=3.0, law=INTEGRAL, G=G, leakage=0.4)
     wrong = loop.matrix()
     wrong[4:, 2:4] = -G @ np.linalg.inv(A_D)

@@ -5,12 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.driving import natural_driving
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import LAWS, DrivingError, Gains
 from identifier.stability import certify
-from identifier.stability.loop import INTEGRAL, direction_matrix
-from identifier.stability.operation import proven_bounds
+from identifier.stability.loop import INTEGRAL
 from identifier.stability.sampled_bound import (
     Disturbance,
     by_leakage,
@@ -20,19 +18,11 @@ from identifier.stability.sampled_bound import (
 from models.vehicle import sedan
 
 CAR = sedan()
-DRIVING = natural_driving(CAR)
 SKEWED = np.array([[-6.0, 4.0], [-1.0, -9.0]])
 
 
 def judged(design):
     return certify(design.gains, LAWS[design.law], design.operation(CAR))
-
-
-def bounds_of(design, driving=None):
-    law = LAWS[design.law]
-    D = direction_matrix(law, design.gains.matrix)
-    task = design.operation(CAR, driving)
-    return proven_bounds(design.gains, law.error(design.gains.lead), task, D)
 
 
 @pytest.mark.parametrize("A_d", [-6.0 * np.eye(2), SKEWED])

@@ -20,23 +20,23 @@ SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])
 NUMBERS = {"W_M": 1.5, "n_h": 6, "eta_W": 3.0, "rho_W": 0.8}
 
 
-def lyapunov_rate(pair, xi_tilde, W_t, W, s, w, eta, rho):
+def lyapunov_rate(pair, xi_tilde, W_t, W, s, w):
     """L' of the instantaneous law, term by term as the equations are written."""
     W_hat, A_d, P = W - W_t, pair.A_d, pair.P
     xi_dot = A_d @ xi_tilde + W_t @ s + w
-    W_hat_dot = -eta * np.outer(np.linalg.solve(A_d.T, xi_tilde), s)
-    W_hat_dot = W_hat_dot - rho * np.linalg.norm(xi_tilde) * W_hat
-    return xi_tilde @ P @ xi_dot + np.sum(W_t * -W_hat_dot) / rho
+    W_hat_dot = -3.0 * np.outer(np.linalg.solve(A_d.T, xi_tilde), s)
+    W_hat_dot = W_hat_dot - 0.8 * np.linalg.norm(xi_tilde) * W_hat
+    return xi_tilde @ P @ xi_dot + np.sum(W_t * -W_hat_dot) / 0.8
 
 
-def random_states(pair, n, seed, w_bar=0.4):
+def random_states(n, seed):
     rng = np.random.default_rng(seed)
     for _ in range(n):
         s = rng.uniform(-1, 1, NUMBERS["n_h"])
         W = rng.standard_normal((2, NUMBERS["n_h"]))
         W *= NUMBERS["W_M"] / np.linalg.norm(W)
         w = rng.standard_normal(2)
-        w *= w_bar / np.linalg.norm(w)
+        w *= 0.4 / np.linalg.norm(w)
         W_t = rng.standard_normal((2, NUMBERS["n_h"])) * rng.uniform(0, 2)
         yield rng.standard_normal(2), W_t, W, s, w
 
@@ -46,9 +46,9 @@ def test_the_lyapunov_function_falls_wherever_the_error_is_beyond_the_bound(k_b_
     pair = lyapunov(SKEWED, np.eye(2))
     k_b = k_b_of(pair, **NUMBERS)
     b = _bound_14(pair, w_bar=0.4, k_b=k_b)
-    for xi_tilde, W_t, W, s, w in random_states(pair, 400, 1):
+    for xi_tilde, W_t, W, s, w in random_states(400, 1):
         beyond = 1.0001 * b * xi_tilde / np.linalg.norm(xi_tilde)
-        assert lyapunov_rate(pair, beyond, W_t, W, s, w, 3.0, 0.8) < 0.0
+        assert lyapunov_rate(pair, beyond, W_t, W, s, w) < 0.0
 
 
 def test_the_quadratic_in_the_weight_error_bounds_the_rate_and_a_wrong_sign_does_not():
@@ -61,9 +61,9 @@ def test_the_quadratic_in_the_weight_error_bounds_the_rate_and_a_wrong_sign_does
         return xi_tilde @ matrix @ W_t @ s
 
     worst = 0.0
-    for xi_tilde, W_t, W, s, w in random_states(pair, 200, 2):
+    for xi_tilde, W_t, W, s, w in random_states(200, 2):
         size, y = np.linalg.norm(xi_tilde), np.linalg.norm(W_t)
-        rate = lyapunov_rate(pair, xi_tilde, W_t, W, s, w, 3.0, 0.8)
+        rate = lyapunov_rate(pair, xi_tilde, W_t, W, s, w)
         k_b = _tight_k_b(pair, **NUMBERS)
         assert rate <= size * (-q * size / 2 + P * 0.4 + 2 * k_b * y - y**2) + 1e-9
         rest = -xi_tilde @ pair.Q @ xi_tilde / 2 + xi_tilde @ pair.P @ w

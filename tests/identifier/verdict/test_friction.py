@@ -5,29 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.random_cars import good_sensors
 from identifier.axle import AxleIdentifier
 from identifier.prediction import predict
 from identifier.run import identify
 from identifier.verdict import calibrated, judge_prediction, road_friction
 from identifier.verdict.friction import _mixed, filtered
 from models.friction import Friction, FrictionChange
-from models.maneuvers import RandomSteer
-from models.plant import Plant
-from models.sensors import Sensor, Sensors
 from models.vehicle import sedan
+from tests.identifier.conftest import steered
 
-SENSORS = Sensors(
-    v_x=Sensor(noise=0.03), v_y=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4)
-)
+SENSORS = good_sensors(sedan())
 DROP = 10.0  # s
 
 
-def driven(seed, friction=None, amplitude=0.06):
-    steering = RandomSteer(
-        amplitude=amplitude, frequency=0.6, seed=seed, onset=1.0, rate_limit=0.8, duration=24.0
-    )
-    run = Plant(sedan()).simulate(steering, speed=20.0, friction=friction)
-    return SENSORS.apply(run.recording(), np.random.default_rng(seed))
+def driven(seed, friction=None, amplitude=0.06, **road):
+    run = steered(seed, 24.0, amplitude=amplitude, frequency=0.6, friction=friction, **road)
+    return run.recording(SENSORS, np.random.default_rng(seed))
 
 
 def taught(log):
@@ -81,14 +75,8 @@ def test_another_zero_of_the_steering_is_no_other_road(tires, same, off):
 
 
 def test_a_banked_road_is_taken_off_and_the_verdict_tells_the_same(tires):
-    steering = RandomSteer(
-        amplitude=0.05, frequency=0.6, seed=5, onset=1.0, rate_limit=0.8, duration=24.0
-    )
     wet = Friction(changes=(FrictionChange(scale=0.5, at_time=DROP),))
-    run = Plant(sedan()).simulate(
-        steering, speed=20.0, friction=wet, bank=lambda t: np.full(t.size, 0.03)
-    )
-    prediction = predict(tires, SENSORS.apply(run.recording(), np.random.default_rng(5)))
+    prediction = predict(tires, driven(5, wet, 0.05, bank=lambda t: np.full(t.size, 0.03)))
     (road,) = prediction.friction().roads
     assert DROP < road.first < DROP + 5.0 and abs(road.ratio - 0.5) < 2.0 * road.sd
     assert road.text in [one.text for one in prediction.verdict.findings]

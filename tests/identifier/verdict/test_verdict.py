@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import identifier.verdict
+from benchmarks.random_cars import good_sensors
 from identifier.estimate.method import FitMethod
 from identifier.evidence import brisk_windows, clean_rms, measured_force
 from identifier.measured import NOT_IDENTIFIABLE
@@ -18,24 +19,19 @@ from identifier.run import identify
 from identifier.tire_model import GRIP, STIFFNESS
 from identifier.verdict import calibrated, judge, judge_prediction
 from models.friction import Friction, FrictionChange
-from models.maneuvers import RandomSteer, Slalom, StepSteer
+from models.maneuvers import Slalom, StepSteer
 from models.plant import Plant
-from models.sensors import Sensor, Sensors
 from models.vehicle import sedan
+from tests.identifier.conftest import missed, steered
 
-SENSORS = Sensors(
-    v_x=Sensor(noise=0.03), v_y=Sensor(noise=0.03), r=Sensor(noise=0.003), delta=Sensor(noise=5e-4)
-)
+SENSORS = good_sensors(sedan())
 ONSET = 4.0  # s
 
 
 @pytest.fixture(scope="module")
 def whole():
     """A drive that begins straight and is steered at random then, without noise."""
-    steering = RandomSteer(
-        amplitude=0.06, frequency=0.6, seed=3, onset=ONSET, rate_limit=0.8, duration=24.0
-    )
-    return Plant(sedan()).simulate(steering, speed=20.0, name="random").recording()
+    return steered(3, 24.0, amplitude=0.06, frequency=0.6, onset=ONSET).recording()
 
 
 @pytest.fixture(scope="module")
@@ -65,9 +61,7 @@ def codes(verdict, *, refusing=True):
 def test_a_right_answer_is_valid_and_it_is_right(clean, good, drive):
     assert good.valid
     assert codes(good) == set()
-    missed = clean.freeze().predict(drive) - drive.axle_force
-    share = np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
-    assert (share < 0.08).all()
+    assert (missed(clean.freeze(), drive) < 0.08).all()
     assert good.measures["explained_lateral"] > 0.98
     assert repr(good) == "<Verdict: valid>"
 
@@ -96,11 +90,6 @@ def turned(drive, degrees):
     )
 
 
-def share_missed(model, drive):
-    missed = model.predict(drive) - drive.axle_force
-    return np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
-
-
 FAULTS = {
     "bias of v_y": (lambda d: replace(d, v_y=d.v_y + 2.0), "v_y_bias", 2.0),
     "turned sensor": (lambda d: turned(d, 5.0), "v_y_angle", np.radians(-5.0)),
@@ -117,7 +106,7 @@ def test_an_offset_is_estimated_with_its_size_and_the_forces_are_right(drive, na
     found = model["v_y_bias"] + model["v_y_angle"] * speed
     assert found == pytest.approx(size if name == "bias of v_y" else size * speed, rel=0.05)
     assert judge(run).valid
-    assert share_missed(model, faulty).max() < 0.08
+    assert missed(model, faulty).max() < 0.08
 
 
 @pytest.mark.parametrize(
@@ -198,14 +187,11 @@ def test_a_stiffness_that_no_tire_has_is_refused_and_told_to_be_at_its_bound(cle
 
 
 def test_another_drive_is_given_back_and_its_range_is_told(clean, whole):
-    steering = RandomSteer(
-        amplitude=0.05, frequency=0.5, seed=8, onset=1.0, rate_limit=0.8, duration=16.0
-    )
-    other = Plant(sedan()).simulate(steering, speed=22.0, name="other").recording()
+    other = steered(8, 16.0, amplitude=0.05, speed=22.0).recording()
     noisy = SENSORS.apply(other, np.random.default_rng(2))
     verdict = judge_prediction(clean.freeze(), noisy)
     assert verdict.valid
-    assert share_missed(clean.freeze(), other).max() < 0.12
+    assert missed(clean.freeze(), other).max() < 0.12
     assert re.match(r"verdict: valid for [\d.]+ to [\d.]+ m/s, slip up to", verdict.lines[0])
     gripless = moved(clean.freeze(), ln_grip=-0.7)
     assert "force_missed" in codes(judge_prediction(gripless, noisy))
@@ -217,7 +203,7 @@ def test_a_prediction_has_a_verdict_of_its_own(clean, drive):
     half = moved(model, ln_grip=np.log(0.5), ln_stiffness=np.log(0.5))
     verdict = judge_prediction(half, drive)
     assert codes(verdict) == {"force_missed"}
-    assert all(0.2 < missed < 0.6 for missed in verdict.measures["force_missed"])
+    assert all(0.2 < share < 0.6 for share in verdict.measures["force_missed"])
 
 
 def test_a_drive_without_force_at_one_axle_judges_the_other(clean):
@@ -254,7 +240,7 @@ def test_one_steady_corner_is_valid_for_no_slip(whole):
     run = answer(SENSORS.apply(log, np.random.default_rng(4)).between(4.0, 34.0))
     assert codes(judge(run)) == {"prior"}
     assert (run.freeze().known_slip == 0.0).all()
-    assert share_missed(run.freeze(), whole).max() > 0.12
+    assert missed(run.freeze(), whole).max() > 0.12
     begun = answer(SENSORS.apply(log, np.random.default_rng(4)).between(0.0, 12.0))
     assert judge(begun).valid and (begun.freeze().known_slip > np.radians(1.0)).all()
 
@@ -264,12 +250,9 @@ def test_another_friction_is_looked_for_where_a_part_is_missed(clean, drive):
     model = clean.freeze()
     assert judge_prediction(model, drive).friction is None
     assert predict(model, drive).friction().unchanged
-    steering = RandomSteer(
-        amplitude=0.06, frequency=0.6, seed=3, onset=1.0, rate_limit=0.8, duration=24.0
-    )
     ice = FrictionChange(scale=0.5, at_time=12.0), FrictionChange(scale=1.0, at_time=16.0)
-    wet = Plant(sedan()).simulate(steering, speed=20.0, friction=Friction(changes=ice)).recording()
-    verdict = judge_prediction(model, SENSORS.apply(wet, np.random.default_rng(1)))
+    wet = steered(3, 24.0, amplitude=0.06, frequency=0.6, friction=Friction(changes=ice))
+    verdict = judge_prediction(model, wet.recording(SENSORS, np.random.default_rng(1)))
     (road,) = verdict.friction.roads
     assert 12.0 < road.first < 15.0
 
@@ -284,8 +267,7 @@ def test_every_method_that_freezes_has_a_verdict(drive, name, valid):
     car = sedan()
     run = identify(drive, car, make_method(name, car))
     verdict = judge(run)
-    missed = run.freeze().predict(drive) - drive.axle_force
-    share = np.sqrt(np.mean(missed**2, axis=0) / np.mean(drive.axle_force**2, axis=0))
+    share = missed(run.freeze(), drive)
     assert verdict.valid == valid
     assert share.max() < 1.0 / 7.0 or not valid
     assert np.allclose(verdict.measures["force_missed"], share, atol=0.05)
