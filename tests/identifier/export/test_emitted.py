@@ -106,7 +106,7 @@ def level(**numbers):
     return replace(model, reach=model.reach._replace(slip=np.array([0.5, 0.5])))
 
 
-NO_ELLIPSE = dict.fromkeys(("braking_f", "braking_r", "driving_f", "driving_r"), 0.02)
+NO_ELLIPSE = dict.fromkeys(("braking_f", "braking_r", "driving_f", "driving_r"), 0.0)
 
 
 def test_limits_of_a_car_are_those_that_load_transfer_leaves_by_hand():
@@ -121,7 +121,7 @@ def test_limits_of_a_car_are_those_that_load_transfer_leaves_by_hand():
 
 
 def test_limits_of_a_car_are_those_that_the_ellipse_leaves_by_hand():
-    use = dict(zip(NO_ELLIPSE, (1.25, 0.5, 2.0, 0.02), strict=True))
+    use = dict(zip(NO_ELLIPSE, (1.25, 0.5, 2.0, 0.0), strict=True))
     found = limits(level(load_transfer=0.0, **use))
     np.testing.assert_allclose(found.braking, GRAVITY / 1.25, rtol=1e-3)
     np.testing.assert_allclose(found.driving, GRAVITY / 2.0, rtol=1e-3)
