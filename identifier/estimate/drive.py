@@ -74,8 +74,8 @@ class Drive:
         within = []
         for one in recording.segments:
             a, b = max(one.start, begin), min(one.stop, end)
-            cuts = [] if replay or a >= b else sorted(_tears(recording, slice(a, b)))
-            within += [slice(*edges) for edges in pairwise([a, *cuts, b])]
+            cuts = set() if replay or a >= b else _tears(recording, slice(a, b), every)
+            within += [slice(*edges) for edges in pairwise([a, *sorted(cuts), b])]
         pieces = [
             _piece(recording, one, vehicle, every, dt, slowest)
             for one in within
@@ -133,12 +133,15 @@ class Drive:
         return replace(self, signals=signals)
 
 
-def _tears(recording: Recording, within: slice) -> list[int]:
-    """Return the first samples after tears, where no car went on: two drives in one log."""
-    named = ("v_x", "v_y", "r", "delta_f")
-    signals = {name: getattr(recording, name)[within] for name in named}
+def _tears(recording: Recording, within: slice, every: int) -> set[int]:
+    """Return where tears are, at which no car went on: two drives in one log.
+
+    They are whole means of so many samples from the beginning on, as without tears.
+    """
+    names = ("v_x", "v_y", "r", "delta_f")
+    signals = {name: recording.needed(name)[within] for name in names}
     moving = {name: signal for name, signal in signals.items() if np.ptp(signal) > 0.0}
-    return [within.start + at for at, _ in tears(moving, SMOOTH)]
+    return {within.start + at // every * every for at, _ in tears(moving, SMOOTH) if at >= every}
 
 
 def _piece(

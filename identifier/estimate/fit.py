@@ -136,8 +136,10 @@ def fit(
         known, count = known + part, count + found.seconds / float(found.memory.min())
         parts.append((drives[0].begin, part))
         went_on(sum(len(one.signals) * one.dt for one in drives))
-    if found is not None and count > MOST_COUNT:
-        p, covariance = settled(before.after(known.counted(MOST_COUNT / count)), found.p)
+    share = MOST_COUNT / max(count, MOST_COUNT)
+    parts = [(t, part.counted(share)) for t, part in parts]
+    if found is not None and len(parts) > 1:
+        p, covariance = settled(before.after(known.counted(share)), found.p)
         found = replace(found, p=p, covariance=covariance)
     beliefs = before if found is None else _after(before, found)
     for blind in (one for one in recordings if one.logged_v_y is None):

@@ -45,6 +45,7 @@ _SETTLED_MEMORY = 0.1  # |ln| by which T changes where the descent may end
 _SETTLING = 60  # iterations at most where no drive is looked at
 _SETTLED = 1e-4  # [nats] of improvement, below which these end
 
+_SOME = 0.1  # of what a step on new slopes promised, that it must gain; else it is damped more
 _GOOD = 0.5  # of what a step promised, that it gains where the next is damped less
 _LEAST_USE = 0.002  # of the ellipse, down to which a descent goes: at none there is no slope
 _USES = [INDEX[f"{use}_{axle}"] for use in ("braking", "driving") for axle in "fr"]
@@ -81,6 +82,7 @@ class Problem:
         self.drives, self.vehicle, self.labels = drives, vehicle, labels
         self.roads = 0 if labels is None else max(int(one.max()) for one in labels)
         self.priors = priors.with_roads(self.roads) if self.roads else priors
+        self._of_one_road = priors
         self.index = np.flatnonzero(self.priors.moves)
         moving = self.index[self.index < len(NAMES)]
         self.tires = len(moving)  # columns of slopes that are not of roads
@@ -104,7 +106,8 @@ class Problem:
     def under(self, priors: Priors) -> "Problem":
         """Return the same under other priors, of a problem with slopes over `every` parameter."""
         other = copy(self)
-        other.priors, other.index = priors, np.flatnonzero(priors.moves)
+        other.priors = other._of_one_road = priors
+        other.index = np.flatnonzero(priors.moves)
         other.tires, other._columns = other.index.size, other.index
         return other
 
@@ -132,12 +135,12 @@ class Problem:
 
     def thinned(self) -> "Problem":
         """Return the problem of one road with means of samples, for first guesses."""
-        small = min(float(np.sqrt(self.vehicle.wheelbase / SEDAN)), 1.0)
-        every = max(1, int(_COARSE * small / min(one.dt for one in self.drives)))
-        if every == 1 and self.labels is None:
+        longest = _COARSE * min(float(np.sqrt(self.vehicle.wheelbase / SEDAN)), 1.0)
+        times = [max(1, int(longest / one.dt)) for one in self.drives]
+        if max(times) == 1 and self.labels is None:
             return self
-        drives = [one.thinned(every) for one in self.drives]
-        return Problem(drives, self.vehicle, self.priors)
+        drives = [one.thinned(every) for one, every in zip(self.drives, times, strict=True)]
+        return Problem(drives, self.vehicle, self._of_one_road)
 
     def misses(self, p: Array, road: float = 0.0) -> Array:
         """Return what the balance misses over its size, (m, 2).
@@ -423,7 +426,7 @@ def _better(
             break
         e = problem.misses(trial)
         reached = problem.misfit(e, *weight) + beliefs_cost(priors, trial)
-        if reached < cost:
+        if cost - reached > (0.0 if once else min(_SOME * promised, enough)):
             good = cost - reached > _GOOD * promised
             return trial, e, max(tried / 5.0, 1e-6) if good else max(tried, 1e-3), cost - reached
         if once:

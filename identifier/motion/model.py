@@ -43,7 +43,7 @@ RATE = 4.0  # κ [1/s]: what is missed is a mean over a quarter of a second
 _LAG_OF_A_X = 0.2  # [s] of the washout that tells a_x
 
 # Rows of slopes are loops over columns, several of which a processor computes at once.
-_SIMD = (*FLAGS, "-ftree-vectorize", "-fvect-cost-model=dynamic")
+_SIMD = tuple("-O3" if flag == "-O2" else flag for flag in FLAGS)
 
 Columns = tuple[str, ...]
 SIGNALS = ("v_x", "v_y", "r", "delta_f", "delta_r", "a_x", "bank", "road", "on")

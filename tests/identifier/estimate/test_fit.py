@@ -13,9 +13,10 @@ from identifier.doctor.faults import examine
 from identifier.estimate import solve
 from identifier.estimate.drive import Drive
 from identifier.estimate.fit import _after, _blocks, _lasting, fit
+from identifier.estimate.information import Information
 from identifier.estimate.method import FitMethod
 from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
-from identifier.estimate.solve import Problem, descend, estimate
+from identifier.estimate.solve import Problem, descend, estimate, settled
 from identifier.motion.parameters import INDEX, NAMES
 from identifier.verdict import judge_identification
 from models.maneuvers import RandomSteer
@@ -119,7 +120,13 @@ def test_hours_of_one_drive_tell_no_more_than_minutes_and_tears_between_are_cut(
     hours = Recording(name="again", t=t, delta_r=np.zeros(t.size), **signals)
     begins = Drive.of(hours, sedan()).begins
     assert np.abs(np.array(begins) - n * np.arange(times)).max() <= 2
-    many, few = (fit([one], sedan()).model for one in (hours, hours.taken(slice(0, 4 * n))))
+    fast = replace(hours.taken(slice(0, 3 * n)), t=0.5 * t[: 3 * n])
+    assert len(Drive.of(fast, sedan()).signals) == 3 * n // 2, "means go on over a tear"
+    whole = fit([hours], sedan())
+    many, few = whole.model, fit([hours.taken(slice(0, 4 * n))], sedan()).model
+    told = sum((part for _, part in whole.parts), Information.nothing())
+    _, together = settled(Priors.of(sedan()).after(told), many.p)
+    np.testing.assert_allclose(np.diag(together), np.diag(many.covariance), rtol=1e-2)
     on = np.diag(few.covariance) > 0.0
     sd, less = (np.sqrt(np.diag(one.covariance)[on]) for one in (few, many))
     assert (less > 0.6 * sd).all() and (np.abs(many.p - few.p)[on] < sd).all()

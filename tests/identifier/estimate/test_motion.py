@@ -1,5 +1,10 @@
 """The forward model against its equations, integrated by other means, and its slopes."""
 
+import os
+import shutil
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -149,3 +154,12 @@ def test_slopes_over_faults_and_the_road_are_finite_differences(drive):
         expected = (run(p + step, "residual") - run(p - step, "residual")) / 2e-5
         away = np.abs(slopes[:, :, column] - expected).max()
         assert away <= 2e-3 * np.abs(expected).max(), name
+
+
+@pytest.mark.skipif(shutil.which("clang") is None, reason="clang is not installed")
+def test_clang_compiles_the_slopes_of_the_motion(tmp_path):
+    code = (
+        "from identifier.motion.model import motion_scan; motion_scan(('ln_grip_f',)).loop.argtypes"
+    )
+    variables = {**os.environ, "CC": "clang", "TIREID_CACHE": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", code], check=True, env=variables, timeout=60)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from identifier.estimate import report, roads
+from identifier.estimate import report, roads, solve
 from identifier.estimate.drive import Drive, box, slope_on, thinned
 from identifier.estimate.information import SIZE, Information
 from identifier.estimate.latent import TRUST
@@ -352,6 +352,15 @@ def test_means_hold_the_edges_and_slopes_are_of_what_is_fast(rng):
     for felt in (0.7 * fast, 1.3 * fast, fast + np.cos(6.0 * t), 0.0 * fast):
         assert slope_on(fast, felt, on, 0.01, within) is None
     assert slope_on(fast, fast, t < 1.9, 0.01, within) is None, "two seconds are needed"
+
+
+def test_starts_are_tried_in_means_of_each_drive_by_its_own_rate(problem):
+    slow = replace(problem.drives[0].thinned(10), every=10)
+    both = Problem([*problem.drives, slow], CAR, PRIORS)
+    assert [one.dt for one in both.thinned().drives] == pytest.approx([0.04, 0.1])
+    labels = [np.arange(len(problem.drives[0].signals)) // 450]
+    found = solve.estimate(problem.drives, CAR, PRIORS, labels=labels)
+    assert found.roads.shape == (1,) and abs(found.roads[0]) < 4.0 * found.road_sd[0]
 
 
 def test_a_thinned_drive_holds_means_of_its_segments():
