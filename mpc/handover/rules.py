@@ -57,8 +57,7 @@ class Rules:
     jump: float = 0.05
     quick_jump: float = 0.2
 
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
+    __post_init__ = require_positive_fields
 
 
 class Verdict(Enum):

@@ -72,8 +72,7 @@ class Localization:
     lost: float = 5.0
     observable: float = 0.01
 
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
+    __post_init__ = require_positive_fields
 
 
 class LateralVelocity:

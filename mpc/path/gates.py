@@ -98,20 +98,6 @@ def _straightest(
     intervals = max(_DEGREE + 1, ceil((end[0] - start[0]) / _KNOTS))
     inner = np.linspace(start[0], end[0], intervals + 1)
     t = np.concatenate((np.full(_DEGREE, start[0]), inner, np.full(_DEGREE, end[0])))
-    c = _coefficients(t, inner, gates, start, end, clearance, easing)
-    greville = np.array([t[i + 1 : i + _DEGREE + 1].mean() for i in range(c.size)])  # of y = x
-    return BSpline(t, np.column_stack((greville, c)), _DEGREE), inner
-
-
-def _coefficients(
-    t: Array,
-    inner: Array,
-    gates: Sequence[Gate],
-    start: tuple[float, float],
-    end: tuple[float, float],
-    clearance: float,
-    easing: float,
-) -> Array:
     n = t.size - _DEGREE - 1
     edges = np.concatenate([[gate.start, gate.end] for gate in gates])
     x = np.linspace(inner[0], inner[-1], _PER_INTERVAL * (inner.size - 1) + 1)
@@ -141,7 +127,9 @@ def _coefficients(
     solution = solver(x0=guess, lbg=lower, ubg=upper)
     if not solver.stats()["success"]:
         raise PathError(f"gates: no line found ({solver.stats()['return_status']})")
-    return np.asarray(solution["x"]).ravel()[:n]
+    greville = [t[i + 1 : i + _DEGREE + 1].mean() for i in range(n)]  # of y = x
+    found = np.asarray(solution["x"]).ravel()[:n]
+    return BSpline(t, np.column_stack((greville, found)), _DEGREE), inner
 
 
 def _basis(t: Array, x: Array, order: int) -> Any:

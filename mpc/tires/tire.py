@@ -54,20 +54,12 @@ class TireStructure:
     """
 
     __slots__ = ()
+    lagged: bool = False  # whether force follows a lagged slip, two more states [rad]
+    saturates = False  # whether it is judged at any slip, not only as far as the car slipped
 
     @property
     def n_weights(self) -> int:
         raise NotImplementedError
-
-    @property
-    def lagged(self) -> bool:
-        """Whether force follows a lagged slip, two more states [rad]."""
-        return False
-
-    @property
-    def saturates(self) -> bool:
-        """Whether it is judged at any slip, not only as far as the car slipped."""
-        return False
 
     def slip(self, at: Point) -> Pair:
         """Return the kinematic slip angles α = δ - atan((v_y ± l r)/v_x) [rad], paper's sign."""

@@ -53,12 +53,13 @@ def write(tmp_path):
 def write_pair(tmp_path):
     """A function that writes both packages and what joins them."""
 
-    def written(pair):
-        put(tmp_path / "identifier", pair.identifier.files)
-        put(tmp_path / "mpc", pair.tracker.files)
-        return put(tmp_path, pair.files)
+    return lambda pair: put_pair(tmp_path, pair)
 
-    return written
+
+def put_pair(folder, pair):
+    put(folder / "identifier", pair.identifier.files)
+    put(folder / "mpc", pair.tracker.files)
+    return put(folder, pair.files)
 
 
 def c_files(folder, under="src"):

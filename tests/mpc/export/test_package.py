@@ -93,9 +93,16 @@ def test_the_manifest_tells_all_that_went_in(packages):
         assert hashlib.sha256(package.files[path].encode()).hexdigest() == hashed
 
 
-def self_test(folder, run, compiler="gcc", single=0, flags=("-O2", "-ffp-contract=off")):
+def self_test(folder, run, compiler="gcc", single=0):
     sources = [*c_files(folder), *c_files(folder, "tests")]
-    words = [*STRICT, *flags, f"-DTIREID_MPC_SINGLE={single}", "-Iinclude", "-Isrc"]
+    words = [
+        *STRICT,
+        "-O2",
+        "-ffp-contract=off",
+        f"-DTIREID_MPC_SINGLE={single}",
+        "-Iinclude",
+        "-Isrc",
+    ]
     answer = run(compiler, *words, *sources, "-lm", "-o", "self_test", cwd=folder)
     assert answer.returncode == 0, answer.stderr
     return run(str(folder / "self_test"))

@@ -32,12 +32,12 @@ def problem():
     return PROBLEM
 
 
-def measured(e_y=0.0, e_psi=0.0, v_y=0.0, r=0.0, kappa=0.0, v_x=20.0, horizon=PROBLEM.horizon):
-    """A measurement on a road of one curvature and speed."""
-    one = np.ones(horizon + 1)
-    return Measurement(e_y, e_psi, v_y, r, kappa * one, v_x * one)
-
-
 @pytest.fixture
 def measure():
+    """A function that returns a measurement on a road of one curvature and speed."""
+    one = np.ones(PROBLEM.horizon + 1)
+
+    def measured(e_y=0.0, e_psi=0.0, v_y=0.0, r=0.0, kappa=0.0, v_x=20.0):
+        return Measurement(e_y, e_psi, v_y, r, kappa * one, v_x * one)
+
     return measured
