@@ -57,7 +57,8 @@ class Rules:
     jump: float = 0.05
     quick_jump: float = 0.2
 
-    __post_init__ = require_positive_fields
+    def __post_init__(self) -> None:
+        require_positive_fields(self)
 
 
 class Verdict(Enum):
