@@ -49,12 +49,11 @@ def drive():
     )
 
 
-def biased(channel, size):
-    return SensorFault(channel=channel, kind="biased", size=size)
+BIASED = SensorFault(channel="v_y", kind="biased", size=0.2)
 
 
 REPAIRS = {
-    "offset": (biased("v_y", 0.2), Repair(offset={"v_y": 0.2})),
+    "offset": (BIASED, Repair(offset={"v_y": 0.2})),
     "factor": (SensorFault(channel="r", kind="scaled", size=1.25), Repair(factor={"r": 0.8})),
     "steering wheel": (
         SensorFault(channel="delta_f", kind="scaled", size=16.0),
@@ -74,7 +73,7 @@ REPAIRS = {
                 SensorElsewhere(sensor="velocity", x=0.7),
                 Misaligned(angle=0.02),
                 Late(channels=("v_y",), delay=0.05),
-                biased("v_y", 0.2),
+                BIASED,
                 SensorFault(channel="v_y", kind="scaled", size=-3.6),
             )
         ),
@@ -249,8 +248,7 @@ def test_what_cannot_be_applied_is_refused(drive):
 
 @pytest.mark.parametrize("name", REPAIRS)
 def test_a_repair_in_blocks_has_the_bits_of_one_in_a_piece(drive, name, monkeypatch):
-    fault, repair = REPAIRS[name]
-    del fault
+    _, repair = REPAIRS[name]
     piece, _ = repair.apply(drive, CAR)
     monkeypatch.setattr("codegen.arrays.LONG", 500)
     monkeypatch.setattr("codegen.arrays.BLOCK", 111)
@@ -283,8 +281,8 @@ def test_a_repair_of_a_segment_looks_at_no_other(drive, broken, name):
     repair = Repair(lag={"r": 0.1}) if name == "low pass" else REPAIRS[name][1]
     repaired, _ = repair.apply(broken, CAR)
     alone, _ = repair.apply(broken.taken(SHORT), CAR)
-    middle = slice(*repaired.breaks) if len(repaired.breaks) == 2 else None
-    assert middle is not None
+    middle = repaired.segments[1]
+    assert len(repaired.segments) == 3
     for channel in ("t", "v_x", "v_y", "r", "delta_f", "a_y", "axle_force"):
         np.testing.assert_array_equal(getattr(repaired, channel)[middle], getattr(alone, channel))
 

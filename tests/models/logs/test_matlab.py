@@ -150,7 +150,7 @@ def test_a_file_without_a_time_says_what_it_needs(version, tmp_path):
     )
 
 
-def opaque(name, kind):
+def table():
     """A variable that is an object of MATLAB, as `save` writes a table."""
 
     def element(number, data):
@@ -159,20 +159,20 @@ def opaque(name, kind):
     inner = element(
         14, element(6, struct.pack("<II", 13, 0)) + element(5, struct.pack("<ii", 1, 1))
     )
-    words = b"".join(element(1, word) for word in (name, b"MCOS", kind))
+    words = b"".join(element(1, word) for word in (b"tab", b"MCOS", b"table"))
     return element(14, element(6, struct.pack("<II", 17, 0)) + words + inner)
 
 
 def test_tables_and_other_objects_are_named_with_what_to_do(tmp_path):
     path = tmp_path / "log.mat"
     write_5(path, {"t": T, "v": A})
-    path.write_bytes(path.read_bytes() + opaque(b"tab", b"table"))
+    path.write_bytes(path.read_bytes() + table())
     log = open_log(path)
     assert [one.name for one in log.listed()] == ["v"]
     assert log.notes == ("not read: tab (a table, timeseries or other object)",)
 
     write_5(path, {"n": np.ones((1, 1))})
-    path.write_bytes(path.read_bytes() + opaque(b"tab", b"table"))
+    path.write_bytes(path.read_bytes() + table())
     text = refusal(path)
     assert (
         "not read: tab (a table, timeseries or other object); save vectors and their time" in text

@@ -13,12 +13,14 @@ from models.recordings.reader import with_columns
 
 N = 300
 T = 0.02 * np.arange(N)
-SIGNALS = {
-    "vx": 20.0 + np.sin(T),
-    "vy": 0.1 * np.sin(T),
-    "r": 0.3 * np.sin(T),
-    "delta_f": 0.05 * np.sin(T),
-}
+
+
+def signals(t):
+    wave = np.sin(t)
+    return {"vx": 20.0 + wave, "vy": 0.1 * wave, "r": 0.3 * wave, "delta_f": 0.05 * wave}
+
+
+SIGNALS = signals(T)
 FIRST = datetime.datetime(2025, 4, 4, 18, 10, 23)
 
 
