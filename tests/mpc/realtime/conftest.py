@@ -5,10 +5,11 @@ import pytest
 
 from models.vehicle import sedan
 from mpc.problem import Limits, Problem
-from mpc.realtime import Measurement
+from mpc.realtime import Measurement, Tracker
 from mpc.tires import prediction_tire
 from mpc.tires.ladder import oracle_tire
 
+PERIOD = 0.02  # s
 PROBLEM = Problem(horizon=20, limits=Limits(steering=0.2, steering_rate=0.5, slip=(0.1, 0.1)))
 
 
@@ -30,6 +31,11 @@ def tire(request):
 @pytest.fixture
 def problem():
     return PROBLEM
+
+
+@pytest.fixture
+def tracker(tire, problem):
+    return Tracker(tire, problem, period=PERIOD, delay=2 * PERIOD)
 
 
 @pytest.fixture
