@@ -13,7 +13,7 @@ from mpc.export.package import build_mpc_package, mpc_readme
 from mpc.problem import Cost, Problem
 from mpc.realtime import Tracker
 from mpc.tires import prediction_tire
-from tests.mpc.export.conftest import LAWS, STRICT, c_files
+from tests.mpc.export.conftest import LAWS, STRICT, c_files, planted
 
 CAR = sedan()
 SHORT = Problem(horizon=8)
@@ -159,10 +159,7 @@ def test_the_self_test_sees_a_planted_error(
     file, pattern, replacement, complaint, packages, write, run
 ):
     folder = write(packages["integral"])
-    text = (folder / file).read_text()
-    changed = re.sub(pattern, replacement, text, count=1)
-    assert changed != text
-    (folder / file).write_text(changed)
+    planted(folder, file, pattern, replacement)
     words = ["-std=c99", "-O1", "-Iinclude", "-Isrc", "-o", "self_test"]
     sources = [*c_files(folder), *c_files(folder, "tests")]
     assert run("gcc", *words, *sources, "-lm", cwd=folder).returncode == 0
