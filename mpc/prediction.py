@@ -12,7 +12,7 @@ import casadi as ca
 
 from codegen.tuned import tuned
 from mpc.problem import N_ERRORS, gauss_newton, tracking_errors
-from mpc.tires.tire import Car, Point, TireStructure, believed
+from mpc.tires.tire import Car, Pair, Point, TireStructure, believed
 
 # The car along a path as the tracker predicts it: ẋ and its Jacobian.
 #
@@ -66,13 +66,8 @@ def stage_ports(structure: TireStructure) -> Ports:
 
 def motion(structure: TireStructure, p: Ports) -> Motion:
     """Return the equations of motion and their derivatives, chained through the axle forces."""
-    e_y, e_psi, v_y, r, delta, *lagged = ca.vertsplit(p.x)
-    car = Car(*ca.vertsplit(p.car))
-    at = Point(v_y, r, delta, p.v_x, car, p.w)
-    kinematic = structure.slip(at)
-    slip = (lagged[0], lagged[1]) if structure.lagged else kinematic
-    force, lengths = believed(structure, slip, at, p.max_slip, p.rise, p.grip)
-
+    e_y, e_psi = p.x[0], p.x[1]
+    (v_y, r, _, _, car, _), kinematic, slip, force, lengths = _axles(structure, p)
     F = ca.SX.sym("F", 2)
     c, s = ca.cos(e_psi), ca.sin(e_psi)
     s_dot = (p.v_x * c - v_y * s) * (1 / ca.fmax(1 - p.kappa * e_y, _NEAREST))
@@ -92,6 +87,15 @@ def motion(structure: TireStructure, p: Ports) -> Motion:
     x_dot, x_dot_x = ca.substitute([x_dot, x_dot_x], [F], [force])
     angles = ca.vertcat(*kinematic)
     return Motion(x_dot, x_dot_x, ca.jacobian(x_dot, p.u), s_dot, angles, ca.jacobian(angles, p.x))
+
+
+def _axles(structure: TireStructure, p: Ports) -> tuple[Point, Pair, Pair, Any, Pair]:
+    """Return where the tires are asked, kinematic slip, what makes the force, force and lengths."""
+    v_y, r, delta, *lagged = ca.vertsplit(p.x)[2:]
+    at = Point(v_y, r, delta, p.v_x, Car(*ca.vertsplit(p.car)), p.w)
+    kinematic = structure.slip(at)
+    slip = (lagged[0], lagged[1]) if structure.lagged else kinematic
+    return at, kinematic, slip, *believed(structure, slip, at, p.max_slip, p.rise, p.grip)
 
 
 _RESULTS = ("x_next", "A", "B", "H", "h", "slip", "slip_x")
@@ -129,13 +133,10 @@ def build_stage(structure: TireStructure) -> ca.Function:
     slip_x (2, n_x).
     """
     p = stage_ports(structure)
-    q = ca.SX.sym("q", N_ERRORS)
     at = motion(structure, p)
     f = ca.Function("motion", list(p), [at.x_dot, at.x_dot_x, at.x_dot_u])
-    x_next, A, B = _runge_kutta(f, p)
-    H, h = gauss_newton(tracking_errors(p.x, p.kappa, p.v_x, at.s_dot), p.x, q)
-    results = [x_next, A, B, H, h, at.slip, at.slip_x]
-    return _finished("stage", {**p._asdict(), "q": q}, results, _RESULTS)
+    q, cost = _cost(p, at)
+    return _finished("stage", {**p._asdict(), "q": q}, [*_runge_kutta(f, p), *cost], _RESULTS)
 
 
 @cache
@@ -145,11 +146,16 @@ def build_end(structure: TireStructure) -> ca.Function:
     Ports: those of `build_stage` without u and dt, with q of the end.
     """
     p = stage_ports(structure)
-    q = ca.SX.sym("q", N_ERRORS)
-    at = motion(structure, p)
-    H, h = gauss_newton(tracking_errors(p.x, p.kappa, p.v_x, at.s_dot), p.x, q)
+    q, cost = _cost(p, motion(structure, p))
     ports = {name: port for name, port in p._asdict().items() if name not in ("u", "dt")}
-    return _finished("end", {**ports, "q": q}, [H, h, at.slip, at.slip_x], _RESULTS[3:])
+    return _finished("end", {**ports, "q": q}, cost, _RESULTS[3:])
+
+
+def _cost(p: Ports, at: Motion) -> tuple[ca.SX, list[ca.SX]]:
+    """Return q, and H, h of the cost with the slips and their derivatives."""
+    q = ca.SX.sym("q", N_ERRORS)
+    H, h = gauss_newton(tracking_errors(p.x, p.kappa, p.v_x, at.s_dot), p.x, q)
+    return q, [H, h, at.slip, at.slip_x]
 
 
 @cache
@@ -160,12 +166,7 @@ def build_axles(structure: TireStructure) -> ca.Function:
     slip (2,) [rad], the kinematic one; length (2,) [m] by which the slip lags, 0 where it does not.
     """
     p = stage_ports(structure)
-    e_y, e_psi, v_y, r, delta, *lagged = ca.vertsplit(p.x)
-    del e_y, e_psi
-    at = Point(v_y, r, delta, p.v_x, Car(*ca.vertsplit(p.car)), p.w)
-    kinematic = structure.slip(at)
-    slip = (lagged[0], lagged[1]) if structure.lagged else kinematic
-    force, lengths = believed(structure, slip, at, p.max_slip, p.rise, p.grip)
+    _, kinematic, _, force, lengths = _axles(structure, p)
     ports = {name: port for name, port in p._asdict().items() if name not in ("u", "kappa", "dt")}
     results = [force, ca.vertcat(*kinematic), ca.vertcat(*lengths)]
     return _finished("axles", ports, results, ("force", "slip", "length"))

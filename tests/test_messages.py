@@ -47,10 +47,10 @@ LOG = Plant(CAR).simulate(STEP, speed=20.0).recording()
 SAMPLED = {"times": (1.0, 1.5, 2.5), "angles": (0.0, 0.1, 0.0), "rate_limit": 0.4, "duration": 4.0}
 FAULT = {"channel": "r", "kind": "zero", "start": 0.0, "duration": 1.0}
 GATE = {"start": 0.0, "end": 1.0, "right": 0.0, "left": 1.0}
-WALL = [
+WALL = (
     Gate(start=10.0, end=30.0, right=5.0, left=8.0),
     Gate(start=20.0, end=40.0, right=-8.0, left=-5.0),
-]
+)
 LINE = Path.from_waypoints([0.0, 50.0], [0.0, 0.0])
 RING = {"closed": True, "X": [30.0, 0.0, -30.0, 0.0], "Y": [0.0, 30.0, 0.0, -30.0]}
 

@@ -105,12 +105,12 @@ class _ArrayTable:
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns, of the rows of a run where one is named."""
-        wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
+        gathered = Gathered(self.path, kinds, self._names, "index", run)
+        wanted = gathered.kinds
         found = {column: self._read(column, kind) for column, kind in wanted.items()}
         sizes = {self._names[column]: self._arrays[column].size for column in wanted}
         if len(set(sizes.values())) > 1:
             raise RecordingError(f"{self.path}: columns must have one length, they have {sizes}")
-        gathered = Gathered(self.path, wanted, self._names, "index", run)
         size = next(iter(sizes.values()), self._arrays[0].size)
         gathered.extend(np.arange(size, dtype=np.int64), found)
         return gathered.finished()

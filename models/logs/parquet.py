@@ -82,7 +82,8 @@ class _ParquetTable:
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
         """
-        wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
+        gathered = Gathered(self.path, kinds, self.columns.names, "row", run)
+        wanted = gathered.kinds
         for column, kind in wanted.items():
             name, found = self.columns.names[column], self.schema.field(column).type
             if self.columns.names.count(name) > 1:
@@ -91,7 +92,6 @@ class _ParquetTable:
                 raise RecordingError(f"{self.path}: {name} must be numeric, its type is {found}")
         if self.rows == 0:
             raise RecordingError(f"{self.path}: has columns but no row of data")
-        gathered = Gathered(self.path, wanted, self.columns.names, "row", run)
         order = list(wanted)
         with one_line(self.path, _WHAT):
             for batch in self._batches(order, _BATCH):

@@ -132,13 +132,14 @@ class Gathered:
         place: str,
         run: tuple[int, str] | None,
     ) -> None:
-        self._path, self._kinds, self._names = path, kinds, names
+        self.kinds = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
+        self._path, self._names = path, names
         self._place, self._run = place, run
         self._rows = Growing(np.int64)
         types = {Kind.NUMBER: np.float64, Kind.INSTANT: np.int64, Kind.WORD: np.int32}
-        self._columns = {column: Growing(types[kind]) for column, kind in kinds.items()}
+        self._columns = {column: Growing(types[kind]) for column, kind in self.kinds.items()}
         self._codes: dict[int, dict[str, int]] = {
-            column: {} for column, kind in kinds.items() if kind is Kind.WORD
+            column: {} for column, kind in self.kinds.items() if kind is Kind.WORD
         }
         self._most = limits().samples
         self._seen = 0
@@ -160,7 +161,7 @@ class Gathered:
             column, word = self._run
             keep = coded[column] == self._codes[column].get(word, -1)
         self._rows.extend(rows[keep])
-        for column, kind in self._kinds.items():
+        for column, kind in self.kinds.items():
             values = coded[column] if kind is Kind.WORD else columns[column]
             self._columns[column].extend(values[keep])
 

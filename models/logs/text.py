@@ -85,8 +85,8 @@ class TextTable:
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
         """
-        wanted = dict(kinds) | ({} if run is None else {run[0]: Kind.WORD})
-        gathered = Gathered(self.path, wanted, self.columns.names, "line", run)
+        gathered = Gathered(self.path, kinds, self.columns.names, "line", run)
+        wanted = gathered.kinds
         reader = _Python(self.path, self.layout, wanted)
         fast = arrow.is_used(self.path) if self.arrow is None else self.arrow
         fast = fast and arrow.is_installed()

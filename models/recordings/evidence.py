@@ -162,18 +162,22 @@ def windows(recording: Recording) -> Means:
     every = max(round(STRIDE / recording.dt), 1) * thinning(len(recording))
     counts = recording.v_x >= moving(recording.v_x)
     w = Windows.where(counts, recording, WINDOW, every)
-    v_y, force = recording.logged_v_y, recording.axle_force
+    v_y = recording.logged_v_y
+
+    def mean(signal: Array | None) -> Array | None:
+        return None if signal is None else w.mean(signal)
+
     return Means(
         v_x=w.mean(recording.v_x),
-        v_y=None if v_y is None else w.mean(v_y),
+        v_y=mean(v_y),
         r=w.mean(recording.r),
         delta_f=w.mean(recording.delta_f),
         delta_r=w.mean(recording.delta_r),
         v_y_dot=None if v_y is None else w.rate(v_y),
         r_dot=w.rate(recording.r),
         v_x_r=w.mean(recording.v_x, recording.r),
-        a_y=None if recording.a_y is None else w.mean(recording.a_y),
-        force=None if force is None else w.mean(force),
+        a_y=mean(recording.a_y),
+        force=mean(recording.axle_force),
     )
 
 

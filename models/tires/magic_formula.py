@@ -36,14 +36,17 @@ class _Shape(NamedTuple):
     S_V: Expression
 
 
+def _bent(Bx: Expression, E: Expression) -> Expression:
+    return Bx - E * (Bx - ca.atan(Bx))
+
+
 def _magic_curve(
     x: Expression, B: Expression, C: Expression, D: Expression, E: Expression
 ) -> Expression:
     """D sin(C atan(B x - E (B x - atan B x))), (4.49) without shifts.
     B, C : stiffness and shape factor.   D : peak value [N].
     """
-    Bx = B * x
-    return D * ca.sin(C * ca.atan(Bx - E * (Bx - ca.atan(Bx))))
+    return D * ca.sin(C * ca.atan(_bent(B * x, E)))
 
 
 def _magic_slope(
@@ -51,7 +54,7 @@ def _magic_slope(
 ) -> Expression:
     """Derivative of `_magic_curve` with respect to x, of its arguments; B C D at x = 0."""
     Bx = B * x
-    inner = Bx - E * (Bx - ca.atan(Bx))
+    inner = _bent(Bx, E)
     inner_slope = B * (1.0 - E * Bx**2 / (1.0 + Bx**2))
     return D * ca.cos(C * ca.atan(inner)) * C * inner_slope / (1.0 + inner**2)
 
@@ -63,10 +66,7 @@ def _weight(s: Expression, S_H: Expression, B: Expression, C: float, E: Expressi
     s : the other slip, not shifted.
     B, C, E : stiffness, shape and curvature factor of the weight.
     """
-    Bs = B * (s + S_H)
-    B0 = B * S_H
-    G = ca.cos(C * ca.atan(Bs - E * (Bs - ca.atan(Bs))))
-    G_0 = ca.cos(C * ca.atan(B0 - E * (B0 - ca.atan(B0))))
+    G, G_0 = (ca.cos(C * ca.atan(_bent(B * x, E))) for x in (s + S_H, S_H))
     return positive(G / G_0)  # the standard asks for G > 0; with C > 1 the cosine alone is not
 
 

@@ -178,29 +178,11 @@ def look_at_road(
         back = fit(rules.recovery_seconds, road.ratio, 1.0)
         if back is not None and back[0].gain >= rules.recovery_evidence:
             return change(Verdict.RECOVERY, *back, t)
-        return _the_road_before(
-            road, in_use, window, t=t, baseline=baseline, judge=judge, rules=rules
-        )
+        if (before := road.before) is not None:  # where that explains more again
+            weights = np.stack([in_use.weights, before.weights])
+            samples = window.last(judge.lookback(rules.recovery_seconds))
+            now, then = judge.chi_squares(in_use, weights, samples)
+            if now.mean > baseline and now.total - then.total >= rules.recovery_evidence * baseline:
+                estimate = Road(before, changed_at=t)
+                return Change(Verdict.RECOVERY, estimate, before, now.total, then.total)
     return None
-
-
-def _the_road_before(
-    road: Road,
-    in_use: PredictionTire,
-    window: Window,
-    *,
-    t: float,
-    baseline: float,
-    judge: Judge,
-    rules: Rules,
-) -> Change | None:
-    """Return the change to the tire before friction was lost, where that explains more again."""
-    if road.before is None:
-        return None
-    weights = np.stack([in_use.weights, road.before.weights])
-    samples = window.last(judge.lookback(rules.recovery_seconds))
-    now, then = judge.chi_squares(in_use, weights, samples)
-    if now.mean <= baseline or now.total - then.total < rules.recovery_evidence * baseline:
-        return None
-    estimate = Road(road.before, changed_at=t)
-    return Change(Verdict.RECOVERY, estimate, road.before, now.total, then.total)

@@ -124,7 +124,7 @@ class LateralVelocity:
         level = felt - self._roll * self._rolls[0]
         self._go_on(m, level)
         if self._place is not None:
-            residual = _in_the_body(np.array([m.X, m.Y]) - self._place, m.psi)
+            residual = _in_the_world(np.array([m.X, m.Y]) - self._place, -m.psi)  # and back
             moved = self._correct(0, residual[1], self.trust.position**2)
             self._place += _in_the_world(residual * [2.0 * dt, 0.0] + [0.0, moved], m.psi)
         if math.isfinite(v_y):
@@ -183,13 +183,7 @@ class LateralVelocity:
         return float(moved[0])
 
 
-def _in_the_body(way: Array, psi: float) -> Array:
-    """Return a vector of the ground along and across the body."""
-    c, s = math.cos(psi), math.sin(psi)
-    return np.array([way[0] * c + way[1] * s, way[1] * c - way[0] * s])
-
-
 def _in_the_world(way: Array, psi: float) -> Array:
-    """Return a vector along and across the body on the ground."""
+    """Return a vector along and across the body on the ground; by -psi the other way."""
     c, s = math.cos(psi), math.sin(psi)
     return np.array([way[0] * c - way[1] * s, way[0] * s + way[1] * c])

@@ -25,6 +25,7 @@ class Straight:
     """A straight.   length : [m]."""
 
     length: float
+    angle = 0.0  # heading gained [rad]
 
     def __post_init__(self) -> None:
         if not (self.length > 0.0 and math.isfinite(self.length)):
@@ -35,11 +36,6 @@ class Straight:
         s : since the start of the section [m], (k,).
         """
         return np.zeros_like(s), np.zeros_like(s)
-
-    @property
-    def angle(self) -> float:
-        """Heading gained [rad]."""
-        return 0.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

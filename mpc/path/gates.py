@@ -6,7 +6,6 @@ cost on dκ/ds chooses among the lines with the same peak.
 """
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil, isfinite
@@ -66,8 +65,9 @@ class Gate:
         return np.vstack([row for row in rows if np.isfinite(row).all()])
 
 
+@lru_cache(maxsize=16)  # a course is asked for once for each drive
 def line_through_gates(
-    gates: Sequence[Gate],
+    gates: tuple[Gate, ...],
     *,
     start: tuple[float, float],
     end: tuple[float, float],
@@ -82,36 +82,9 @@ def line_through_gates(
     for gate in gates:
         if gate.left - gate.right < 2.0 * clearance:
             raise PathError(f"gates: {gate} is too narrow for a clearance of {clearance} m")
-    spline, inner = _straightest(tuple(gates), start, end, clearance, easing)
-    return sample(spline, inner, SPACING, "gates")
-
-
-@lru_cache(maxsize=16)
-def _straightest(
-    gates: tuple[Gate, ...],
-    start: tuple[float, float],
-    end: tuple[float, float],
-    clearance: float,
-    easing: float,
-) -> tuple[BSpline, Array]:
-    """Return the line as a spline and its knots; a course is asked for once for each drive."""
     intervals = max(_DEGREE + 1, ceil((end[0] - start[0]) / _KNOTS))
     inner = np.linspace(start[0], end[0], intervals + 1)
     t = np.concatenate((np.full(_DEGREE, start[0]), inner, np.full(_DEGREE, end[0])))
-    c = _coefficients(t, inner, gates, start, end, clearance, easing)
-    greville = np.array([t[i + 1 : i + _DEGREE + 1].mean() for i in range(c.size)])  # of y = x
-    return BSpline(t, np.column_stack((greville, c)), _DEGREE), inner
-
-
-def _coefficients(
-    t: Array,
-    inner: Array,
-    gates: Sequence[Gate],
-    start: tuple[float, float],
-    end: tuple[float, float],
-    clearance: float,
-    easing: float,
-) -> Array:
     n = t.size - _DEGREE - 1
     edges = np.concatenate([[gate.start, gate.end] for gate in gates])
     x = np.linspace(inner[0], inner[-1], _PER_INTERVAL * (inner.size - 1) + 1)
@@ -141,7 +114,10 @@ def _coefficients(
     solution = solver(x0=guess, lbg=lower, ubg=upper)
     if not solver.stats()["success"]:
         raise PathError(f"gates: no line found ({solver.stats()['return_status']})")
-    return np.asarray(solution["x"]).ravel()[:n]
+    greville = [t[i + 1 : i + _DEGREE + 1].mean() for i in range(n)]  # of y = x
+    found = np.asarray(solution["x"]).ravel()[:n]
+    spline = BSpline(t, np.column_stack((greville, found)), _DEGREE)
+    return sample(spline, inner, SPACING, "gates")
 
 
 def _basis(t: Array, x: Array, order: int) -> Any:
@@ -214,7 +190,7 @@ def _checked(car_width: float) -> float:
 
 def _path(
     name: str,
-    gates: Sequence[Gate],
+    gates: tuple[Gate, ...],
     clearance: float,
     easing: float,
     *,
@@ -223,7 +199,7 @@ def _path(
     """Drive through the gates; where they are lanes, the car keeps them before and after."""
     begin, finish = gates[0].start - _RUN, gates[-1].end + _RUN
     line = line_through_gates(
-        [replace(gates[0], start=begin), *gates[1:-1], replace(gates[-1], end=finish)]
+        (replace(gates[0], start=begin), *gates[1:-1], replace(gates[-1], end=finish))
         if lanes
         else gates,
         start=(begin, 0.0),
@@ -247,6 +223,6 @@ def slalom(*, gap: float = 18.0, cones: int = 8) -> Path:
         raise PathError(f"a slalom needs a cone and 5 m between them, got {cones} and {gap} m")
     sides = (0.0, math.inf), (-math.inf, 0.0)  # right and left of the gates in turn
     places = [(i * gap, *sides[i % 2]) for i in range(cones)]
-    gates = [Gate(start=x, end=x, right=right, left=left) for x, right, left in places]
+    gates = tuple(Gate(start=x, end=x, right=right, left=left) for x, right, left in places)
     half = 0.5 * _CAR_WIDTH + _SLALOM_MARGIN
     return _path("slalom", gates, half, _EASING)

@@ -42,7 +42,7 @@ def uniform_grid(length: float, spacing: float) -> Array:
         )
     steps = length / spacing
     require_few(PathError, f"a path of {length:.4g} m", steps, "path", f"steps of {spacing:g} m")
-    return np.linspace(0.0, length, int(np.ceil(length / spacing - 1e-9)) + 1)
+    return np.linspace(0.0, length, int(np.ceil(steps - 1e-9)) + 1)
 
 
 def line_from_heading(psi: Array, kappa: Array, spacing: float) -> Line:

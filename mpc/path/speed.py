@@ -27,10 +27,7 @@ def grip_speed(
     a_accel : acceleration on the straight [m/s²].
     a_brake : deceleration on the straight, positive [m/s²].
     """
-    for name, value in (("a_y_max", a_y_max), ("v_max", v_max)):
-        require_positive(PathError, **{f"{path.name}: {name}": value})
-    for name, value in (("a_accel", a_accel), ("a_brake", a_brake)):
-        require_positive(PathError, **{f"{path.name}: {name}": value})
+    _require_positive(path, a_y_max=a_y_max, v_max=v_max, a_accel=a_accel, a_brake=a_brake)
     kappa = np.abs(path.kappa)
     square = np.minimum(v_max**2, a_y_max / np.maximum(kappa, a_y_max / v_max**2))
     if path.closed:  # the slowest place limits itself; start both passes there
@@ -55,11 +52,14 @@ def steady_speed(path: Path, *, a_y_max: float, share: float = 1.0) -> float:
     a_y_max : lateral acceleration at the limit of grip [m/s²].
     share : of a_y_max [-].
     """
-    for name, value in (("a_y_max", a_y_max), ("share", share)):
-        require_positive(PathError, **{f"{path.name}: {name}": value})
+    _require_positive(path, a_y_max=a_y_max, share=share)
     if path.peak_curvature * path.length < 1e-6:
         raise PathError(f"{path.name}: has no turn that limits the speed, choose one")
     return math.sqrt(share * a_y_max / path.peak_curvature)
+
+
+def _require_positive(path: Path, **values: float) -> None:
+    require_positive(PathError, **{f"{path.name}: {name}": x for name, x in values.items()})
 
 
 def _pass(square: Array, bend: Array, gain: float) -> Array:

@@ -84,9 +84,7 @@ def sample(spline: Any, knots: Array, spacing: float, name: str) -> Line:
         np.arange(knots.size),
         knots,
     )
-    half = 0.5 * np.diff(t)
-    nodes = t[:-1, None] + half[:, None] * (1.0 + _LOBES)
-    length_at_t = np.append(0.0, np.cumsum(half * (_norm(velocity(nodes)) @ _SHARES)))
+    length_at_t = np.append(0.0, np.cumsum(_lengths(velocity, t[:-1], t[1:])))
     try:
         s = uniform_grid(float(length_at_t[-1]), spacing)
     except PathError as error:
@@ -103,13 +101,18 @@ def _times(velocity: Any, t: Array, length_at_t: Array, s: Array) -> Array:
     rest = s - length_at_t[i]
     at = t[i] + np.diff(t)[i] * rest / np.diff(length_at_t)[i]
     for _ in range(20):
-        half = 0.5 * (at - t[i])
-        nodes = t[i][:, None] + half[:, None] * (1.0 + _LOBES)
-        error = half * (_norm(velocity(nodes)) @ _SHARES) - rest
+        error = _lengths(velocity, t[i], at) - rest
         at = np.clip(at - error / _norm(velocity(at)), t[i], t[i + 1])
         if np.abs(error).max() < 1e-12 * s[-1]:
             break
     return np.asarray(at)
+
+
+def _lengths(velocity: Any, start: Array, end: Array) -> Array:
+    """Return the arc lengths from each start to its end, by quadrature."""
+    half = 0.5 * (end - start)
+    nodes = start[:, None] + half[:, None] * (1.0 + _LOBES)
+    return np.asarray(half * (_norm(velocity(nodes)) @ _SHARES))
 
 
 def _norm(vectors: Array) -> Array:
@@ -160,10 +163,7 @@ def _fit(points: Array, closed: bool) -> Any:
     t = np.append(0.0, np.cumsum(_norm(np.diff(points, axis=0))))
     for _ in range(_FITS):
         spline = CubicSpline(t, points, bc_type="periodic" if closed else "natural")
-        half = 0.5 * np.diff(t)
-        nodes = t[:-1, None] + half[:, None] * (1.0 + _LOBES)
-        lengths = half * (_norm(spline.derivative()(nodes)) @ _SHARES)
-        t = np.append(0.0, np.cumsum(lengths))
+        t = np.append(0.0, np.cumsum(_lengths(spline.derivative(), t[:-1], t[1:])))
     return spline
 
 

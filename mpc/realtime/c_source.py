@@ -21,13 +21,6 @@ from mpc.tires.tire import N_DOUBTS, TireStructure
 
 C = Path(__file__).parents[1] / "c"
 PREFIX = "tireid_mpc"  # of the C as it lies there
-PLACES: Mapping[str, str] = {
-    "tireid_mpc.h": "include", "tireid_mpc_equations.h": "src", "tireid_mpc_qp.h": "src",
-    "tireid_mpc_riccati.h": "src", "tireid_mpc_active.h": "src", "tireid_mpc_iteration.h": "src",
-    "tireid_mpc_caution.h": "src", "tireid_mpc_numbers.h": "src", "tireid_mpc_numbers.c": "src",
-    "tireid_mpc_riccati.c": "src", "tireid_mpc_active.c": "src", "tireid_mpc_qp.c": "src",
-    "tireid_mpc_caution.c": "src", "tireid_mpc_iteration.c": "src", "tireid_mpc.c": "src",
-}  # fmt: skip
 # Of the tracker as one file, headers first.
 ORDER = (
     *("include/{}_config.h", "include/{}.h"),
@@ -36,6 +29,11 @@ ORDER = (
     *("src/{}_numbers.c", "src/{}_riccati.c", "src/{}_active.c", "src/{}_qp.c"),
     *("src/{}_caution.c", "src/{}_iteration.c", "src/{}.c"),
 )
+PLACES = {  # of what lies there
+    file: folder
+    for folder, file in (one.format(PREFIX).split("/") for one in ORDER)
+    if not file.endswith(("_config.h", "_equations.c"))
+}
 READ: Mapping[str, str] = {
     "x": "x[{}]", "u": "u", "kappa": "kappa", "v_x": "v_x", "dt": "params->stage_time",
     "car": "params->car[{}]", "w": "params->weights[{}]", "max_slip": "params->max_slip[{}]",

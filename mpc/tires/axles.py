@@ -59,7 +59,7 @@ class CurveAxles(TireStructure):
     def slip(self, at: Point) -> Pair:
         """Return the slip angles, errors of the sensors taken off [rad]."""
         v_y = at.v_y - at.w[2] - at.w[3] * at.v_x
-        delta = (1 + at.w[1]) * at.delta + at.w[0]
+        delta = CurveAxles.turned(self, at)
         return TireStructure.slip(self, at._replace(v_y=v_y, delta=delta))
 
     def force(self, slip: Pair, at: Point) -> Pair:

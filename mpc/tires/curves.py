@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from codegen.arrays import Array
 from models.vehicle import Vehicle
 from mpc.tires.tire import Pair, Point, PredictionTire, SmallSlip
 
@@ -21,7 +21,7 @@ class LinearAxles(SmallSlip):
         return w[0] * slip[0], w[1] * slip[1]
 
 
-def linear_tire(vehicle: Vehicle, stiffness: Array | None = None) -> PredictionTire:
+def linear_tire(vehicle: Vehicle, stiffness: ArrayLike | None = None) -> PredictionTire:
     """Return the tire of the linear bicycle.
     stiffness : C_f, C_r per axle [N/rad] (2,); None takes those that the vehicle states.
     """

@@ -3,8 +3,6 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import numpy as np
-
 from identifier.axle.model import AxleModel
 from identifier.baselines.linear import LinearModel
 from identifier.estimate.model import FittedModel
@@ -29,7 +27,7 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
     if isinstance(source, PredictionTire):
         return source if vehicle is None else source._replace(vehicle=vehicle)
     if isinstance(source, Vehicle):
-        return linear_tire(source if vehicle is None else vehicle, np.array(source.bicycle[4:]))
+        return linear_tire(vehicle or source, source.bicycle[4:])
     if isinstance(source, TireModel):
         if source.kind not in MODELS:
             name = type(source).__name__
@@ -43,15 +41,11 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
     raise TypeError(f"no prediction tire can be made of {type(source).__name__}")
 
 
-def _linear(vehicle: Vehicle, tire: LinearTire) -> PredictionTire:
-    return linear_tire(vehicle, np.full(2, 2.0 * tire.C_alpha))
-
-
 MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {
     NetworkModel.kind: network_tire, AxleModel.kind: axle_tire, FittedModel.kind: fit_tire,
     LinearModel.kind: lambda model: linear_tire(model.vehicle),
 }  # fmt: skip
 TIRES: Mapping[type, Callable[[Vehicle, Any], PredictionTire]] = {
-    LinearTire: _linear,
+    LinearTire: lambda vehicle, tire: linear_tire(vehicle, 2 * (2.0 * tire.C_alpha,)),
     **dict.fromkeys((DugoffTire, FialaTire, MagicFormula), mounted_tire),
 }

@@ -5,6 +5,7 @@ paper's sign, the negative of ISO 8855, and slip makes lateral axle forces F = +
 of the body. Only the structure is compiled; the car and the weights are read while driving.
 """
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple, TypeAlias
 
@@ -54,27 +55,20 @@ class TireStructure:
     """
 
     __slots__ = ()
+    angle: Callable[[Any], Any] = staticmethod(ca.atan)  # of travel [rad], by its tangent
+    lagged: bool = False  # whether force follows a lagged slip, two more states [rad]
+    saturates = False  # whether it is judged at any slip, not only as far as the car slipped
 
     @property
     def n_weights(self) -> int:
         raise NotImplementedError
 
-    @property
-    def lagged(self) -> bool:
-        """Whether force follows a lagged slip, two more states [rad]."""
-        return False
-
-    @property
-    def saturates(self) -> bool:
-        """Whether it is judged at any slip, not only as far as the car slipped."""
-        return False
-
     def slip(self, at: Point) -> Pair:
         """Return the kinematic slip angles α = δ - atan((v_y ± l r)/v_x) [rad], paper's sign."""
         v_y, r, delta, v_x, car, _ = at
         per_speed = 1 / v_x
-        front = delta - ca.atan((v_y + car.l_f * r) * per_speed)
-        return front, -ca.atan((v_y - car.l_r * r) * per_speed)
+        front = delta - self.angle((v_y + car.l_f * r) * per_speed)
+        return front, -self.angle((v_y - car.l_r * r) * per_speed)
 
     def force(self, slip: Pair, at: Point) -> Pair:
         """Return the axle forces [N], frame of the body.
@@ -107,15 +101,11 @@ class TireStructure:
 
 
 class SmallSlip(TireStructure):
-    """A structure whose slip is that of the paper's (3), for small angles."""
+    """A structure whose slip is that of the paper's (3), α = δ - (v_y ± l r)/v_x [rad]."""
 
     __slots__ = ()
 
-    def slip(self, at: Point) -> Pair:
-        """Return α = δ - (v_y ± l r)/v_x [rad]."""
-        v_y, r, delta, v_x, car, _ = at
-        per_speed = 1 / v_x
-        return delta - (v_y + car.l_f * r) * per_speed, -(v_y - car.l_r * r) * per_speed
+    angle = staticmethod(lambda tangent: tangent)
 
 
 class PredictionTire(NamedTuple):

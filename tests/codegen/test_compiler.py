@@ -118,21 +118,17 @@ def test_a_library_appears_whole_or_not_at_all(monkeypatch, cache):
     assert found[-1] == (0, []) and list(cache.iterdir()) == [library]
 
 
-def require_a_new_one(library, caplog):
-    """What is damaged is said and never loaded: a process that maps it may crash."""
-    with caplog.at_level("INFO", logger="tireid"):
-        assert load_library(ONE, "one").one() == 1
-    assert "is damaged: building it anew" in " ".join(caplog.messages)
-    assert list(library.parent.iterdir()) == [library]
-
-
 @pytest.mark.sweep("0.0", "0.5", "0.9545*", "0.0909*")
 @pytest.mark.parametrize("share", [i / 22 for i in range(22)])
 def test_a_library_that_was_cut_short_is_built_anew(cache, caplog, share):
+    """What is damaged is said and never loaded: a process that maps it may crash."""
     library = build_library(ONE, "one")
     whole = library.read_bytes()
     library.write_bytes(whole[: int(share * len(whole))])
-    require_a_new_one(library, caplog)
+    with caplog.at_level("INFO", logger="tireid"):
+        assert load_library(ONE, "one").one() == 1
+    assert "is damaged: building it anew" in " ".join(caplog.messages)
+    assert list(cache.iterdir()) == [library]
     assert library.read_bytes() == whole
 
 

@@ -15,7 +15,12 @@ def case(rng):
     m, I_z = rng.uniform(800, 3000), rng.uniform(1000, 5000)
     l_f, l_r = rng.uniform(0.8, 2.0, 2)
     C_f, C_r = rng.uniform(4e4, 2e5, 2)
-    return BicycleParameters(m, I_z, l_f, l_r, C_f, C_r), rng.uniform(8, 40), rng.normal(size=6)
+    p, v_x, s = (
+        BicycleParameters(m, I_z, l_f, l_r, C_f, C_r),
+        rng.uniform(8, 40),
+        rng.normal(size=6),
+    )
+    return p, v_x, s[:2], 0.1 * s[2:4], 1000 * s[4:]
 
 
 def newton_euler(p, v_x, x, u, f):
@@ -34,32 +39,22 @@ def relative(residual, scale):
     return np.abs(residual).max() / np.abs(scale).max()
 
 
-def require_newton_and_euler(case, implementation):
-    p, v_x, s = case
-    x, u, f = s[:2], 0.1 * s[2:4], 1000 * s[4:]
-    model = implementation(p, v_x)
+def require_newton_and_euler(model, p, v_x, x, u, f):
     x_dot = numbers(model.A) @ x + numbers(model.B) @ u + numbers(model.K) @ f
     expected = newton_euler(p, v_x, x, u, f)
     assert relative(x_dot - expected, expected) < RESIDUAL
 
 
-def require_input_matrix_of_the_stiffnesses(case, implementation):
-    p, v_x, _ = case
-    model = implementation(p, v_x)
+def require_input_matrix_of_the_stiffnesses(model, p, *_):
     B = numbers(model.K) @ np.diag([p.C_f, p.C_r])
     assert relative(B - numbers(model.B), numbers(model.B)) < RESIDUAL
 
 
-def require_closed_form_inverse(case, implementation):
-    p, v_x, _ = case
-    model = implementation(p, v_x)
+def require_closed_form_inverse(model, *_):
     np.testing.assert_allclose(numbers(model.K) @ numbers(model.K_inv), np.eye(2), atol=RESIDUAL)
 
 
-def require_decoupled_axle_forces(case, implementation):
-    p, v_x, s = case
-    x, u, f = s[:2], 0.1 * s[2:4], 1000 * s[4:]
-    model = implementation(p, v_x)
+def require_decoupled_axle_forces(model, p, v_x, x, u, f):
     K_inv = np.linalg.inv(numbers(model.K))
     xi_dot = K_inv @ newton_euler(p, v_x, x, u, f)
     decoupled = numbers(model.A_xi) @ (K_inv @ x) + numbers(model.B_xi) @ u + f  # (7)
@@ -76,23 +71,18 @@ REQUIREMENTS = (
 
 @pytest.mark.parametrize("require", REQUIREMENTS)
 def test_bicycle_obeys_its_equations(case, require):
-    require(case, bicycle)
-
-
-def with_printed_transpose(p, v_x):
-    """The bicycle with K as (6) prints it, transposed."""
-    model = bicycle(p, v_x)
-    return model._replace(K=model.K.T)
+    require(bicycle(*case[:2]), *case)
 
 
 @pytest.mark.parametrize("require", REQUIREMENTS)
 def test_the_printed_transpose_of_K_is_caught(case, require):
+    model = bicycle(*case[:2])
     with pytest.raises(AssertionError):
-        require(case, with_printed_transpose)
+        require(model._replace(K=model.K.T), *case)
 
 
 def test_matrices_are_the_jacobians_of_newton_and_euler(case):
-    p, v_x, _ = case
+    p, v_x, *_ = case
     x, u, f = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("f", 2)
     alpha = slip_angles(p.l_f, p.l_r, v_x, x, u)
     F = ca.vertcat(p.C_f * alpha[0], p.C_r * alpha[1]) + f  # (3), (5)
@@ -104,7 +94,7 @@ def test_matrices_are_the_jacobians_of_newton_and_euler(case):
 
 
 def test_symbols_and_numbers_give_the_same_matrices(case):
-    p, v_x, _ = case
+    p, v_x, *_ = case
     symbols = BicycleParameters(*(ca.SX.sym(name) for name in p._fields))
     speed = ca.SX.sym("v_x")
     evaluate = ca.Function("matrices", [*symbols, speed], list(bicycle(symbols, speed)))

@@ -8,9 +8,9 @@ import pytest
 from models.faults import KINDS, SensorFault
 
 
-def fault(kind, size=0.5, **times):
+def fault(kind, **times):
     return SensorFault(
-        channel="v_y", kind=kind, **{"start": 2.0, "duration": 1.5, **times}, size=size
+        channel="v_y", kind=kind, **{"start": 2.0, "duration": 1.5, **times}, size=0.5
     )
 
 

@@ -290,10 +290,6 @@ def test_a_wide_change_over_the_place_is_the_one_cubic_that_starts_and_ends_flat
     assert steepest == pytest.approx(1.5 * 0.4 / 4.0, rel=1e-3)  # of a straight ramp: 0.4/4
 
 
-def half(**where):
-    return FrictionChange(scale=0.5, **where)
-
-
 def test_the_driver_holds_and_reaches_a_speed():
     straight = StepSteer(amplitude=0.0, onset=0.0, rate_limit=1.0, duration=12.0)
     run = PLANT.simulate(straight, speed=lambda t: np.where(t < 1.0, 20.0, 25.0))

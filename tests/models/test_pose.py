@@ -190,7 +190,8 @@ def test_a_pose_that_nobody_told_and_that_is_none_is_left_aside_with_a_note(tmp_
 @pytest.mark.parametrize("kind", ["PoseStamped", "Odometry", "TFMessage"])
 def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
     pytest.importorskip("rosbags")
-    from tests.models.logs.test_bag import header, store_of, write
+    from tests.models.logs.drive_in_every_format import header
+    from tests.models.logs.test_bag import store_of, write
 
     store = store_of()
     kinds = store.types

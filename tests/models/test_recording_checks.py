@@ -16,7 +16,6 @@ from models.recordings import (
     runs,
 )
 
-Array = np.ndarray
 DEGREES = 180.0 / np.pi
 
 # name -> m [kg], I_z [kg m^2], l_f, l_r [m], C_f, C_r [N/rad]

@@ -30,9 +30,9 @@ def write(path, header, lines):
     return path
 
 
-def refusal(path, run=None, dt=0.01):
+def refusal(path, run=None):
     with pytest.raises(RecordingError) as caught:
-        read_recording(path, run, dt)
+        read_recording(path, run)
     message = str(caught.value)
     assert "\n" not in message
     assert message.startswith(str(path))

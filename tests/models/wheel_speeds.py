@@ -36,11 +36,11 @@ def spin(t, begin, lasts, size, rise=0.15):
     return size * np.minimum(up, down)
 
 
-def anti_lock(t, begin, lasts, deepest=0.3, frequency=7.0, phase=0.0):
+def anti_lock(t, begin, lasts, frequency=7.0, phase=0.0):
     """Slip of a wheel that is braked at the limit [-], (n,): it dives and comes back."""
     braked = (t >= begin) & (t < begin + lasts)
     dive = 0.5 - 0.5 * np.cos(2.0 * np.pi * (frequency * (t - begin) + phase))
-    return -deepest * braked * dive**2
+    return -0.3 * braked * dive**2
 
 
 def shown(run, slip, rng=None, noise=0.02):

@@ -101,11 +101,11 @@ def write_bag(path, t, columns, storage="sqlite3"):
             )
         )
         for k, time in enumerate(ns.tolist()):
-            header = _header(store, time)
+            head = header(store, time)
             one = {name: float(values[k]) for name, values in columns.items()}
             for connection, message in (
-                (odometry, _odometry(store, header, one)),
-                (imu, _imu(store, header, one)),
+                (odometry, _odometry(store, head, one)),
+                (imu, _imu(store, head, one)),
                 (steering, store.types["std_msgs/msg/Float64"](one["delta_f"])),
             ):
                 raw = store.serialize_cdr(message, message.__msgtype__)
@@ -123,7 +123,7 @@ IN_BAG = {
 }
 
 
-def _header(store, ns, frame="base_link"):
+def header(store, ns, frame="base_link"):
     time = store.types["builtin_interfaces/msg/Time"](ns // 10**9, ns % 10**9)
     return store.types["std_msgs/msg/Header"](time, frame)
 

@@ -28,8 +28,8 @@ def drive(n=N):
     )
 
 
-def number(value, decimal=".", digits=3):
-    return f"{value:.{digits}f}".replace(".", decimal)
+def number(value, decimal="."):
+    return f"{value:.3f}".replace(".", decimal)
 
 
 def table(rows, delimiter=",", decimal=".", end="\n", quoted=False, trailing=False):

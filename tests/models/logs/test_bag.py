@@ -8,7 +8,7 @@ import pytest
 from models.logs.bag import _KNOWN
 from models.logs.door import open_log
 from tests.models.logs.conftest import refusal
-from tests.models.logs.drive_in_every_format import FIRST_NS, write_bag
+from tests.models.logs.drive_in_every_format import FIRST_NS, header, write_bag
 
 rosbag2 = pytest.importorskip("rosbags.rosbag2")
 typesys = pytest.importorskip("rosbags.typesys")
@@ -22,11 +22,6 @@ def store_of(**types):
     for kind, text in {**_KNOWN, **types}.items():
         store.register(typesys.get_types_from_msg(text, kind))
     return store
-
-
-def header(store, ns, frame="base_link"):
-    time = store.types["builtin_interfaces/msg/Time"](ns // 10**9, ns % 10**9)
-    return store.types["std_msgs/msg/Header"](time, frame)
 
 
 def write(path, store, topics, storage="sqlite3", mode=None):

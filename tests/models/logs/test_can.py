@@ -44,9 +44,9 @@ def write(path, messages):
     return path
 
 
-def dbc(folder, text=CAR, encoding="cp1252"):
+def dbc(folder, text=CAR):
     path = folder / "car.dbc"
-    path.write_bytes(text.encode(encoding))
+    path.write_bytes(text.encode("cp1252"))
     return path
 
 
@@ -86,9 +86,9 @@ def steering(k):
     return struct.pack("<h", k) + struct.pack(">h", 2 * k) + b"\0\0\0" + bytes([(k % 16) << 4])
 
 
-def car_log(path, count=30):
+def car_log(path):
     messages = []
-    for k in range(count):
+    for k in range(30):
         t = 1.7e9 + k * 0.02
         messages.append((t, 100, steering(k), {}))
         messages.append((t + 0.001, 0x18FF1000, struct.pack("<HH", 100 * k, 0), {}))
@@ -262,8 +262,8 @@ def of_a_truck(folder, more="", sender=0xFE):
     return dbc(folder, f'VERSION ""\n\nBU_: Car\n\n{message}{more}')
 
 
-def frames(count, identifier, bus="can0"):
-    return [(10.0 + 0.01 * k, bus, identifier, struct.pack("<hh", k, 0)) for k in range(count)]
+def frames(count, identifier):
+    return [(10.0 + 0.01 * k, "can0", identifier, struct.pack("<hh", k, 0)) for k in range(count)]
 
 
 @pytest.mark.parametrize("senders", [[0x18F0093E], [0x08F009FE], [0x18F0093E, 0x18F00917]])

@@ -10,14 +10,10 @@ from models.logs.log import RecordingError
 from models.logs.names import propose
 from models.recordings import LogMap, read_recording
 from models.recordings.map import given_signals
+from tests.models.logs.test_which_time import signals
 
 T = 0.01 * np.arange(600)
-SIGNALS = {
-    "vx": 20.0 + np.sin(T),
-    "vy": 0.1 * np.sin(T),
-    "r": 0.3 * np.sin(T),
-    "delta_f": 0.05 * np.sin(T),
-}
+SIGNALS = signals(T)
 
 
 def table(path, names, *columns):

@@ -31,9 +31,9 @@ WRITTEN = {
 }
 
 
-def as_arrays(t, columns, rows, **told):
+def as_arrays(t, columns, rows):
     data = {"t": t[rows], **{name: values[rows] for name, values in columns.items()}}
-    return open_arrays("log", data, **told)
+    return open_arrays("log", data, mend=True)
 
 
 @pytest.mark.parametrize("kind", WRITTEN)
@@ -42,7 +42,7 @@ def test_the_samples_are_those_of_the_right_log(format, kind, tmp_path, drive):
     t, columns = drive
     rows, said = WRITTEN[kind]
     if format == "arrays":
-        log, names = as_arrays(t, columns, rows, mend=True), list(columns)
+        log, names = as_arrays(t, columns, rows), list(columns)
     else:
         written = write(format, tmp_path, t[rows], {k: v[rows] for k, v in columns.items()})
         log, names = open_log(written.path, written.dbc, mend=True), list(written.names.values())
@@ -59,7 +59,7 @@ def test_the_samples_are_those_of_the_right_log(format, kind, tmp_path, drive):
 def test_what_follows_where_the_clock_starts_again_is_put_after_a_gap(drive):
     t, columns = drive
     pieces = [EVERY, EVERY[:200], EVERY[:250]]
-    log = as_arrays(t, columns, np.concatenate(pieces), mend=True)
+    log = as_arrays(t, columns, np.concatenate(pieces))
     channel = log.read(["r"])[0]
     np.testing.assert_array_equal(channel.values, columns["r"][np.concatenate(pieces)])
     ends = np.cumsum([len(piece) for piece in pieces])
@@ -72,12 +72,12 @@ def test_what_follows_where_the_clock_starts_again_is_put_after_a_gap(drive):
 def test_runs_are_not_mixed_and_a_sample_astray_goes_to_its_place(drive):
     t, columns = drive
     late = np.concatenate([EVERY[:200], EVERY[90:]])  # as late as that no clock begins
-    log = as_arrays(t, columns, late, mend=True)
+    log = as_arrays(t, columns, late)
     np.testing.assert_array_equal(log.read(["r"])[0].values, columns["r"][late])
-    log = as_arrays(t, columns, np.concatenate([EVERY[:20], EVERY[21:], [20]]), mend=True)
+    log = as_arrays(t, columns, np.concatenate([EVERY[:20], EVERY[21:], [20]]))
     np.testing.assert_array_equal(log.read(["r"])[0].values, columns["r"])
     mixed = np.random.default_rng(7).permutation(N)
-    np.testing.assert_array_equal(as_arrays(t, columns, mixed, mend=True).read(["r"])[0].t, t)
+    np.testing.assert_array_equal(as_arrays(t, columns, mixed).read(["r"])[0].t, t)
 
 
 def test_a_clock_of_several_that_starts_again_is_refused_all_the_same(tmp_path, drive):
@@ -91,20 +91,20 @@ def test_a_clock_of_several_that_starts_again_is_refused_all_the_same(tmp_path, 
 
 def test_stamps_that_are_shared_throughout_are_refused_all_the_same(drive):
     t, columns = drive
-    log = as_arrays(np.sqrt(t), columns, np.repeat(EVERY, 2), mend=True)
+    log = as_arrays(np.sqrt(t), columns, np.repeat(EVERY, 2))
     with pytest.raises(RecordingError, match="stamps are rounded, 2 samples share one"):
         log.read(["r"])
 
 
 def test_a_time_that_never_moves_is_refused_all_the_same(drive):
     t, columns = drive
-    log = as_arrays(0.0 * t, columns, EVERY, mend=True)
+    log = as_arrays(0.0 * t, columns, EVERY)
     with pytest.raises(RecordingError, match="it never moves: declare the column"):
         log.read(["r"])
 
 
 def test_a_log_that_is_right_is_left_alone(drive):
     t, columns = drive
-    log = as_arrays(t, columns, EVERY, mend=True)
+    log = as_arrays(t, columns, EVERY)
     np.testing.assert_array_equal(log.read(["r"])[0].t, t)
     assert not log.notes

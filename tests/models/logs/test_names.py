@@ -104,13 +104,14 @@ class Log:
         return tuple(
             Channel(
                 name=name,
-                unit=self.channels[name][0],
-                t=0.01 * np.arange(self.channels[name][1].size),
-                values=self.channels[name][1],
+                unit=unit,
+                t=0.01 * np.arange(values.size),
+                values=values,
                 place="sample",
-                rows=np.arange(self.channels[name][1].size),
+                rows=np.arange(values.size),
             )
             for name in names
+            for unit, values in [self.channels[name]]
         )
 
 

@@ -153,13 +153,6 @@ def test_curvature_is_at_most_one(name):
     assert force(3.0) == force(1.0) != force(0.9)
 
 
-def test_friction_of_the_road_multiplies_the_friction_scales():
-    c = SEDAN.coefficients
-    scaled = replace(SEDAN, coefficients=replace(c, LMUX=0.4, LMUY=0.4))
-    slip = (0.08, -0.05, 0.03, 3000.0)
-    assert SEDAN.forces(*slip, mu=0.4) == pytest.approx(scaled.forces(*slip), abs=1e-9)
-
-
 @pytest.mark.parametrize("kind", [ca.SX, ca.MX, ca.DM])
 def test_symbols_and_floats_give_the_same_force(kind):
     point = (0.06, -0.04, 0.03, 3500.0, 0.8)

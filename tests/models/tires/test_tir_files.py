@@ -20,6 +20,10 @@ def written(folder, text):
     return path
 
 
+def tire_of(folder, text):
+    return MagicFormula.from_tir(written(folder, text))
+
+
 def edited(**changes):
     """A small complete file with values replaced, added, or (None) removed."""
     lines = {**ESSENTIAL, **changes}
@@ -39,7 +43,7 @@ def complaint(folder, text):
 
 
 def test_eight_coefficients_are_a_tire(tmp_path):
-    tire = MagicFormula.from_tir(written(tmp_path, PLAIN))
+    tire = tire_of(tmp_path, PLAIN)
     assert tire.name == "odd"
     assert tire.side == "left"
     assert tire.valid_range.F_z == (-inf, inf)
@@ -95,7 +99,7 @@ PCY1 = 130.E-2
 PKY1 = -19.
 PKY2 = 1.9
 $ the end, without a line break"""
-    plain = MagicFormula.from_tir(written(tmp_path, edited(TYRESIDE="RIGHT")))
+    plain = tire_of(tmp_path, edited(TYRESIDE="RIGHT"))
     forms = [
         odd.encode("utf-8"),
         odd.replace("\n", "\r\n").encode("utf-8"),
@@ -104,7 +108,7 @@ $ the end, without a line break"""
         odd.removeprefix("\ufeff").encode("utf-16"),
     ]
     for form in forms:
-        tire = MagicFormula.from_tir(written(tmp_path, form))
+        tire = tire_of(tmp_path, form)
         assert tire.coefficients == plain.coefficients
         assert tire.side == "right"
         assert tire.valid_range.F_z == pytest.approx((200.0, 9000.0))
@@ -128,7 +132,7 @@ $ the end, without a line break"""
     ],
 )  # fmt: skip
 def test_loads_come_in_every_unit(tmp_path, unit, newton):
-    tire = MagicFormula.from_tir(written(tmp_path, f"[UNITS]\nFORCE = '{unit}'\n{PLAIN}"))
+    tire = tire_of(tmp_path, f"[UNITS]\nFORCE = '{unit}'\n{PLAIN}")
     nominal_load = tire.coefficients.FNOMIN
     assert nominal_load == pytest.approx(4000.0 * newton, rel=1e-12)
 
@@ -141,7 +145,7 @@ def test_loads_come_in_every_unit(tmp_path, unit, newton):
     ],
 )
 def test_a_key_or_word_like_a_unit_is_none_outside_its_section(tmp_path, text):
-    tire = MagicFormula.from_tir(written(tmp_path, f"{text}\n{PLAIN}"))
+    tire = tire_of(tmp_path, f"{text}\n{PLAIN}")
     assert tire.coefficients.FNOMIN == 4000.0
 
 
@@ -155,8 +159,8 @@ def test_files_of_the_same_formula_are_accepted(tmp_path):
         "PROPERTY_FILE_FORMAT = 'MF-TYRE'\nFITTYP = 5",
         "FITTYP = 21",
     ):
-        tire = MagicFormula.from_tir(written(tmp_path, f"{head}\n{PLAIN}"))
-        assert tire.coefficients == MagicFormula.from_tir(written(tmp_path, PLAIN)).coefficients
+        tire = tire_of(tmp_path, f"{head}\n{PLAIN}")
+        assert tire.coefficients == tire_of(tmp_path, PLAIN).coefficients
 
 
 @pytest.mark.parametrize(
@@ -205,7 +209,7 @@ def test_a_file_of_another_version_is_told_by_its_coefficients_whatever_it_calls
 def test_the_pressure_coefficients_of_pac2002_are_no_mark_of_another_version(tmp_path):
     """PPX1-4 and PPY1-4 beside IP and IP_NOM are PAC2002's own; only PPY5 is not."""
     own = edited(IP="2", IP_NOM="2", PPX1="0.5", PPY1="-0.4", PPY4="0.1")
-    MagicFormula.from_tir(written(tmp_path, f"PROPERTY_FILE_FORMAT = 'PAC2002'\n{own}"))
+    tire_of(tmp_path, f"PROPERTY_FILE_FORMAT = 'PAC2002'\n{own}")
 
 
 def test_a_file_of_the_formula_that_lists_later_names_too_is_read(tmp_path):
@@ -216,7 +220,7 @@ def test_a_file_of_the_formula_that_lists_later_names_too_is_read(tmp_path):
         "PROPERTY_FILE_FORMAT = 'MF-TYRE'\nFITTYP = 52",
         "PROPERTY_FILE_FORMAT = 'MF_05'",
     ):
-        plain = MagicFormula.from_tir(written(tmp_path, f"{label}\n{own}")).coefficients
+        plain = tire_of(tmp_path, f"{label}\n{own}").coefficients
         listed = written(tmp_path, f"{label}\n{own}\n{later}")
         assert MagicFormula.from_tir(listed).coefficients == plain
         for mark in ("PKY4 = 1.9", "PKY6 = -0.9"):
@@ -230,10 +234,10 @@ def test_pressures_by_their_later_names_scale_as_those_of_pac2002(tmp_path):
     now, nominal = "220000", "200000"
     later = label + edited(**effects, INFLPRES=now, NOMPRES=nominal)
     own = label + edited(**effects, IP=now, IP_NOM=nominal)
-    read = MagicFormula.from_tir(written(tmp_path, later)).coefficients
+    read = tire_of(tmp_path, later).coefficients
     mu = read.PDY1
     assert mu == pytest.approx(0.9)
-    assert read == MagicFormula.from_tir(written(tmp_path, own)).coefficients
+    assert read == tire_of(tmp_path, own).coefficients
     says = complaint(tmp_path, label + edited(**effects, INFLPRES="0", NOMPRES=nominal))
     assert says == "INFLPRES and NOMPRES must be positive, they are 0 and 200000"
 
@@ -242,7 +246,7 @@ def test_a_negative_lateral_friction_is_the_same_tire(tmp_path):
     """B = K/(C D) takes the sign of D, and D sin(C atan(B x)) is the same in (-B, -D)."""
     values = {"PDY1": -0.71, "PDY2": 0.14, "PDY3": -4.5, "PHY1": 0.005, "PVY1": 0.014, "RVY1": 0.2}
     values |= {"RVY4": 12.0, "RVY5": 1.9, "RVY6": -10.0, "RBY1": 7.0, "RBY2": 2.0, "RCY1": 1.0}
-    tire = MagicFormula.from_tir(written(tmp_path, edited(**{k: str(values[k]) for k in values})))
+    tire = tire_of(tmp_path, edited(**{k: str(values[k]) for k in values}))
     F_z, alpha, kappa, gamma = 5000.0, -0.06, -0.04, 0.03  # ISO slip angle
     df = (F_z - 4000.0) / 4000.0
     D = F_z * (values["PDY1"] + values["PDY2"] * df) * (1.0 - values["PDY3"] * gamma**2)
@@ -287,7 +291,7 @@ def test_impossible_values_are_refused(tmp_path, change, says):
 def test_a_value_that_is_no_number_is_shown_with_its_line(tmp_path, word):
     message = complaint(tmp_path, f"{PLAIN}\n\nPHY1 = {word}\n")
     assert re.match(r"line 10: PHY1 must be a finite number, it is ", message)
-    MagicFormula.from_tir(written(tmp_path, f"{PLAIN}\nNOBODY_NEEDS_IT = {word}\n"))
+    tire_of(tmp_path, f"{PLAIN}\nNOBODY_NEEDS_IT = {word}\n")
 
 
 @pytest.mark.parametrize(
@@ -325,13 +329,13 @@ def test_a_forgotten_equals_sign_is_no_missing_word(tmp_path, line, says):
 def test_a_comment_ends_with_its_line_alone(tmp_path, sign):
     """0x85 is the ellipsis of cp1252, and the next line of Unicode."""
     raw = PLAIN.encode() + b"\n$ measured on wet road " + sign + b"LMUY = 0.5\n"
-    assert MagicFormula.from_tir(written(tmp_path, raw)).coefficients.LMUY == 1.0
+    assert tire_of(tmp_path, raw).coefficients.LMUY == 1.0
 
 
 def test_a_symmetric_tire_loses_conicity_and_plysteer(tmp_path):
     lopsided = {"PHY1": "0.01", "PVY1": "0.02"}
-    plain = MagicFormula.from_tir(written(tmp_path, edited(**lopsided)))
-    tire = MagicFormula.from_tir(written(tmp_path, edited(**lopsided, TYRESIDE="SYMMETRIC")))
+    plain = tire_of(tmp_path, edited(**lopsided))
+    tire = tire_of(tmp_path, edited(**lopsided, TYRESIDE="SYMMETRIC"))
     assert plain.forces(0.0, 0.0, 0.0, 4000.0).F_y != 0.0
     assert tire.forces(0.0, 0.0, 0.0, 4000.0).F_y == 0.0
 
@@ -351,8 +355,8 @@ def test_inflation_pressure_scales_friction_alike_at_every_load(tmp_path):
     spread = {"PDX2": "-0.3", "PDY2": "-0.2", "PKX2": "3"}
     pressure = {"IP": "220000", "IP_NOM": "200000", "LIP": "1.5"}
     effects = {"PPX3": "0.5", "PPY3": "-0.4", "PPY4": "1", "PPX1": "0.6"}
-    plain = MagicFormula.from_tir(written(tmp_path, edited(**spread)))
-    blown = MagicFormula.from_tir(written(tmp_path, edited(**spread, **pressure, **effects)))
+    plain = tire_of(tmp_path, edited(**spread))
+    blown = tire_of(tmp_path, edited(**spread, **pressure, **effects))
     dp = (1.5 * 220.0 - 200.0) / 200.0
     slips = [0.002 * k for k in range(1, 400)]
     for F_z in (2000.0, 4000.0, 7000.0):
@@ -371,7 +375,7 @@ def test_inflation_pressure_scales_friction_alike_at_every_load(tmp_path):
 
 def test_a_scale_that_is_not_written_is_one_and_a_coefficient_zero(tmp_path):
     """Conditions of the format: what a file leaves out changes nothing."""
-    bare = MagicFormula.from_tir(written(tmp_path, PLAIN)).coefficients
+    bare = tire_of(tmp_path, PLAIN).coefficients
     for name in bare.__dataclass_fields__:
         if name not in ESSENTIAL:
             assert getattr(bare, name) == (1.0 if name.startswith("L") else 0.0), name

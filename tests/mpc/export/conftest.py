@@ -1,5 +1,6 @@
 """Packages of both kinds of tires that can be handed over, alone and with their identifiers."""
 
+import re
 import shutil
 
 import pytest
@@ -53,12 +54,21 @@ def write(tmp_path):
 def write_pair(tmp_path):
     """A function that writes both packages and what joins them."""
 
-    def written(pair):
-        put(tmp_path / "identifier", pair.identifier.files)
-        put(tmp_path / "mpc", pair.tracker.files)
-        return put(tmp_path, pair.files)
+    return lambda pair: put_pair(tmp_path, pair)
 
-    return written
+
+def put_pair(folder, pair):
+    put(folder / "identifier", pair.identifier.files)
+    put(folder / "mpc", pair.tracker.files)
+    return put(folder, pair.files)
+
+
+def planted(folder, file, pattern, replacement):
+    """Change the text of a file of a package at one place."""
+    text = (folder / file).read_text()
+    changed = re.sub(pattern, replacement, text, count=1)
+    assert changed != text
+    (folder / file).write_text(changed)
 
 
 def c_files(folder, under="src"):

@@ -20,10 +20,11 @@ from mpc.export.pair import DELAY, NoHandoverError, build_pair, frozen_start
 from mpc.realtime import Tracker
 from mpc.tires import prediction_tire
 from tests.kept import Kept
-from tests.mpc.export.conftest import LAWS, STRICT, c_files, put
+from tests.mpc.export.conftest import LAWS, STRICT, c_files, put_pair
 from tests.rivals import rival
 
 CAR = sedan()
+SLALOM = Slalom(amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=9.99)
 INCLUDES = ["-Iinclude", "-Iidentifier/include", "-Impc/include"]
 
 
@@ -46,13 +47,22 @@ def sensing():
     return cache(lambda law: build_pair(build_package(make_method(law, CAR), CAR, with_a_y=True)))
 
 
-def program(folder, run, compiler="gcc", *, single=0):
+def program(folder, run, single):
     """Build the example with its packages; return what the compiler says."""
     parts = ("", "identifier/", "mpc/")
     sources = [path for part in parts for path in c_files(folder, f"{part}src")]
     defines = [f"-DTIREID_SINGLE={single}", f"-DTIREID_MPC_SINGLE={single}"]
     words = [*STRICT, "-O1", "-ffp-contract=off", *defines, *INCLUDES, *sources]
-    return run(compiler, *words, *c_files(folder, "examples"), "-lm", "-o", "loop", cwd=folder)
+    return run("gcc", *words, *c_files(folder, "examples"), "-lm", "-o", "loop", cwd=folder)
+
+
+def require_lane_kept(said, log):
+    rms = [float(text) for text in re.findall(r"rms ([\d.]+) m", said)]
+    exported, learnt = np.array(rms).reshape(2, -1)
+    assert learnt[-1] < 0.6 * exported[-1]  # what was learnt is worth something
+    rows = np.loadtxt(log, delimiter=",", skiprows=1)
+    assert np.abs(rows[:, 3]).max() < 0.3
+    return rows
 
 
 @pytest.mark.heavy
@@ -60,25 +70,19 @@ def program(folder, run, compiler="gcc", *, single=0):
 def test_a_car_with_an_accelerometer_keeps_its_lane(law, single, sensing, write_pair, run):
     """The inertial one without a sensor of v_y: the tracker steers by the v_y that is told."""
     folder = write_pair(sensing(law))
-    answer = program(folder, run, single=single)
+    answer = program(folder, run, single)
     assert (answer.returncode, answer.stderr) == (0, "")
     log = folder / "log.csv"
     answer = run(str(folder / "loop"), str(log))
     assert answer.returncode == 0, answer.stdout
-    rms = [float(text) for text in re.findall(r"rms ([\d.]+) m", answer.stdout)]
-    exported, learnt = np.array(rms).reshape(2, -1)
-    assert learnt[-1] < 0.6 * exported[-1]
-    assert np.abs(np.loadtxt(log, delimiter=",", skiprows=1)[:, 3]).max() < 0.3
+    require_lane_kept(answer.stdout, log)
 
 
 @pytest.mark.heavy
 def test_what_is_learnt_without_v_y_is_handed_over_whole(sensing, write_pair):
     """Compliance, the share of sway, and the zero of the steering: as Python makes the tire."""
     pair = sensing("inertial")
-    slalom = Slalom(
-        amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=9.99
-    )
-    drive = replace(Plant(CAR).simulate(slalom, speed=20.0).recording(), v_y=None)
+    drive = replace(Plant(CAR).simulate(SLALOM, speed=20.0).recording(), v_y=None)
     drive = replace(drive, delta_f=drive.delta_f - 0.004)
     library = joined(write_pair(pair))
     learnt = CompiledPackage.of(pair.identifier, single=False)
@@ -110,21 +114,14 @@ def test_cmake_builds_both_and_the_learning_car_keeps_its_lane(law, single, pair
     log = folder / "log.csv"
     answer = run(str(folder / "build" / "tireid_closed_loop"), str(log))
     assert answer.returncode == 0, answer.stdout
-    rms = [float(text) for text in re.findall(r"rms ([\d.]+) m", answer.stdout)]
-    exported, learnt = np.array(rms).reshape(2, -1)
-    assert learnt[-1] < 0.6 * exported[-1]  # what was learnt is worth something
-    rows = np.loadtxt(log, delimiter=",", skiprows=1)
-    assert np.abs(rows[:, 3]).max() < 0.3
+    rows = require_lane_kept(answer.stdout, log)
     assert (rows[:, -1] <= 1).all()
 
 
 @pytest.fixture(scope="module")
 def taught(pairs):
     """By law, the identifier after 10 s of a slalom, as C has learnt it."""
-    slalom = Slalom(
-        amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=9.99
-    )
-    recording = Plant(sedan()).simulate(slalom, speed=20.0).recording()
+    recording = Plant(CAR).simulate(SLALOM, speed=20.0).recording()
 
     def make(law):
         learner = CompiledPackage.of(pairs[law].identifier, single=False)
@@ -139,14 +136,7 @@ def libraries(pairs, tmp_path_factory):
     """By law, the handover and the tracker in double."""
 
     def make(law):
-        folder, pair = tmp_path_factory.mktemp(law), pairs[law]
-        for part, files in (
-            ("identifier", pair.identifier.files),
-            ("mpc", pair.tracker.files),
-            ("", pair.files),
-        ):
-            put(folder / part, files)
-        return joined(folder)
+        return joined(put_pair(tmp_path_factory.mktemp(law), pairs[law]))
 
     return Kept(make)
 
@@ -194,19 +184,13 @@ def test_c_hands_over_what_python_makes_of_the_same_weights(law, taught, pairs, 
         np.testing.assert_array_equal(params[name], pair.tracker.params[name], err_msg=name)
 
 
-def test_how_sensors_are_mounted_stays_at_a_handover(tmp_path):
+def test_how_sensors_are_mounted_stays_at_a_handover(write_pair):
     design = make_method("axle", CAR)
     fresh = design.frozen(CAR, design.setup(CAR).carry)
     start = replace(fresh, sensors=Sensors(0.01, 0.2, 0.05))
     pair = build_pair(build_package(design, CAR, start))
-    for part, files in (
-        ("identifier", pair.identifier.files),
-        ("mpc", pair.tracker.files),
-        ("", pair.files),
-    ):
-        put(tmp_path / part, files)
     weights = CompiledPackage.of(pair.identifier, single=False).weights
-    taken, params = handed_over(joined(tmp_path), pair, weights, 1.0)
+    taken, params = handed_over(joined(write_pair(pair)), pair, weights, 1.0)
     assert taken
     np.testing.assert_allclose(params["weights"], prediction_tire(start).weights, rtol=1e-14)
     np.testing.assert_array_equal(params["weights"][[3, 1]], [0.01, 0.05])

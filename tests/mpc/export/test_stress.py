@@ -9,7 +9,7 @@ from models.vehicle import sedan
 from mpc.export.package import build_mpc_package
 from mpc.problem import Problem
 from mpc.tires import prediction_tire
-from tests.mpc.export.conftest import LAWS, c_files
+from tests.mpc.export.conftest import LAWS, c_files, planted
 
 HOSTILE = (Path(__file__).parent / "hostile.c").read_text()
 SANITIZED = "-std=c99 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=all"
@@ -61,10 +61,7 @@ def test_thousands_of_hostile_measurements_find_nothing(law, steps, packages, wr
 )
 def test_without_a_guard_the_alarm_rings(file, pattern, replacement, complaint, write, run):
     folder = write(build_mpc_package(prediction_tire(sedan()), Problem(horizon=8)))
-    text = (folder / file).read_text()
-    changed = re.sub(pattern, replacement, text, count=1)
-    assert changed != text
-    (folder / file).write_text(changed)
+    planted(folder, file, pattern, replacement)
     answer = run(build(folder, run, 0, steps=500, optimized=BUILDS))
     assert answer.returncode != 0
     if complaint:

@@ -19,14 +19,24 @@ NOISY = Sensors(
 )
 
 
-def drive(maneuver, *, friction=None, seed=0, sensors=NOISY):
+def drive(maneuver, *, friction=None):
     run = Plant(sedan()).simulate(maneuver, speed=SPEED, friction=friction)
-    return run, run.recording(sensors, np.random.default_rng(seed))
+    return run, run.recording(NOISY, np.random.default_rng(0))
 
 
 def samples_of(recording):
     """Rows of `window.COLUMNS`."""
     return np.column_stack([recording.v_x, recording.v_y, recording.r, recording.delta_f])
+
+
+class Told:
+    """A judge whose chi-squares are told."""
+
+    def lookback(self, seconds):
+        return seconds
+
+    def chi_square(self, tire, samples):
+        return self.chi_squares(tire, tire.weights[None], samples)[0]
 
 
 @pytest.fixture(scope="session")

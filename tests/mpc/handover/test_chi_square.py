@@ -8,7 +8,7 @@ from mpc.tires import prediction_tire
 from tests.mpc.handover.conftest import samples_of
 
 
-def forces_by_hand(tire, samples, dt):
+def forces_by_hand(tire, samples):
     """Ladders with lag, in plain numpy."""
     car, n = tire.vehicle, tire.structure.units
     delta_0, _, bias, _ = tire.weights[:4]
@@ -29,7 +29,7 @@ def forces_by_hand(tire, samples, dt):
                 per_scale, W = axle[4 : 4 + n], axle[-n:]
                 slope = np.sum(W * per_scale / np.cosh(per_scale * x) ** 2)
                 sigma.append(axle[2] * max(slope, 0.02 * np.sum(W * per_scale)) + axle[3])
-            lagged = alpha + np.exp(-v_x * dt / np.array(sigma)) * (lagged - alpha)
+            lagged = alpha + np.exp(-v_x * 0.01 / np.array(sigma)) * (lagged - alpha)
         force = [
             axle[0] * np.sum(axle[-n:] * np.tanh(axle[4 : 4 + n] * x))
             for axle, x in zip(axles, lagged, strict=True)
@@ -42,17 +42,17 @@ def test_forces_along_a_drive_are_those_by_hand(tire, dry, rng):
     samples = samples_of(dry[1])[:200]
     weights = np.stack([tire.weights, 0.9 * tire.weights])
     told = axle_forces(tire, weights, samples, 0.01)
-    np.testing.assert_allclose(told[0], forces_by_hand(tire, samples, 0.01), atol=1.0)
+    np.testing.assert_allclose(told[0], forces_by_hand(tire, samples), atol=1.0)
     other = tire._replace(weights=weights[1])
-    np.testing.assert_allclose(told[1], forces_by_hand(other, samples, 0.01), atol=1.0)
+    np.testing.assert_allclose(told[1], forces_by_hand(other, samples), atol=1.0)
 
 
-def bicycle_drive(car, n=300, fine=10, dt=0.01, v_x=20.0):
+def bicycle_drive(car):
     """Samples of a bicycle whose axle forces (n, 2) [N] are known exactly."""
-    v_y = r = 0.0
-    load, h = np.array(car.axle_loads), dt / fine
+    v_x, v_y, r = 20.0, 0.0, 0.0
+    load, h, fine = np.array(car.axle_loads), 0.001, 10
     rows, forces = [], []
-    for k in range(n * fine):
+    for k in range(3000):
         delta = 0.05 * np.sin(3.0 * k * h)
         alpha = np.array([delta - (v_y + car.l_f * r) / v_x, -(v_y - car.l_r * r) / v_x])
         F = 0.8 * load * np.tanh(20.0 * alpha)

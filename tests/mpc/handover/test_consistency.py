@@ -51,12 +51,12 @@ def states(duration):
             psi += h * r
 
 
-def watch(*faults, sensors=None, seed=0, duration=8.0, dt=DT):
+def watch(*faults, sensors=None, seed=0):
     """Times at which they do not agree, and the first reason."""
     broken = FaultySensors(sensors or inertial_unit(), faults)
-    watch, rng = Consistency(dt), np.random.default_rng(seed)
+    watch, rng = Consistency(DT), np.random.default_rng(seed)
     times, reason = [], ""
-    for state in states(duration):
+    for state in states(8.0):
         if not watch.observe(broken.measure(state, rng), float(steering(state.t - DELAY))):
             times.append(state.t)
             reason = reason or str(watch.worst)

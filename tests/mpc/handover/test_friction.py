@@ -13,10 +13,10 @@ from mpc.tires import prediction_tire
 from tests.mpc.handover.conftest import DROP, samples_of
 
 
-def steady_force(tire, alpha, v_x=20.0):
+def steady_force(tire, alpha):
     """Forces [N] where both axles have one slip, straight ahead, sensors' offsets aside."""
-    v_y = -v_x * np.tan(alpha)
-    rows = np.column_stack([np.full_like(alpha, v_x), v_y, 0.0 * alpha, 0.0 * alpha])
+    v_y = -20.0 * np.tan(alpha)
+    rows = np.column_stack([np.full_like(alpha, 20.0), v_y, 0.0 * alpha, 0.0 * alpha])
     told = [axle_forces(tire, tire.weights[None], np.tile(row, (2, 1)), 0.01)[0, 0] for row in rows]
     return np.array(told)
 

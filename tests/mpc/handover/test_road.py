@@ -9,28 +9,23 @@ import pytest
 from mpc.handover.judge import ChiSquare, Window
 from mpc.handover.road import Road, at_friction, look_at_road
 from mpc.handover.rules import Rules, Verdict
+from tests.mpc.handover.conftest import Told
 
 COUNT = 10.0  # independent errors, whatever the samples
 
 
-class Formula:
+class Formula(Told):
     """Mean chi-square = size (least + slope (ln μ - ln μ_true)²) of a tire of friction μ."""
 
-    def __init__(self, tire, *, true, least, slope, size=1.0, count=COUNT):
-        self._grip, self._count = grip(tire.weights, tire), count
+    def __init__(self, tire, *, true, least, slope, size=1.0):
+        self._grip = grip(tire.weights, tire)
         self._true, self._least, self._slope, self._size = true, least, slope, size
-
-    def lookback(self, seconds):
-        return seconds
-
-    def chi_square(self, tire, samples):
-        return self.chi_squares(tire, tire.weights[None], samples)[0]
 
     def chi_squares(self, tire, weights, samples):
         del samples
         away = [np.log(grip(w, tire) / self._grip / self._true) for w in weights]
         means = [self._size * (self._least + self._slope * a**2) for a in away]
-        return [ChiSquare(self._count * mean, self._count, np.zeros(2)) for mean in means]
+        return [ChiSquare(COUNT * mean, COUNT, np.zeros(2)) for mean in means]
 
 
 def grip(weights, tire):
@@ -39,18 +34,14 @@ def grip(weights, tire):
     return axles[:, 0] @ axles[:, -tire.structure.units :].sum(axis=1)
 
 
-def seen(seconds=4.0):
-    window = Window(seconds, 0.01)
-    for _ in range(round(seconds / 0.01)):
+def look(road, in_use, judge, *, baseline, t=10.0):
+    window = Window(4.0, 0.01)
+    for _ in range(400):
         window.add((20.0, 0.0, 0.0, 0.0))
-    return window
-
-
-def look(road, in_use, judge, *, baseline, t=10.0, window=None):
     return look_at_road(
         road,
         in_use,
-        window or seen(),
+        window,
         t=t,
         baseline=baseline,
         trusted=0.2,

@@ -15,7 +15,7 @@ from mpc.handover.judge import ChiSquare, Judge
 from mpc.handover.rules import Rules, Verdict
 from mpc.handover.supervisor import Supervisor
 from mpc.tires import prediction_tire
-from tests.mpc.handover.conftest import DROP, drive, samples_of
+from tests.mpc.handover.conftest import DROP, Told, drive, samples_of
 
 
 def supervisor_of(car, start=None, *, in_use=None, rules=None):
@@ -111,18 +111,12 @@ def test_a_stale_identifier_is_a_fault_and_the_last_good_tire_stays(car, learnt,
     assert not supervisor.identifier.stale
 
 
-class LateralEstimate:
+class Given(Told):
     """A judge whose mean chi-squares are given: of the tire in use, and of any other."""
 
     def __init__(self, in_use, mean, *, better=0.0, worse_lately=0.0):
         self.in_use, self._mean = in_use, mean
         self._better, self._worse_lately = better, worse_lately
-
-    def lookback(self, seconds):
-        return seconds
-
-    def chi_square(self, tire, samples):
-        return self.chi_squares(tire, tire.weights[None], samples)[0]
 
     def chi_squares(self, tire, weights, samples):
         total = 20.0 * self._mean
@@ -141,7 +135,7 @@ def test_the_baseline_follows_what_is_seen_slowly_and_not_a_change(
         supervisor_module, "look_at_road", lambda *_, **given: baseline.append(given["baseline"])
     )
     supervisor = supervisor_of(car, learnt, rules=Rules(learning_time=1e3))
-    supervisor.judge = LateralEstimate(supervisor.target, mean)
+    supervisor.judge = Given(supervisor.target, mean)
     watched(supervisor, dry[1].between(0.0, 4.0))
     n, share = np.arange(len(baseline)), 0.05 / 10.0
     assert n.size > 70
@@ -168,7 +162,7 @@ def test_a_learnt_tire_is_taken_by_evidence_in_parts_of_the_baseline(
     """4 better over seconds, no more than 2 worse in the last moments; on a bad road thrice it."""
     supervisor = supervisor_of(car, learnt, rules=Rules(baseline_time=0.05))
     monkeypatch.setattr(supervisor_module, "look_at_road", lambda *_, **given: None)
-    supervisor.judge = LateralEstimate(
+    supervisor.judge = Given(
         supervisor.target, baseline, better=baseline * better, worse_lately=baseline * worse_lately
     )
     watched(supervisor, dry[1].between(0.0, 6.0))

@@ -15,6 +15,8 @@ from mpc.loop.sensing import CarSensors, Measured, SpeedProfile, inertial_unit
 from mpc.path.path import Path
 from mpc.realtime import Command
 
+STRAIGHT = Path.from_waypoints([0, 20, 40, 60], [0, 0, 0, 0], name="straight")
+
 
 class Driver:
     """Steers by the curvature ahead and the errors now."""
@@ -62,10 +64,14 @@ def seeded(seed=1):
     return np.random.default_rng(seed)
 
 
+def shaken(bump, seed):
+    sensors, rng = inertial_unit(), seeded(seed)
+    return drive(bump, car(), Driver(), speed=12.0, sensors=sensors, delay=2, rng=rng)
+
+
 @pytest.fixture(scope="module")
 def noisy(bump):
-    sensors = inertial_unit()
-    return drive(bump, car(), Driver(), speed=12.0, sensors=sensors, delay=2, rng=seeded())
+    return shaken(bump, 1)
 
 
 def test_a_gentle_path_is_followed_to_its_end(noisy, bump):
@@ -79,8 +85,7 @@ def test_a_gentle_path_is_followed_to_its_end(noisy, bump):
 def test_the_tracker_sees_what_is_measured_and_not_the_truth(bump):
     biased = CarSensors(Y=Sensor(bias=0.3), r=Sensor(resolution=0.5))
     tracker = Fixed()
-    straight = Path.from_waypoints([0, 20, 40, 60], [0, 0, 0, 0], name="straight")
-    run = drive(straight, car(), tracker, speed=15.0, sensors=biased, rng=seeded())
+    run = drive(STRAIGHT, car(), tracker, speed=15.0, sensors=biased, rng=seeded())
     assert max(abs(m.e_y - 0.3) for m in tracker.seen) < 1e-3
     assert np.abs(run.e_y).max() < 1e-3
     assert {m.r for m in tracker.seen} == {0.0}
@@ -88,8 +93,7 @@ def test_the_tracker_sees_what_is_measured_and_not_the_truth(bump):
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
 def test_a_command_acts_as_many_periods_later_as_is_said(ring, delay):
-    straight = Path.from_waypoints([0, 20, 40, 60], [0, 0, 0, 0], name="straight")
-    run = drive(straight, car(), Fixed(0.01, start=5), speed=15.0, delay=delay, rng=seeded())
+    run = drive(STRAIGHT, car(), Fixed(0.01, start=5), speed=15.0, delay=delay, rng=seeded())
     assert run.command[5] == 0.01
     assert run.command[4] == 0.0
     moved = np.flatnonzero(np.abs(run.delta) > 0.0)
@@ -97,10 +101,7 @@ def test_a_command_acts_as_many_periods_later_as_is_said(ring, delay):
 
 
 def test_a_seed_decides_the_drive(bump, noisy):
-    again = drive(bump, car(), Driver(), speed=12.0, sensors=inertial_unit(), delay=2, rng=seeded())
-    other = drive(
-        bump, car(), Driver(), speed=12.0, sensors=inertial_unit(), delay=2, rng=seeded(2)
-    )
+    again, other = shaken(bump, 1), shaken(bump, 2)
     assert np.array_equal(again.X, noisy.X)
     assert not np.array_equal(other.Y[:500], noisy.Y[:500])
 
@@ -114,8 +115,7 @@ def test_laps_of_a_closed_path_are_counted(ring):
 
 
 def test_a_drive_that_fails_says_how(ring, bump):
-    straight = Path.from_waypoints([0, 20, 40, 60], [0, 0, 0, 0], name="straight")
-    off = drive(straight, car(), Fixed(0.1), speed=15.0, rng=seeded())
+    off = drive(STRAIGHT, car(), Fixed(0.1), speed=15.0, rng=seeded())
     assert (off.completed, off.ending) == (False, "left the path by more than 2 m")
     ice = car(friction=Friction(scale=0.3))
     spun = drive(ring, ice, Fixed(-0.5), speed=20.0, widest=1e3, rng=seeded(), time_limit=3.0)
@@ -165,20 +165,19 @@ def test_scores_are_those_of_the_signals(noisy):
 class Broken:
     """Sensors of which one channel shows something that is no number of a car, for some time."""
 
-    def __init__(self, channel, value, start=1.0, duration=math.inf):
-        self.channel, self.value, self.start, self.end = channel, value, start, start + duration
+    def __init__(self, channel, value, duration=math.inf):
+        self.channel, self.value, self.end = channel, value, 1.0 + duration
 
     def measure(self, state, rng):
         shown = inertial_unit().measure(state, rng)
-        if not self.start <= state.t < self.end:
+        if not 1.0 <= state.t < self.end:
             return shown
         channels = Measured._fields[1:] if self.channel == "all" else (self.channel,)
         return shown._replace(**dict.fromkeys(channels, self.value))
 
 
 def broken_drive(bump, tracker, sensors, **keys):
-    rng = np.random.default_rng(0)
-    return drive(bump, car(), tracker, speed=15.0, sensors=sensors, rng=rng, **keys)
+    return drive(bump, car(), tracker, speed=15.0, sensors=sensors, rng=seeded(0), **keys)
 
 
 NO_NUMBERS = (math.nan, math.inf, -math.inf, 1e308, -1e308)

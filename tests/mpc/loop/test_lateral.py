@@ -27,36 +27,31 @@ CAR, DT = sedan(), 0.01
 SPEED = 20.0
 
 
-def states(duration=12.0, friction=None, amplitude=0.06):
+@pytest.fixture(scope="module")
+def swings():
     """A car on a field, steered left and right, up to 7 m/s² and more."""
-    car = DoubleTrackCar(CAR, friction=friction)
-    state = car.start(SPEED)
-    for k in range(round(duration / DT)):
-        yield state
-        angle = amplitude * math.sin(2.0 * math.pi * 0.35 * k * DT) * min(0.3 * k * DT, 1.0)
-        state = car.step(state, angle, SPEED)
+    car = DoubleTrackCar(CAR)
+    driven = [car.start(SPEED)]
+    for k in range(1199):
+        angle = 0.06 * math.sin(2.0 * math.pi * 0.35 * k * DT) * min(0.3 * k * DT, 1.0)
+        driven.append(car.step(driven[-1], angle, SPEED))
+    return driven
 
 
-def lateral(localization=None, start=None, car=CAR, body=None):
-    method = InertialIdentifier.for_vehicle(car, dt=DT)
-    return LateralVelocity(OnlineIdentifier(method, car, DT, start), localization, body)
+def lateral(localization=None, start=None, body=None):
+    method = InertialIdentifier.for_vehicle(CAR, dt=DT)
+    return LateralVelocity(OnlineIdentifier(method, CAR, DT, start), localization, body)
 
 
-def told_over(driven, *faults, seed=0, localization=None):
+def told_over(driven, *faults):
     """What was told of a drive, by name, with the errors of v_y and the times."""
-    rng = np.random.default_rng(seed)
-    sensors = FaultySensors(imu_and_localization(np.random.default_rng([seed, 9])), faults)
-    teller = lateral(localization)
+    rng, teller = np.random.default_rng(0), lateral()
+    sensors = FaultySensors(imu_and_localization(np.random.default_rng([0, 9])), faults)
     rows = np.array([teller.tell(sensors.measure(state, rng)) for state in driven])
     found = dict(zip(LateralEstimate._fields, rows.T, strict=True))
     t, v_y, a_y = np.array([(state.t, state.v_y, state.a_y) for state in driven]).T
     errors = {"error": found["v_y"] - v_y, "inertial": found["inertial_v_y"] - v_y}
     return {**found, **errors, "leveled": found["a_y"] - a_y, "t": t, "true_a_y": a_y}
-
-
-@pytest.fixture(scope="module")
-def swings():
-    return list(states())
 
 
 @pytest.fixture(scope="module")
@@ -182,21 +177,25 @@ def learnt():
     return identify(recording, CAR, AxleIdentifier.for_vehicle(CAR)).freeze()
 
 
-def test_a_friction_that_drops_is_noticed_without_v_y_and_the_car_stays_on_its_path(learnt):
-    place = 50.0
-    friction = Friction(changes=(FrictionChange(scale=0.5, at_place=place),))
+def learning(learnt, speed, *faults, friction=None):
     identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(CAR), CAR, DT, learnt)
-    run = drive(
+    return drive(
         iso_3888_1(),
         DoubleTrackCar(CAR, friction=friction),
         Tracker(prediction_tire(learnt), period=DT, delay=0.06),
-        speed=27.5,
-        sensors=imu_and_localization(np.random.default_rng(4)),
+        speed=speed,
+        sensors=FaultySensors(imu_and_localization(np.random.default_rng(4)), faults),
         delay=2,
         rng=np.random.default_rng(1),
         learner=Learner(Supervisor(identifier, prediction_tire(learnt))),
         lateral=lateral(start=learnt),
     )
+
+
+def test_a_friction_that_drops_is_noticed_without_v_y_and_the_car_stays_on_its_path(learnt):
+    place = 50.0
+    friction = Friction(changes=(FrictionChange(scale=0.5, at_place=place),))
+    run = learning(learnt, 27.5, friction=friction)
     assert run.completed
     assert np.abs(run.e_y).max() < 0.3
     dropped_at = run.t[np.argmax(place < run.X)]
@@ -212,18 +211,6 @@ def test_a_friction_that_drops_is_noticed_without_v_y_and_the_car_stays_on_its_p
 )
 def test_a_sensor_that_breaks_is_noticed_without_v_y(learnt, channel, kind, size):
     fault = SensorFault(channel=channel, kind=kind, start=2.0, duration=math.inf, size=size)
-    sensors = FaultySensors(imu_and_localization(np.random.default_rng(4)), [fault])
-    identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(CAR), CAR, DT, learnt)
-    run = drive(
-        iso_3888_1(),
-        DoubleTrackCar(CAR),
-        Tracker(prediction_tire(learnt), period=DT, delay=0.06),
-        speed=20.0,
-        sensors=sensors,
-        delay=2,
-        rng=np.random.default_rng(1),
-        learner=Learner(Supervisor(identifier, prediction_tire(learnt))),
-        lateral=lateral(start=learnt),
-    )
+    run = learning(learnt, 20.0, fault)
     noticed = [t for t, note in run.notes if note.startswith("sensor fault")]
     assert 2.0 <= noticed[0] < 5.0

@@ -7,6 +7,7 @@ from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
 from mpc.loop.sensing import SpeedProfile
 from mpc.path.path import Path
+from tests.mpc.loop.test_drive import ring as ring
 
 GAIN = 2.0
 
@@ -14,12 +15,6 @@ GAIN = 2.0
 @pytest.fixture(scope="module")
 def straight():
     return Path.from_waypoints([0.0, 50.0, 100.0, 150.0, 200.0], np.zeros(5), name="straight")
-
-
-@pytest.fixture(scope="module")
-def ring():
-    angle = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
-    return Path.from_waypoints(30.0 * np.sin(angle), 30.0 * (1.0 - np.cos(angle)), closed=True)
 
 
 def wave(path):

@@ -4,12 +4,6 @@ import pytest
 from mpc.path import Path
 
 
-def circle(n, radius=30.0, gaps=None):
-    gaps = np.ones(n) if gaps is None else gaps
-    angle = 2 * np.pi * np.append(0.0, np.cumsum(gaps)[:-1]) / np.sum(gaps)
-    return radius * np.cos(angle), radius * np.sin(angle)
-
-
 def test_the_path_of_a_sine_has_its_curvature_and_converges_with_the_way_points():
     errors = []
     for n in (40, 80):
@@ -32,7 +26,8 @@ def test_the_path_passes_through_every_way_point(rng):
 
 
 def test_a_repeated_last_way_point_of_a_ring_is_the_same_ring():
-    X, Y = circle(24)
+    angle = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
+    X, Y = 30.0 * np.cos(angle), 30.0 * np.sin(angle)
     once = Path.from_waypoints(X, Y, closed=True)
     again = Path.from_waypoints(np.append(X, X[0]), np.append(Y, Y[0] + 1e-12), closed=True)
     np.testing.assert_allclose(again.X, once.X, atol=1e-9)

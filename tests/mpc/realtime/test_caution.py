@@ -8,10 +8,10 @@ from mpc.prediction import build_axles, build_dynamics, build_rk4, state_size
 from mpc.realtime import Measurement, Status, Tracker
 from mpc.realtime.caution import GRIPS, N_GRIPS, SURPRISE
 from mpc.tires.tire import ALL, DOUBT_STEP, N_DOUBTS, curves_at
-from tests.mpc.realtime.conftest import PROBLEM
+from tests.mpc.realtime.conftest import PERIOD, PROBLEM
 from tests.mpc.test_prediction import TIRES
 
-PERIOD, V_X = 0.02, 20.0
+V_X = 20.0
 STEPS = 250
 
 

@@ -3,19 +3,14 @@
 import numpy as np
 import pytest
 
-from mpc.prediction import build_stage
+from mpc.prediction import build_stage, state_size
 from mpc.realtime import Status, Tracker
 from mpc.tires.tire import valid_slip
+from tests.mpc.realtime.conftest import PERIOD
 
-PERIOD = 0.02
 HUGE = [1e308, -1e308, 1e30, np.inf, np.nan]
 CARRIED = ("x", "u", "feedback", "commands", "lagged")
 OF_PLAN = ("x", "u", "feedback", "lagged", "age", "planned", "guessed", "started")
-
-
-@pytest.fixture
-def tracker(tire, problem):
-    return Tracker(tire, problem, period=PERIOD, delay=2 * PERIOD)
 
 
 def numbers(tracker):
@@ -64,7 +59,7 @@ def test_what_is_refused_does_to_the_plan_what_any_other_refused_sample_does(
 
 def test_the_stage_is_finite_beyond_the_center_and_as_before_on_this_side(tire, problem):
     stage = build_stage(tire.structure)
-    n_x = 7 if tire.structure.lagged else 5
+    n_x = state_size(tire.structure)
     valid = valid_slip(tire, problem.limits.slip)
 
     def s_dot_acts(e_y, kappa):

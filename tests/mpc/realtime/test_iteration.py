@@ -101,14 +101,6 @@ def test_an_iteration_solves_the_linearized_problem(tire, problem, seed):
     np.testing.assert_allclose(command.plan_u, wanted, atol=1e-5)
 
 
-def test_the_cases_have_active_limits(tire, problem):
-    tracker = Tracker(tire, problem)
-    x0 = np.zeros(tracker.instance.state["x"].shape[1])
-    x0[:2] = 0.9, 0.15
-    plan = solve(tracker, x0, 0.0, 20.0)
-    assert np.abs(plan.plan_u).max() == pytest.approx(problem.limits.steering_rate, rel=1e-6)
-
-
 def test_too_few_iterations_are_said(tire, problem):
     tracker = Tracker(tire, problem, max_iterations=2)
     x0 = np.zeros(tracker.instance.state["x"].shape[1])

@@ -4,13 +4,7 @@ import pytest
 from mpc.prediction import build_rk4
 from mpc.realtime import Guards, Status, Tracker
 from mpc.tires.tire import ALL
-
-PERIOD = 0.02
-
-
-@pytest.fixture
-def tracker(tire, problem):
-    return Tracker(tire, problem, period=PERIOD, delay=2 * PERIOD)
+from tests.mpc.realtime.conftest import PERIOD
 
 
 def drive(tracker, tire, measure, x, steps, delay_periods, kappa=0.004, v_x=20.0):

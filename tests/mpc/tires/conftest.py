@@ -26,13 +26,14 @@ def forces(model, v_x, v_y, r, delta, lagged=None):
     return tuple(np.array(value).T for value in result)
 
 
-def motions(n=200, speed=(8.0, 40.0), seed=3):
+@pytest.fixture
+def motions():
     """A recording of unrelated samples: every sample is another speed, drift and steering."""
-    rng = np.random.default_rng(seed)
+    rng, n = np.random.default_rng(3), 200
     return Recording(
         name="motions",
         t=0.01 * np.arange(n),
-        v_x=rng.uniform(*speed, n),
+        v_x=rng.uniform(8.0, 40.0, n),
         v_y=rng.normal(0.0, 1.0, n),
         r=rng.normal(0.0, 0.3, n),
         delta_f=rng.normal(0.0, 0.1, n),
@@ -47,11 +48,6 @@ def at(recording):
 @pytest.fixture(name="car")
 def the_car():
     return sedan()
-
-
-@pytest.fixture(name="motions")
-def some_motions():
-    return motions()
 
 
 @pytest.fixture(name="forces")

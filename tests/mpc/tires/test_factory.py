@@ -10,6 +10,7 @@ from mpc.prediction import build_stage
 from mpc.tires import prediction_tire
 from mpc.tires.ladder import mounted_tire
 from mpc.tires.tire import ALL
+from tests.mpc.tires.test_oracle import at_slip
 
 
 def test_a_vehicle_stands_for_the_linear_tire_that_it_states(car):
@@ -49,12 +50,17 @@ def test_a_mounted_tire_is_that_of_the_static_load(car, forces, kind):
     tire, alpha = MagicFormula.from_tir(car.chassis.tire), np.linspace(0.01, 0.4, 20)
     if kind is not MagicFormula:
         tire = kind(C_alpha=6.0e4, C_kappa=8.0e4, friction=0.9)
-    worst, none = 0.005 if kind is MagicFormula else 0.013, np.zeros(20)
-    given = np.column_stack([alpha, alpha])
-    force = forces(prediction_tire(tire, car), 20.0, none, none, none, lagged=given)[0]
-    for i, load in enumerate(car.axle_loads):
+    worst = 0.005 if kind is MagicFormula else 0.013
+    require_forces(
+        at_slip(forces, prediction_tire(tire, car), alpha), car, tire, tire, alpha, worst
+    )
+
+
+def require_forces(force, car, front, rear, alpha, worst):
+    """Those of two tires an axle at its static load."""
+    for found, tire, load in zip(force.T, (front, rear), car.axle_loads, strict=True):
         expected = [2.0 * float(tire.forces(a, 0.0, 0.0, 0.5 * load).F_y) for a in alpha]
-        np.testing.assert_allclose(force[:, i], expected, atol=worst * max(expected))
+        np.testing.assert_allclose(found, expected, atol=worst * max(expected))
 
 
 @pytest.mark.parametrize("kind", [DugoffTire, FialaTire])
@@ -66,12 +72,8 @@ def test_tires_of_any_friction_and_stiffness_are_mounted(
 ):
     given = {"C_alpha": 0.5 * stiffness, "C_kappa": 0.5 * stiffness}
     tires = [kind(**given, friction=share * friction) for share in (1.0, rear_share)]
-    none, alpha = np.zeros(40), np.geomspace(1e-5, 0.5, 40)
-    model, both = mounted_tire(car, *tires), np.column_stack([alpha, alpha])
-    force = forces(model, 20.0, none, none, none, lagged=both)[0]
-    for i, load in enumerate(car.axle_loads):
-        expected = [2.0 * float(tires[i].forces(a, 0.0, 0.0, 0.5 * load).F_y) for a in alpha]
-        np.testing.assert_allclose(force[:, i], expected, atol=0.02 * max(expected))
+    alpha = np.geomspace(1e-5, 0.5, 40)
+    require_forces(at_slip(forces, mounted_tire(car, *tires), alpha), car, *tires, alpha, 0.02)
 
 
 def test_the_door_says_what_it_cannot_use(car):

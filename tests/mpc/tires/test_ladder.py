@@ -16,7 +16,7 @@ from mpc.tires.tire import ALL, Car, Point
 W = np.array([[0.05, 0.5, 0.5, -0.15], [0.02, 0.6, 0.6, -0.2]])
 
 
-def axle_model(car, *, compliance=(0.05, 0.06), sway=(0.0, 0.0), offset=(0.0, 0.0), weights=W):
+def axle_model(car, *, sway=(0.0, 0.0), offset=(0.0, 0.0), weights=W):
     design, n = AxleIdentifier.for_vehicle(car), weights.shape[1]
     return AxleModel(
         vehicle=car,
@@ -24,7 +24,7 @@ def axle_model(car, *, compliance=(0.05, 0.06), sway=(0.0, 0.0), offset=(0.0, 0.
         sway=design.sway,
         plausibility=design.plausibility,
         W=weights,
-        compliance=np.array(compliance),
+        compliance=np.array([0.05, 0.06]),
         sway_share=np.array(sway),
         offset=np.array(offset),
         covariance=np.tile(np.eye(n + 3), (2, 1, 1)),
@@ -33,30 +33,20 @@ def axle_model(car, *, compliance=(0.05, 0.06), sway=(0.0, 0.0), offset=(0.0, 0.
     )
 
 
-def slalom(n=600, speed=20.0):
-    t = 0.01 * np.arange(n)
-    wave = np.sin(2.0 * np.pi * 0.7 * t)
-    return Recording(
-        name="slalom",
-        t=t,
-        v_x=np.full(n, speed),
-        v_y=0.5 * np.sin(2.0 * np.pi * 0.7 * t + 0.5),
-        r=0.3 * wave,
-        delta_f=0.05 * wave,
-        delta_r=np.zeros(n),
-    )
+def recorded(n, v_x, v_y, r, delta):
+    v_x, v_y, r, delta_f = (np.broadcast_to(signal, n) for signal in (v_x, v_y, r, delta))
+    t, straight = 0.01 * np.arange(n), np.zeros(n)
+    return Recording(name="drive", t=t, v_x=v_x, v_y=v_y, r=r, delta_f=delta_f, delta_r=straight)
 
 
-def standing(v_y, r, delta, speed=20.0, n=400):
-    return Recording(
-        name="steady",
-        t=0.01 * np.arange(n),
-        v_x=np.full(n, speed),
-        v_y=np.full(n, v_y),
-        r=np.full(n, r),
-        delta_f=np.full(n, delta),
-        delta_r=np.zeros(n),
-    )
+def slalom(speed=20.0):
+    phase = 2.0 * np.pi * 0.7 * 0.01 * np.arange(600)
+    wave = np.sin(phase)
+    return recorded(600, speed, 0.5 * np.sin(phase + 0.5), 0.3 * wave, 0.05 * wave)
+
+
+def standing(v_y, r, delta, speed=20.0):
+    return recorded(400, speed, v_y, r, delta)
 
 
 @pytest.mark.parametrize("motion", [(0.4, 0.3, 0.05), (-1.0, -0.2, -0.1), (1.5, 0.5, 0.2)])
@@ -90,27 +80,31 @@ def test_the_lag_is_that_of_the_frozen_model_and_shortens_where_the_tire_slides(
     )
 
 
-def test_lagged_slip_follows_as_in_the_frozen_model(car):
-    model, drive = axle_model(car), slalom()
+def followed(model, drive, fine):
+    """Lagged slip after a second, by Euler steps with linear between samples, is the model's."""
     tire = prediction_tire(model)
     rates = build_dynamics(tire.structure)
-    behind, fine = np.zeros(2), 5
-    slips = []
-    for k in range(drive.t.size):
+    behind, slips = np.zeros(2), []
+    for k in range(len(drive)):
         slips.append(behind)
-        for j in range(fine):  # Euler at 2 ms, signals linear between samples
-            share = j / fine
-            i = min(k + 1, drive.t.size - 1)
-            v_y, r, delta = (
+        i = min(k + 1, len(drive) - 1)
+        for share in np.arange(fine) / fine:
+            v_x, v_y, r, delta = (
                 (1 - share) * signal[k] + share * signal[i]
-                for signal in (drive.v_y, drive.r, drive.delta_f)
+                for signal in (drive.v_x, drive.v_y, drive.r, drive.delta_f)
             )
             x = np.concatenate([[0.0, 0.0, v_y, r, delta], behind])
-            x_dot = rates(x, 0.0, 0.0, drive.v_x[k], 1e-9, tire.car, tire.weights, *ALL)
+            x_dot = rates(x, 0.0, 0.0, v_x, 1e-9, tire.car, tire.weights, *ALL)
             behind = behind + 0.01 / fine * np.array(x_dot).ravel()[5:]
-    expected = model.lagged_slip(drive)[100:]
-    size = np.abs(expected).max(axis=0)
-    assert (np.abs(np.array(slips)[100:] - expected).max(axis=0) < 0.03 * size).all()
+    found, expected = np.array(slips)[100:], model.lagged_slip(drive)[100:]
+    error, size = np.abs(found - expected).max(axis=0), np.abs(expected).max(axis=0)
+    assert (error < 0.03 * size).all()
+    return error, size, expected
+
+
+def test_lagged_slip_follows_as_in_the_frozen_model(car):
+    drive = slalom()
+    _, size, expected = followed(axle_model(car), drive, 5)
     kinematic = drive.alpha(car.l_f, car.l_r)[100:]  # without the lag it would show
     assert (np.abs(kinematic - expected).max(axis=0) > 0.1 * size).all()
 
@@ -132,15 +126,7 @@ def test_a_body_that_sways_slowly_is_a_softer_carcass(car):
             x = x + 0.002 * np.array(rates(*given, *ALL)).ravel()
             x[:2] = 0.0
     v_y, r = np.array(rows).T
-    drive = Recording(
-        name="rhythm",
-        t=t,
-        v_x=np.full(t.size, v_x),
-        v_y=v_y,
-        r=r,
-        delta_f=delta,
-        delta_r=np.zeros(t.size),
-    )
+    drive = recorded(t.size, v_x, v_y, r, delta)
     found, late = np.array(slips)[600:], slice(600, None)
     with_sway, without = (model.lagged_slip(drive)[late] for model in (sways, rests))
     size = np.abs(with_sway).max(axis=0)
@@ -176,29 +162,11 @@ def test_of_a_car_with_downforce_forces_are_those_of_the_frozen_model(racer, for
 
 @pytest.mark.heavy
 def test_of_a_car_with_downforce_slip_lags_as_in_the_frozen_model(racer):
-    model, drive = axle_model(racer), slalom()
-    drive = replace(drive, v_x=np.linspace(15.0, 60.0, len(drive)))
-    tire = prediction_tire(model)
-    rates = build_dynamics(tire.structure)
-    behind, fine, slips = np.zeros(2), 10, []
-    for k in range(len(drive)):
-        slips.append(behind)
-        i = min(k + 1, len(drive) - 1)
-        for j in range(fine):
-            share = j / fine
-            v_x, v_y, r, delta = (
-                (1 - share) * signal[k] + share * signal[i]
-                for signal in (drive.v_x, drive.v_y, drive.r, drive.delta_f)
-            )
-            x = np.concatenate([[0.0, 0.0, v_y, r, delta], behind])
-            x_dot = rates(x, 0.0, 0.0, v_x, 1e-9, tire.car, tire.weights, *ALL)
-            behind = behind + 0.01 / fine * np.array(x_dot).ravel()[5:]
-    expected = model.lagged_slip(drive)[100:]
-    size = np.abs(expected).max(axis=0)
-    assert (np.abs(np.array(slips)[100:] - expected).max(axis=0) < 0.03 * size).all()
+    model, drive = axle_model(racer), slalom(np.linspace(15.0, 60.0, 600))
+    error, _, expected = followed(model, drive, 10)
     plain = replace(model, vehicle=replace(racer, downforce_area_front=0.0, downforce_area_rear=0))
     apart = np.abs(plain.lagged_slip(drive)[100:] - expected).max(axis=0)
-    assert (apart > 5.0 * np.abs(np.array(slips)[100:] - expected).max(axis=0)).any()
+    assert (apart > 5.0 * error).any()
 
 
 def test_caution_is_refused_for_a_car_whose_bands_are_of_static_loads(racer):

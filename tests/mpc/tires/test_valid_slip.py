@@ -4,7 +4,6 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from identifier.paper.network import Network, NetworkModel, Weights
 from models.tires import FialaTire
 from models.vehicle import sedan
 from mpc.prediction import build_dynamics
@@ -12,6 +11,7 @@ from mpc.problem import Limits, Problem
 from mpc.realtime import Tracker
 from mpc.tires import oracle_tire, prediction_tire
 from mpc.tires.tire import ALL, LEAST_RISE, Car, Point, believed, valid_slip
+from tests.mpc.test_prediction import network
 
 CAR = sedan()
 SLIPS = np.linspace(-0.4, 0.4, 161)
@@ -81,16 +81,7 @@ def test_a_tire_that_slides_fully_still_rises():
 
 
 def test_a_network_of_other_signals_is_left_as_it_is():
-    rng = np.random.default_rng(0)
-    tire = prediction_tire(
-        NetworkModel(
-            vehicle=CAR,
-            network=Network(hidden=4),
-            weights=Weights(W=rng.normal(0, 1, (2, 4)), V=rng.normal(0, 1, (4, 4))),
-            force_unit=1000.0,
-            min_speed=1.0,
-        )
-    )
+    tire = prediction_tire(network(hidden=4))
     valid = valid_slip(tire, MOST)
     x = np.array([0.0, 0.0, 3.0, 0.5, 0.4])
     given = (x, 0.1, 0.0, 12.0, 0.05, tire.car, tire.weights)
