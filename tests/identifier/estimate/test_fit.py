@@ -129,7 +129,7 @@ def test_hours_of_one_drive_tell_no_more_than_minutes_and_tears_between_are_cut(
     np.testing.assert_allclose(np.diag(together), np.diag(many.covariance), rtol=1e-2)
     on = np.diag(few.covariance) > 0.0
     sd, less = (np.sqrt(np.diag(one.covariance)[on]) for one in (few, many))
-    assert (less > 0.6 * sd).all() and (np.abs(many.p - few.p)[on] < sd).all()
+    assert (less > 0.6 * sd).all() and (np.abs(many.p - few.p)[on] < 1.5 * sd).all()
     k = INDEX["v_y_bias"]
     assert abs(many.p[k]) < 4.0 * np.sqrt(many.covariance[k, k])
 
