@@ -73,9 +73,9 @@ def typed(*words):
     return main([str(word) for word in words])
 
 
-def learn_words(folder, log="slalom.csv"):
+def learn_words(folder, log="slalom.csv", *more):
     """Words that identify the tires of the car of a folder on a log, of this folder or by path."""
-    return ["identify", folder / log, "--vehicle", folder / "car.toml"]
+    return ["identify", folder / log, "--vehicle", folder / "car.toml", *more]
 
 
 def json_of(path):
