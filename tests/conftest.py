@@ -21,7 +21,7 @@ for flag in ("MAKEFLAGS", "MFLAGS", "MAKELEVEL"):  # packages are built as from 
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 # Of these each test takes longest: begun first, they do not keep one worker busy at the end.
 LONGEST = ("tests/tireid/", "tests/benchmarks/")
-ASKED: set[str] = set()  # commands that the test which runs has looked for or run
+ASKED = set()  # commands that the test which runs has looked for or run
 listen(ASKED)
 
 
@@ -58,7 +58,7 @@ def pytest_runtest_call(item):
 
 
 @pytest.fixture(scope="session")
-def shared_data() -> Path:
+def shared_data():
     """The folder of recordings, tire files and golden values; they are not part of the project."""
     if not SHARED_DATA.is_dir():
         pytest.skip("needs the recordings of ../shared/data, which are not part of the project")
@@ -66,7 +66,7 @@ def shared_data() -> Path:
 
 
 @pytest.fixture
-def rng() -> np.random.Generator:
+def rng():
     return np.random.default_rng(20260101)
 
 
@@ -74,7 +74,7 @@ def rng() -> np.random.Generator:
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
-def without_ink(patch) -> None:
+def without_ink(patch):
     """Leave out what takes longest in a figure, for what a module's tests share, too."""
     patch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)
 

@@ -77,7 +77,7 @@ def main(command: list[str]) -> int:
         return 2
     with tempfile.TemporaryDirectory(prefix="tireid-path-") as scratch:
         path = path_without(os.environ["PATH"], Path(scratch))
-        return subprocess.run(command, env=os.environ | {"PATH": path}, check=False).returncode
+        return subprocess.run(command, env=os.environ | {"PATH": path}).returncode
 
 
 if __name__ == "__main__":

@@ -8,33 +8,33 @@ VOID = {"meta", "img"}
 class Outline(HTMLParser):
     """What a browser would see: elements in order, links, texts; complains of a wrong nesting."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__()
-        self.open: list[str] = []
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.open = []
+        self.tags = []
         self.text = ""
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
         if tag not in VOID:
             self.open.append(tag)
 
-    def handle_endtag(self, tag: str) -> None:
+    def handle_endtag(self, tag):
         assert self.open.pop() == tag
 
-    def handle_data(self, data: str) -> None:
+    def handle_data(self, data):
         if "style" not in self.open:
             self.text += data
 
 
-def outline(page: str) -> Outline:
+def outline(page):
     parser = Outline()
     parser.feed(page)
     assert parser.open == []
     return parser
 
 
-def faults_of(page: str) -> list[str]:
+def faults_of(page):
     """What is wrong with a page whatever it reports: anchors, pictures without words, raw text."""
     parser = outline(page)
     ids = [attributes["id"] for _, attributes in parser.tags if "id" in attributes]

@@ -9,6 +9,6 @@ INSTALLED = set(RIVALS) <= set(methods())
 needs_rivals = pytest.mark.skipif(not INSTALLED, reason=REASON)
 
 
-def rival(name: object, *values: object) -> object:
+def rival(name, *values):
     """A case of a parametrized test that is left out where the rivals are not installed."""
     return pytest.param(name, *values, marks=needs_rivals)

@@ -5,12 +5,12 @@ from functools import cache
 
 
 @cache
-def tree_of(source: str) -> ast.Module:
+def tree_of(source):
     """The tree of a source, parsed once in a process."""
     return ast.parse(source)
 
 
 @cache
-def nodes_of(source: str) -> tuple[ast.AST, ...]:
+def nodes_of(source):
     """All nodes of it, in the order of `ast.walk`."""
     return tuple(ast.walk(tree_of(source)))

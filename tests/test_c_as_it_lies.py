@@ -30,7 +30,7 @@ NUMBER = re.compile(r"(?<![\w.])-?\d+\.\d*(?:e[-+]?\d+)?")
 def run(*command):
     if shutil.which(command[0]) is None:
         pytest.skip(f"needs {command[0]}")
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
 
 
 def compiled(compiler, file, single):

@@ -18,14 +18,14 @@ Documented = ast.FunctionDef | ast.ClassDef
 SHAPE_OR_UNIT = r"\(.*\)|\[.+\]|`\w[\w.]*`"
 
 
-def documented_parameters(docstring: str, *, inner: bool = False) -> dict[str, str]:
+def documented_parameters(docstring, *, inner=False):
     """What is said under "Parameters" of a numpy-style docstring, by name in order.
 
     Outside the interface entries stand below the summary, three spaces apart.
     """
     found = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n-+\n|\Z)", docstring, re.M | re.S)
-    said: dict[str, str] = {}
-    names: list[str] = []
+    said = {}
+    names = []
     if inner and not found:
         entry = r"(?:^|   )([\w*]+(?:, [\w*]+)*) : (.*?)(?=   [\w*]+(?:, [\w*]+)* : |$)"
         for one in re.finditer(entry, docstring, re.M):
@@ -39,7 +39,7 @@ def documented_parameters(docstring: str, *, inner: bool = False) -> dict[str, s
     return said
 
 
-def fields(node: ast.ClassDef) -> list[ast.AnnAssign]:
+def fields(node):
     return [
         item
         for item in node.body
@@ -47,13 +47,13 @@ def fields(node: ast.ClassDef) -> list[ast.AnnAssign]:
     ]
 
 
-def is_method(node: ast.FunctionDef) -> bool:
+def is_method(node):
     arguments = [*node.args.posonlyargs, *node.args.args]
     bound = {ast.unparse(d) for d in node.decorator_list} & {"classmethod"}
     return bool(arguments) and (arguments[0].arg == "self" or bool(bound))
 
 
-def actual_parameters(node: Documented) -> dict[str, str]:
+def actual_parameters(node):
     """Annotations of arguments of a function, or fields (else arguments of __init__) of a class."""
     if isinstance(node, ast.ClassDef):
         for item in node.body:
@@ -67,25 +67,25 @@ def actual_parameters(node: Documented) -> dict[str, str]:
     return {a.arg: ast.unparse(a.annotation) if a.annotation else "" for a in shown}
 
 
-def describes_itself(node: Documented) -> bool:
+def describes_itself(node):
     """Whether a class is a tuple with names, or a protocol: prose describes its fields."""
     return isinstance(node, ast.ClassDef) and bool(
         {ast.unparse(base) for base in node.bases} & {"NamedTuple", "Protocol"}
     )
 
 
-def is_array(annotation: str) -> bool:
+def is_array(annotation):
     return bool({"Array", "ArrayLike"} & set(annotation.split(" | ")))
 
 
-def is_overload(node: Documented) -> bool:
+def is_overload(node):
     """Whether a function is only a signature for type checkers: its body has the docstring."""
     return "overload" in {ast.unparse(decorator) for decorator in node.decorator_list}
 
 
-def documented_definitions(source: str) -> list[tuple[Documented, str]]:
+def documented_definitions(source):
     """Functions, classes and methods, each with the name of the top level that it belongs to."""
-    found: list[tuple[Documented, str]] = []
+    found = []
     for node in tree_of(source).body:
         if isinstance(node, Documented):
             found.append((node, node.name))
@@ -95,7 +95,7 @@ def documented_definitions(source: str) -> list[tuple[Documented, str]]:
     return [(node, top) for node, top in found if not is_overload(node)]
 
 
-def listed_names(page: str) -> list[tuple[str, str]]:
+def listed_names(page):
     """Module and name of what the tables of the API list."""
     found, module = [], ""
     tables = re.findall(r"^```\{eval-rst\}\n(.*?)^```$", page, re.M | re.S)
@@ -107,7 +107,7 @@ def listed_names(page: str) -> list[tuple[str, str]]:
     return found
 
 
-def interface() -> dict[Path, set[str]]:
+def interface():
     """Names of what `tireid` offers and its bases, by the file that defines them.
 
     With them classes that only the tables of the API name, by the module that they lie in.
@@ -121,7 +121,7 @@ def interface() -> dict[Path, set[str]]:
     ]
     for module in [one for one in offered if isinstance(one, ModuleType)]:
         offered += [value for name, value in vars(module).items() if not name.startswith("_")]
-    named: dict[Path, set[str]] = {}
+    named = {}
     for one in offered:
         for part in one.__mro__ if inspect.isclass(one) else [one]:
             if getattr(part, "__module__", "").split(".")[0] in PACKAGES and hasattr(
@@ -131,7 +131,7 @@ def interface() -> dict[Path, set[str]]:
     return named
 
 
-def complaints(source: str, offered: set[str]) -> list[str]:
+def complaints(source, offered):
     """Drift between docstrings and signatures; what the interface leaves without a docstring, and
     its arrays of which no shape or unit is said.
 
@@ -249,7 +249,7 @@ class Corner(NamedTuple):
     assert complaints(source, set()) == inner
 
 
-def missing_names(page: str) -> set[str]:
+def missing_names(page):
     """Public names of `tireid` that the tables of the API do not list, and what else they list."""
     listed = {name for module, name in listed_names(page) if module == "tireid"}
     return {name for name in ti.__all__ if not name.startswith("_")} ^ listed
@@ -261,13 +261,13 @@ def test_the_page_of_the_api_lists_every_public_name():
     assert missing_names(page.replace("   certify\n", "   cert\n")) == {"certify", "cert"}
 
 
-def anchors(text: str) -> set[str]:
+def anchors(text):
     """Anchors of the headings of a page, as GitHub and the site make them."""
     titles = re.findall(r"^#+ (.*)$", re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S), re.M)
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
-def dead_links(path: Path, text: str) -> list[str]:
+def dead_links(path, text):
     """Targets of relative links and pictures that are no file, or no heading of a page."""
     prose = re.sub(r"^```.*?^```$|`[^`\n]*`", "", text, flags=re.M | re.S)
     dead = []
@@ -289,7 +289,7 @@ def test_links_of_documents_lead_to_files():
     assert dead_links(ROOT / "README.md", planted) == ["docs/nowhere.md", "docs/limits.md#nothing"]
 
 
-def unknown_names(text: str) -> set[str]:
+def unknown_names(text):
     """Names of `tireid` in the Python of a document that are none."""
     used = set()
     for block in re.findall(r"^```python\n(.*?)^```$", text, re.M | re.S):

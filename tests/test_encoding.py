@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PLACES = ("codegen", "models", "identifier", "mpc", "tireid", "examples", "benchmarks")
 
 
-def without_encoding(source: str) -> list[int]:
+def without_encoding(source):
     """Lines that open, read or write text and leave the encoding to the machine."""
     lines = []
     for node in nodes_of(source):
@@ -26,7 +26,7 @@ def without_encoding(source: str) -> list[int]:
     return lines
 
 
-def _is_text(call: ast.Call) -> bool:
+def _is_text(call):
     """Whether an `open` is of a text: one whose mode is known, and has no b."""
     path = isinstance(call.func, ast.Attribute)
     modes = [keyword.value for keyword in call.keywords if keyword.arg == "mode"]

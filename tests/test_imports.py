@@ -16,7 +16,7 @@ ORDER = ("codegen", "models", "identifier", "mpc", "tireid")
 PLOTTING_ALLOWED = ("tireid", "examples", "benchmarks")
 
 
-def imported(source: str) -> set[str]:
+def imported(source):
     """Modules that a file imports, and what it imports from them, by their full names."""
     names = set()
     for node in nodes_of(source):
@@ -27,12 +27,12 @@ def imported(source: str) -> set[str]:
     return names
 
 
-def commands_imported(source: str) -> set[str]:
+def commands_imported(source):
     """The modules of commands that a file imports."""
     return {name for name in imported(source) if name.split(".")[:2] == ["tireid", "commands"]}
 
 
-def wrong_imports(package: str, source: str) -> set[str]:
+def wrong_imports(package, source):
     """What a file of `package` imports from the packages to its right, or to draw."""
     later = set(ORDER[ORDER.index(package) + 1 :])
     drawing = set() if package in PLOTTING_ALLOWED else {"matplotlib"}
@@ -52,7 +52,7 @@ def test_the_rule_catches_a_planted_import():
     assert wrong_imports("tireid", "import matplotlib, identifier, models") == set()
 
 
-def circles(sources: dict[str, str]) -> list[list[str]]:
+def circles(sources):
     """Files that import one another in a circle; imports in functions and for types count."""
     files = list(sources)
     home = {re.sub(r"(/__init__)?\.py$", "", name).replace("/", "."): name for name in files}

@@ -14,13 +14,13 @@ ROOT = Path(__file__).resolve().parents[1]
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 
 
-def cells(path: Path, kind: str) -> list[str]:
+def cells(path, kind):
     """The sources of the cells of a kind, markdown or code."""
     notebook = json.loads(path.read_text(encoding="utf-8"))
     return ["".join(c["source"]) for c in notebook["cells"] if c["cell_type"] == kind]
 
 
-def run(sources: list[str]) -> dict:
+def run(sources):
     """Run cells one after the other as Jupyter does; return the names that they leave."""
     names = {"__name__": "__main__"}
     for k, source in enumerate(sources):
@@ -83,7 +83,7 @@ def test_a_notebook_keeps_no_output_and_has_the_form_that_jupyter_reads(path):
         assert not cell.get("outputs") and cell.get("execution_count") is None
 
 
-def strangers(gallery: str) -> list[str]:
+def strangers(gallery):
     """Commands of the gallery that there are none, and figures from folders that none writes."""
     wrong, written = [], set()
     shell = "\n".join(re.findall(r"^%%sh\n(.*?)^```$", gallery, re.M | re.S))

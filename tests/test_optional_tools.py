@@ -54,7 +54,7 @@ def test_a_new_file_that_asks_for_a_tool_fails_until_it_is_listed(tmp_path):
     file.write_text(PLANTED)
     words = ["-q", "-p", "tests.conftest", "-p", "no:cacheprovider", "-c", "pyproject.toml"]
     command = [sys.executable, "-m", "pytest", *words, f"--rootdir={tmp_path}", str(file)]
-    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert "3 failed, 1 passed" in ran.stdout, ran.stdout + ran.stderr
     for tool in ("clang++", "arm-none-eabi-gcc", "cmake"):
         assert f"test_new.py asks for {tool}: name it in tests/optional_tools.txt" in ran.stdout
@@ -82,5 +82,5 @@ def test_a_path_without_the_tools_still_finds_all_else(tmp_path):
 def test_a_command_is_run_without_the_tools_and_its_answer_is_handed_on():
     script = "command -v sh && ! command -v cmake && ! command -v clang && exit 3"
     command = [sys.executable, "-m", "tests.optional_tools", "sh", "-c", script]
-    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert (ran.returncode, ran.stdout.count("\n")) == (3, 1), ran.stderr

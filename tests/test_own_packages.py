@@ -30,7 +30,7 @@ def put_strangers(folder):
 
 def run_in(folder, *words):
     command = [sys.executable, *map(str, words)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
 
 
 @pytest.mark.parametrize("code", [SEDAN, SPAWNED], ids=["here", "spawned"])

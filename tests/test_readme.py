@@ -18,7 +18,7 @@ def test_the_example_identifies_the_tire(tmp_path, monkeypatch, capsys):
     assert blocks, "the README has no Python example"
     assert len(blocks[0].splitlines()) <= 12
     assert set(re.findall(r"^(?:import|from) (.*)", blocks[0], re.M)) == {"tireid as ti"}
-    names: dict[str, object] = {"__name__": "__main__"}
+    names = {"__name__": "__main__"}
     exec(compile(blocks[0], "README.md", "exec"), names)
     text = capsys.readouterr().out
     printed = re.search(r"<Prediction .*?([\d.]+) / ([\d.]+) %", text)

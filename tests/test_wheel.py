@@ -59,7 +59,7 @@ def installed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("wheel")
     build = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation"]
     done = subprocess.run(
-        [*build, "--wheel-dir", str(folder), str(ROOT)], capture_output=True, text=True, check=False
+        [*build, "--wheel-dir", str(folder), str(ROOT)], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
     (wheel,) = folder.glob("*.whl")
@@ -81,10 +81,10 @@ def installed(tmp_path_factory):
     return python, packages
 
 
-def run_in(folder: Path, *command: object) -> subprocess.CompletedProcess[str]:
+def run_in(folder, *command):
     words = [str(word) for word in command]
     own = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    return subprocess.run(words, cwd=folder, env=own, capture_output=True, text=True, check=False)
+    return subprocess.run(words, cwd=folder, env=own, capture_output=True, text=True)
 
 
 def test_every_package_says_that_it_is_typed(installed):

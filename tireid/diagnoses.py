@@ -2,7 +2,6 @@
 
 import argparse
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from models.recordings.reader import repair_text
 from models.vehicle import Vehicle
 from tireid import report as page
 from tireid.output import text_table
-from tireid.reports.common import READ, REPORT, origin
+from tireid.reports.common import REPORT, drawings, origin
 
 _HEADER = ("found", "size", "confidence", "repair")
 NAMES = {  # of findings by their code, where the code is not the word
@@ -102,26 +101,21 @@ def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
     return [page.printed(f"the log: {one.text}") for one in diagnosis.findings]
 
 
-def diagnosis_section(
-    diagnosis: Diagnosis, more: Sequence[page.Block] = (), heading: str = "Doctor"
-) -> page.Section:
+def diagnosis_section(diagnosis: Diagnosis, heading: str = "Doctor") -> page.Section:
     rows = _finding_rows(diagnosis)
     blocks: list[page.Block] = [
-        page.Paragraph(
-            text="Faults of the log, or of its declared car, from the log alone. ± is one "
+        (
+            "Faults of the log, or of its declared car, from the log alone. ± is one "
             "standard deviation."
         )
     ]
     if rows:
-        blocks.append(page.Table(caption="What was found.", header=list(_HEADER), rows=rows))
-        blocks += [page.Paragraph(text=page.printed(one.text)) for one in diagnosis.findings]
+        blocks.append(page.Table("What was found.", list(_HEADER), rows))
+        blocks += [page.printed(one.text) for one in diagnosis.findings]
     else:
-        blocks.append(page.Paragraph(text="Nothing was found."))
-    blocks += [
-        page.Paragraph(text=page.printed(f"Not observable: {line}"))
-        for line in diagnosis.unobservable
-    ]
-    return page.Section(heading=heading, blocks=[*blocks, *more])
+        blocks.append("Nothing was found.")
+    blocks += [page.printed(f"Not observable: {line}") for line in diagnosis.unobservable]
+    return page.Section(heading, blocks)
 
 
 def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
@@ -176,10 +170,9 @@ def write_doctor_report(
     after : that of the repaired log, None where nothing was repaired.
     """
     caption = "Force over slip angle, as logged and repaired."
-    drawn = page.Picture(image=figure, caption=caption, read=READ["doctor"])
     sections = [
         diagnosis_section(diagnosis),
-        page.Section(heading="Tire curves", blocks=[drawn]),
+        page.Section("Tire curves", drawings({"doctor": figure}, {"doctor": caption})),
     ]
     if after is not None:
         sections.append(diagnosis_section(after, heading="After the repair"))
@@ -207,8 +200,6 @@ def write_doctor_report(
     page.write_report(folder / REPORT, report)
 
 
-def write_repair(path: Path, given: LogMap, diagnosis: Diagnosis) -> LogMap:
-    """Write how a log is read with what is sure taken out of it, and return it."""
-    repaired = replace(given, repair=given.repair.then(diagnosis.repair))
-    repaired.to_toml(path)
-    return repaired
+def write_repair(path: Path, given: LogMap, diagnosis: Diagnosis) -> None:
+    """Write how a log is read with what is sure taken out of it."""
+    replace(given, repair=given.repair.then(diagnosis.repair)).to_toml(path)

@@ -72,14 +72,7 @@ class Headline(NamedTuple):
     tone: Tone = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Paragraph:
-    """Running text."""
-
-    text: str
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Table:
     """A table with a caption; units belong into the header.
 
@@ -101,7 +94,7 @@ class Table:
                 )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Picture:
     """A picture with a caption.
 
@@ -119,11 +112,10 @@ class Picture:
         object.__setattr__(self, "image", data)
 
 
-Block = Paragraph | Table | Picture
+Block = str | Table | Picture  # running text is a str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Section:
+class Section(NamedTuple):
     """A part of a report under one heading.
 
     blocks : paragraphs, tables and pictures in order.
@@ -142,8 +134,7 @@ class Report:
     summary : what a hurried reader should know, plain text.
     numbers : what stands at the top, with units; none where there is nothing to count.
     lead : what is looked at first, above the warnings.
-    warnings : what speaks against the results, plain text; what is marked bad refuses them. None
-        where nothing was looked at.
+    warnings : what speaks against the results, plain text; what is marked bad refuses them.
     """
 
     title: str
@@ -151,7 +142,7 @@ class Report:
     summary: str = ""
     numbers: Sequence[Headline] = ()
     lead: Sequence[Block] = ()
-    warnings: Sequence[str | Marked] | None = None
+    warnings: Sequence[str | Marked] = ()
 
 
 _FINE = "No warnings."
@@ -167,7 +158,7 @@ def report_html(report: Report) -> str:
             return _table(block, next(tables))
         if isinstance(block, Picture):
             return _picture(block, next(figures))
-        return f"<p>{_inline(block.text)}</p>"
+        return f"<p>{_inline(block)}</p>"
 
     lead = [written(block) for block in report.lead]
     entries, parts = [], []
@@ -191,8 +182,7 @@ def report_html(report: Report) -> str:
         "<body>",
         f"<h1>{html(title)}</h1>",
     ]
-    if report.summary:
-        head.append(f'<p class="summary">{_inline(report.summary)}</p>')
+    head.append(f'<p class="summary">{_inline(report.summary)}</p>')
     head += _numbers(report.numbers) + lead + _warnings(report.warnings)
     contents = ['<nav aria-label="Contents">', "<ol>", *entries, "</ol>", "</nav>"]
     return "\n".join([*head, *contents, *parts, "</body>", "</html>"]) + "\n"
@@ -231,9 +221,7 @@ def _marked(one: Marked) -> str:
     return text + (f'<small class="unknown">{_inline(one.note)}</small>' if one.note else "")
 
 
-def _warnings(warnings: Sequence[str | Marked] | None) -> list[str]:
-    if warnings is None:
-        return []
+def _warnings(warnings: Sequence[str | Marked]) -> list[str]:
     if not warnings:
         return [f'<p class="fine">{_FINE}</p>']
     marked = [one if isinstance(one, Marked) else Marked(one) for one in warnings]

@@ -14,7 +14,7 @@ from identifier.verdict.verdict import LARGEST_MODEL_ERROR, PERCENT
 from models.recordings import Recording
 from tireid.output import text_table
 from tireid.progress import complain
-from tireid.report import Block, Cell, Headline, Marked, Paragraph, Section, Table, Tone, printed
+from tireid.report import Block, Cell, Headline, Marked, Section, Table, Tone, printed
 
 HEADER = ("", "front", "is", "rear", "is")
 
@@ -100,8 +100,8 @@ def sensors_section(model: TireModel, recordings: Iterable[Recording]) -> list[S
         [name, *(day.words.get(title, "") for title in titles)] for name, day in days
     ]
     caption = "Errors that were found from its motion with the tires held, and taken off."
-    table = Table(caption=caption, header=["log", *titles], rows=rows)
-    return [Section(heading="Sensors of each log", blocks=[table])]
+    table = Table(caption, ["log", *titles], rows)
+    return [Section("Sensors of each log", [table])]
 
 
 def verdict_headline(verdict: Verdict, others: Sequence[str | Marked] = ()) -> Headline:
@@ -199,19 +199,19 @@ def verdict_section(verdict: Verdict) -> Section:
     ]
     lines = (verdict.headline, verdict.model_error_line, *verdict.unobservable)
     blocks: list[Block] = [
-        Paragraph(
-            text="The frozen model is replayed over the drive and must reproduce the force in "
+        (
+            "The frozen model is replayed over the drive and must reproduce the force in "
             "the motion, at each axle, on identification and validation drives. ± is one "
             "standard deviation."
         ),
-        *(Paragraph(text=printed(line)) for line in lines if line),
+        *(printed(line) for line in lines if line),
         Table(
-            caption="Estimates. Grey was not identified; struck through is not valid.",
-            header=("", *AXLES),
-            rows=rows,
+            "Estimates. Grey was not identified; struck through is not valid.",
+            ("", *AXLES),
+            rows,
         ),
     ]
-    return Section(heading="Verdict", blocks=blocks)
+    return Section("Verdict", blocks)
 
 
 def warn_of_stored(path: Path | str) -> None:

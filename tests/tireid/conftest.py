@@ -1,6 +1,7 @@
 """Two short drives of the sedan as log files, and its vehicle file; a doctor that is asked once."""
 
 import hashlib
+import json
 import pickle
 
 import numpy as np
@@ -12,6 +13,7 @@ from models.plant import Plant
 from models.recordings import write_recording
 from models.vehicle import sedan
 from tireid.cli import main
+from tireid.commands.demo_story import run_story
 
 
 @pytest.fixture(scope="session")
@@ -55,9 +57,48 @@ def asked_once(diagnoses):
         yield
 
 
+@pytest.fixture(scope="session")
+def story():
+    return run_story()
+
+
+@pytest.fixture
+def unmeasured(monkeypatch):
+    """No package is measured for Arm: costs have tests of their own."""
+    monkeypatch.setattr("tireid.exporting.measure", lambda *_: [])
+
+
+def typed(*words):
+    """The exit code of a command; paths are words too."""
+    return main([str(word) for word in words])
+
+
+def learn_words(folder, log="slalom.csv", *more):
+    """Words that identify the tires of the car of a folder on a log, of this folder or by path."""
+    return ["identify", folder / log, "--vehicle", folder / "car.toml", *more]
+
+
+def json_of(path):
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
+def columns_of(log):
+    """The signals of a log by the names of its columns, as `read_recording` takes them."""
+    return {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
+
+
+def table_of(path):
+    """The columns of a CSV file by their names."""
+    return np.genfromtxt(path, delimiter=",", names=True)
+
+
+def page_in(folder):
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
 def refusal(capsys, words):
     """The one line of an error of a command, after checking the exit code."""
     capsys.readouterr()
-    assert main([str(word) for word in words]) == 2
+    assert typed(*words) == 2
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "error:" in line]
     return line

@@ -1,13 +1,11 @@
 """Logs as loggers write them go to a verdict by `tireid channels` and `tireid identify` alone."""
 
-import json
-
 import numpy as np
 import pytest
 
 import tireid as ti
 from tests.models.logs.drive_in_every_format import IN_BAG, write_bag
-from tireid.cli import main
+from tests.tireid.conftest import json_of, typed
 
 CAR = ti.sedan()
 
@@ -28,8 +26,8 @@ def car(tmp_path_factory):
 
 def learnt(words, out):
     """The stiffnesses of a run whose verdict is valid."""
-    assert main([*words, "--out", str(out)]) == 0
-    model = json.loads((out / "weights.json").read_text())
+    assert typed(*words, "--out", out) == 0
+    model = json_of(out / "weights.json")
     return np.array(model["cornering_stiffness_N_rad"])
 
 
@@ -66,11 +64,11 @@ def test_mdf_with_three_rates_a_gap_and_a_hand_wheel(log, car, in_si, tmp_path, 
         )
         file.save(tmp_path / "log.mf4", overwrite=True)
     path, told = str(tmp_path / "log.mf4"), str(tmp_path / "log.toml")
-    assert main(["channels", path]) == 1
+    assert typed("channels", path) == 1
     said = capsys.readouterr().out
     assert '--columns "delta_f=LWS_Angle [deg] /RATIO"' in said
     word = "delta_f=LWS_Angle [deg] /14.6"
-    assert main(["channels", path, "--columns", word, "--write", told]) == 0
+    assert typed("channels", path, "--columns", word, "--write", told) == 0
     capsys.readouterr()
     found = learnt(["identify", path, "--vehicle", car, "--log", told], tmp_path / "out")
     assert "gaps cut the log into 2 segments" in capsys.readouterr().err
@@ -82,7 +80,7 @@ def test_a_bag_of_two_yaw_rates_asks_which_and_goes_on_when_told(log, car, in_si
     columns = {name: getattr(log, name) for name in ("v_x", "v_y", "r", "delta_f", "a_y")}
     path = str(write_bag(tmp_path / "bag", log.t, columns))
     words = ["identify", path, "--vehicle", car]
-    assert main(words) == 2
+    assert typed(*words) == 2
     said = capsys.readouterr().err
     assert "'/odom/twist.twist.angular.z' or '/imu/angular_velocity.z' for r, equally" in said
     told = ["--columns", f"r={IN_BAG['r']}", f"delta_f={IN_BAG['delta_f']} [rad]"]

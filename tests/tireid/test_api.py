@@ -2,7 +2,6 @@
 
 import ast
 import builtins
-import json
 import subprocess
 import sys
 from dataclasses import replace
@@ -17,7 +16,7 @@ from identifier.methods import make_method
 from models.recordings import RecordingError
 from mpc.prediction import build_dynamics
 from mpc.tires import prediction_tire
-from tireid.cli import main
+from tests.tireid.conftest import columns_of, json_of, learn_words, typed
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
@@ -47,7 +46,7 @@ def tires(log, car):
     return {name: ti.identify(log, car, make_method(name, car)).freeze() for name in KINDS}
 
 
-def imported_by(code: str) -> set[str]:
+def imported_by(code):
     """Packages that a fresh Python has imported after some code."""
     script = f"import sys\n{code}\nprint(*(m.split('.')[0] for m in sys.modules), file=sys.stderr)"
     command = [sys.executable, "-c", script]
@@ -55,7 +54,7 @@ def imported_by(code: str) -> set[str]:
     return set(told.stderr.split())
 
 
-def help_of(words: str) -> str:
+def help_of(words):
     return (
         "from tireid.cli import main\n"
         f"try:\n    main({words})\nexcept SystemExit as stop:\n    assert not stop.code"
@@ -102,11 +101,11 @@ def test_python_m_tireid_is_the_command_line():
 
 def test_the_command_and_the_function_write_the_same_model(logs, run, tmp_path, undrawn):
     out = tmp_path / "out"
-    words = ["identify", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
-    assert main([*words, "--out", str(out)]) == 0
+    words = learn_words(logs)
+    assert typed(*words, "--out", out) == 0
     told = {"valid": run.verdict.valid}
     model = run.tire
-    assert json.loads((out / "weights.json").read_text()) == model.to_dict() | told
+    assert json_of(out / "weights.json") == model.to_dict() | told
     assert ti.TireModel.load(out / "weights.json").to_dict() == model.to_dict()
     checked = {name: model.to_dict()[name] for name in ("force_missed",)}
     assert model.to_dict() == run.freeze().to_dict() | checked
@@ -129,7 +128,7 @@ def test_a_run_names_its_parts(log, car, tmp_path):
     run.save(tmp_path / "run")
     again = ti.TireModel.load(tmp_path / "run" / "weights.json")
     assert again.to_dict() == run.tire.to_dict()
-    told = json.loads((tmp_path / "run" / "verdict.json").read_text())
+    told = json_of(tmp_path / "run" / "verdict.json")
     assert told["valid"] == run.verdict.valid
     with pytest.raises(FileExistsError, match="overwrite=True replaces it"):
         run.save(tmp_path / "run")
@@ -173,10 +172,6 @@ def test_a_recording_of_another_car_is_refused(log, car):
     ti.identify(log, swapped, check=False)
 
 
-def columns_of(log):
-    return {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
-
-
 class Frame:
     """As much of a data frame as pandas and polars share."""
 
@@ -216,12 +211,11 @@ def test_columns_of_another_name_and_runs_are_chosen(log):
 
 @pytest.mark.parametrize("kind", ["datetime64[ns]", "datetime64[us]", "timedelta64[ms]"])
 def test_times_of_the_calendar_and_durations_count_from_the_first(log, kind):
-    columns = {"vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
     milliseconds = np.round(1e3 * (log.t - log.t[0])).astype("timedelta64[ms]")
     start = np.datetime64("2026-03-29T00:59:55") if kind.startswith("d") else 0
-    stamped = {"t": (start + milliseconds).astype(kind), **columns}
+    stamped = columns_of(log) | {"t": (start + milliseconds).astype(kind)}
     told = ti.read_recording(stamped)
-    plain = ti.read_recording({"t": log.t - log.t[0], **columns})
+    plain = ti.read_recording(columns_of(log) | {"t": log.t - log.t[0]})
     np.testing.assert_allclose(told.t, plain.t, atol=1e-9)
     np.testing.assert_allclose(told.r, plain.r, atol=1e-9)
     stamped["t"][7] = "NaT"
@@ -232,8 +226,7 @@ def test_times_of_the_calendar_and_durations_count_from_the_first(log, kind):
 def test_an_hour_that_is_there_twice_in_summer_time_is_no_jump(log):
     pandas = pytest.importorskip("pandas", reason="needs pandas, which is no dependency")
     t = pandas.to_datetime("2026-10-25 00:59:55", utc=True) + pandas.to_timedelta(log.t, unit="s")
-    columns = {"vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
-    data = pandas.DataFrame({"t": t.tz_convert("Europe/Berlin"), **columns})
+    data = pandas.DataFrame(columns_of(log) | {"t": t.tz_convert("Europe/Berlin")})
     np.testing.assert_allclose(ti.read_recording(data).t, log.t - log.t[0], atol=1e-6)
 
 

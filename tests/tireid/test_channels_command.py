@@ -1,7 +1,6 @@
 """`tireid channels`: what a log holds, the map that it writes, and logs that are read by one."""
 
 import csv
-import json
 import re
 import tomllib
 
@@ -10,7 +9,7 @@ import pytest
 
 import tireid as ti
 from models.recordings import RecordingError, read_recording, write_recording
-from tireid.cli import main
+from tests.tireid.conftest import columns_of, json_of, learn_words, page_in, typed
 
 CAR = ti.sedan()
 
@@ -51,7 +50,7 @@ RATIO = "delta_f=Steered Angle [deg] /14.6"
 
 
 def test_it_lists_what_is_there_and_what_is_missing(folder, capsys):
-    assert main(["channels", str(folder / "motec.csv")]) == 1
+    assert typed("channels", folder / "motec.csv") == 1
     said = capsys.readouterr().out
     assert "MoTeC" in said
     row = next(line for line in said.splitlines() if line.startswith("Vel Lat"))
@@ -59,7 +58,7 @@ def test_it_lists_what_is_there_and_what_is_missing(folder, capsys):
     row = next(line for line in said.splitlines() if line.startswith("Steered Angle"))
     assert "perhaps delta_f" in row and "give its ratio" in row
     assert '--columns "delta_f=Steered Angle [deg] /RATIO"' in said
-    assert main(["channels", str(folder / "plain.csv")]) == 0
+    assert typed("channels", folder / "plain.csv") == 0
     assert "all that is needed is there" in capsys.readouterr().out
 
 
@@ -67,7 +66,7 @@ def test_what_is_there_of_a_log_without_lateral_velocity_is_what_stands_in_for_i
     path = tmp_path / "imu.csv"
     rows = [f"{0.01 * k:.2f},20.0,0.{k % 10},{k % 7},0.0{k % 3}" for k in range(200)]
     path.write_text("\n".join(["t,vx,r,ay,delta_f", *rows]))
-    assert main(["channels", str(path)]) == 0
+    assert typed("channels", path) == 0
     assert "all that is needed is there: vx, r, delta_f, ay\n" in capsys.readouterr().out
 
 
@@ -75,32 +74,30 @@ def test_what_is_there_of_a_log_without_lateral_velocity_is_what_stands_in_for_i
 def test_a_log_of_a_logger_goes_to_the_verdict_of_the_same_in_si(folder, tmp_path, capsys):
     told = tmp_path / "log.toml"
     motec, car = str(folder / "motec.csv"), str(folder / "car.toml")
-    assert main(["channels", motec, "--columns", RATIO, "--write", str(told)]) == 0
+    assert typed("channels", motec, "--columns", RATIO, "--write", told) == 0
     data = tomllib.loads(told.read_text())
     assert data["signals"]["delta_f"] == {"channel": "Steered Angle", "unit": "deg", "ratio": 14.6}
-    words = ["identify", motec, "--vehicle", car, "--out", str(tmp_path / "out")]
-    assert main([*words, "--log", str(told)]) == 0
-    plain = ["identify", str(folder / "plain.csv"), "--vehicle", car]
-    assert main([*plain, "--out", str(tmp_path / "plain")]) == 0
-    found, same = (
-        json.loads((tmp_path / one / "weights.json").read_text()) for one in ("out", "plain")
-    )
+    words = ["identify", motec, "--vehicle", car, "--out", tmp_path / "out"]
+    assert typed(*words, "--log", told) == 0
+    plain = ["identify", folder / "plain.csv", "--vehicle", car]
+    assert typed(*plain, "--out", tmp_path / "plain") == 0
+    found, same = (json_of(tmp_path / one / "weights.json") for one in ("out", "plain"))
     stiffness = [one["cornering_stiffness_N_rad"] for one in (found, same)]
     assert np.allclose(stiffness[0], stiffness[1], rtol=1e-6)
 
 
 def test_what_is_taken_by_its_name_is_said_and_stands_in_the_report(folder, tmp_path, capsys):
     out = tmp_path / "out"
-    words = ["identify", str(folder / "motec.csv"), "--vehicle", str(folder / "car.toml")]
-    assert main([*words, "--columns", RATIO, "--out", str(out)]) == 0
+    words = learn_words(folder, "motec.csv")
+    assert typed(*words, "--columns", RATIO, "--out", out) == 0
     said = capsys.readouterr().err
     assert "vy is taken from Vel Lat [km/h], by its name" in said
-    assert "vy is taken from Vel Lat [km/h], by its name" in (out / "report.html").read_text()
+    assert "vy is taken from Vel Lat [km/h], by its name" in page_in(out)
 
 
 def test_an_error_shows_the_word_that_mends_it(folder, capsys):
-    words = ["identify", str(folder / "motec.csv"), "--vehicle", str(folder / "car.toml")]
-    assert main(words) == 2
+    words = learn_words(folder, "motec.csv")
+    assert typed(*words) == 2
     said = capsys.readouterr().err
     assert "column delta_f is missing; did you mean 'Steered Angle' of the hand wheel" in said
     assert 'declare it by --columns "delta_f=Steered Angle [deg] /RATIO"' in said
@@ -108,8 +105,8 @@ def test_an_error_shows_the_word_that_mends_it(folder, capsys):
 
 
 def test_a_rear_or_right_wheel_is_not_taken_for_the_front_axle(log, tmp_path):
-    columns = {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r}
-    columns |= {"delta_fl": log.delta_f, "delta_fr": log.delta_f}
+    columns = columns_of(log)
+    columns["delta_fl"] = columns["delta_fr"] = columns.pop("delta_f")
     with pytest.raises(RecordingError) as caught:
         ti.read_recording(columns)
     assert "did you mean 'delta_fl + delta_fr' for delta_f (goes to 0.12; mean of two" in str(
@@ -120,7 +117,8 @@ def test_a_rear_or_right_wheel_is_not_taken_for_the_front_axle(log, tmp_path):
 
 
 def test_sideslip_is_read_in_place_of_lateral_velocity(log):
-    columns = {"t": log.t, "vx": log.v_x, "r": log.r, "delta_f": log.delta_f}
+    columns = columns_of(log)
+    del columns["vy"]
     columns["Schwimmwinkel"] = np.degrees(np.arctan2(log.v_y, log.v_x))
     told = ti.read_recording(columns, columns={"beta": "Schwimmwinkel [deg]"})
     assert np.allclose(told.v_y, log.v_y, atol=1e-12)
@@ -128,7 +126,7 @@ def test_sideslip_is_read_in_place_of_lateral_velocity(log):
 
 @pytest.mark.parametrize("cut_off", [1e-300, 1e-9, 0.0099, 50.0, 1e9])
 def test_a_filter_that_lets_nothing_pass_or_cannot_be_is_refused(log, cut_off):
-    columns = {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": log.r, "delta_f": log.delta_f}
+    columns = columns_of(log)
     said = "^mine: low_pass of the map must be at least 0.01 Hz and below half the sampling rate"
     with pytest.raises(RecordingError, match=said):
         ti.read_recording(columns, name="mine", log_map=ti.LogMap(low_pass=cut_off))
@@ -138,8 +136,8 @@ def test_a_filter_that_lets_nothing_pass_or_cannot_be_is_refused(log, cut_off):
 
 
 def test_mirrored_axes_and_a_filter_are_told_by_the_map(log):
-    columns = {"t": log.t, "vx": log.v_x, "vy": -log.v_y, "r": -log.r, "delta_f": -log.delta_f}
-    columns["ay"] = -log.a_y
+    columns = columns_of(log) | {"ay": log.a_y}
+    columns |= {name: -columns[name] for name in ("vy", "r", "delta_f", "ay")}
     told = ti.read_recording(columns, log_map=ti.LogMap(axes="SAE"))
     for name in ("v_x", "v_y", "r", "delta_f", "a_y"):
         assert np.array_equal(getattr(told, name), getattr(log, name))
@@ -159,11 +157,11 @@ def test_several_logs_teach_one_model_with_errors_of_each(log, folder, tmp_path,
     write_recording(log.between(18.0, 39.0), tmp_path / "b.csv")
     out, car = tmp_path / "out", str(folder / "car.toml")
     logs = [str(tmp_path / "a.csv"), str(tmp_path / "b.csv")]
-    assert main(["identify", *logs, "--vehicle", car, "--out", str(out)]) == 0
+    assert typed("identify", *logs, "--vehicle", car, "--out", out) == 0
     said = capsys.readouterr()
     rows = [line.split() for line in said.out.splitlines()]
     assert any(row[2:3] == ["a"] for row in rows) and any(row[2:3] == ["b"] for row in rows)
-    errors = json.loads((out / "summary.json").read_text())["rmse_N"]
+    errors = json_of(out / "summary.json")["rmse_N"]
     assert {"a + b", "a", "b"} == set(errors["online"])
     frozen = next(iter(errors["frozen"].values()))
     whole, parts = frozen["a + b"]["front"], [frozen[one]["front"] for one in "ab"]
@@ -173,20 +171,17 @@ def test_several_logs_teach_one_model_with_errors_of_each(log, folder, tmp_path,
 
 
 def test_a_repair_of_the_map_is_taken_out_of_log_and_car_and_said(log, folder, tmp_path, capsys):
-    off = ti.read_recording(
-        {"t": log.t, "vx": log.v_x, "vy": log.v_y, "r": -log.r, "delta_f": log.delta_f},
-        check=False,
-    )
+    off = ti.read_recording(columns_of(log) | {"r": -log.r}, check=False)
     write_recording(off, tmp_path / "off.csv")
     (tmp_path / "log.toml").write_text("[repair.factor]\nr = -1.0\n[repair.vehicle]\nmass = 1400\n")
-    words = ["identify", str(tmp_path / "off.csv"), "--vehicle", str(folder / "car.toml")]
-    assert main([*words, "--out", str(tmp_path / "no")]) == 2
+    words = learn_words(folder, tmp_path / "off.csv")
+    assert typed(*words, "--out", tmp_path / "no") == 2
     capsys.readouterr()
-    done = [*words, "--log", str(tmp_path / "log.toml"), "--out", str(tmp_path / "out")]
-    assert main(done) in (0, 3)
+    done = [*words, "--log", tmp_path / "log.toml", "--out", tmp_path / "out"]
+    assert typed(*done) in (0, 3)
     said = capsys.readouterr().err
     assert "repairs the car: mass = 1400" in said and "factor.r = -1" in said
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    summary = json_of(tmp_path / "out" / "summary.json")
     assert summary["vehicle"]["mass"] == 1400.0
 
 
@@ -203,16 +198,16 @@ def test_a_repair_of_the_map_is_taken_out_of_log_and_car_and_said(log, folder, t
 )
 def test_words_that_are_wrong_are_told_in_one_line(folder, words, said, monkeypatch, capsys):
     monkeypatch.chdir(folder)
-    assert main(["channels", *words]) == 2
+    assert typed("channels", *words) == 2
     error = capsys.readouterr().err
     assert said in error and len(error.strip().splitlines()) == 1
 
 
 def test_a_map_that_is_there_is_not_replaced(folder, tmp_path, capsys):
     (tmp_path / "log.toml").write_text("")
-    words = ["channels", str(folder / "plain.csv"), "--write", str(tmp_path / "log.toml")]
-    assert main(words) == 2
-    assert main([*words, "--force"]) == 0
+    words = ["channels", folder / "plain.csv", "--write", tmp_path / "log.toml"]
+    assert typed(*words) == 2
+    assert typed(*words, "--force") == 0
     assert "[signals.v_x]" in (tmp_path / "log.toml").read_text()
 
 
@@ -246,7 +241,7 @@ def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(f
     path.write_text("\n".join([*rows, ""]), encoding="utf-8")
     with pytest.raises(RecordingError, match=r"vy must be finite, 301 of 4000 .*--cut-holes"):
         read_recording(path)
-    assert main(["channels", str(path), "--write", str(by)]) == 0
+    assert typed("channels", path, "--write", by) == 0
     said = capsys.readouterr().out
     assert "vy has no value in 301 of 4000 cells of 'vy', the first in line 1002" in said
     assert "they are rejected without --cut-holes" in said
@@ -258,7 +253,7 @@ def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(f
     known = kept != single
     assert np.array_equal(read.v_y[known], log.v_y[kept][known])
     assert abs(read.v_y[~known] - log.v_y[single]) < 0.1, "v_y goes on as before for one sample"
-    assert main(["channels", str(path), "--cut-holes"]) == 0
+    assert typed("channels", path, "--cut-holes") == 0
     assert "they are cut out, as given" in capsys.readouterr().out
 
 
@@ -278,7 +273,7 @@ def test_a_clock_is_mended_where_it_is_asked_for(folder, tmp_path, capsys):
         RecordingError, match=r"a sample is there twice: --mend-clock .* leaves one"
     ):
         read_recording(path)
-    assert main(["channels", str(path), "--mend-clock", "--write", str(by)]) == 0
+    assert typed("channels", path, "--mend-clock", "--write", by) == 0
     assert 'order = "mend"' in by.read_text(encoding="utf-8")
     read, right = read_recording(path, log_map=by), read_recording(folder / "plain.csv")
     assert np.array_equal(read.t, right.t) and np.array_equal(read.r, right.r)
@@ -310,6 +305,11 @@ def written(path, log, columns):
     return path
 
 
+def assert_read(got, log):
+    for name in ("v_x", "v_y", "r", "delta_f", "a_y"):
+        assert np.allclose(getattr(got, name), getattr(log, name), atol=1e-6)
+
+
 def in_degrees(log):
     columns = {"Geschw [km/h]": 3.6 * log.v_x, "Gierrate [°/s]": np.degrees(log.r)}
     return columns | {"RoadWheelAngle [deg]": np.degrees(log.delta_f)}
@@ -318,8 +318,7 @@ def in_degrees(log):
 def test_a_log_in_german_is_read_by_its_names(log, tmp_path):
     columns = in_degrees(log) | {"Quergeschw [km/h]": 3.6 * log.v_y, "Querbeschl [m/s²]": log.a_y}
     got = read_recording(written(tmp_path / "fahrt.csv", log, columns))
-    for name in ("v_x", "v_y", "r", "delta_f", "a_y"):
-        assert np.allclose(getattr(got, name), getattr(log, name), atol=1e-6)
+    assert_read(got, log)
 
 
 def test_a_channel_that_may_be_v_y_is_named_where_the_log_is_read_without(log, tmp_path, capsys):
@@ -331,7 +330,7 @@ def test_a_channel_that_may_be_v_y_is_named_where_the_log_is_read_without(log, t
     word = '--columns "vy=Seitwärts [km/h]"'
     assert "if 'Seitwärts [km/h]' for vy (by a word of its name and its unit) is one" in note
     assert note.endswith(f"declare it by {word}")
-    assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 0
+    assert typed("channels", path, "--write", tmp_path / "log.toml") == 0
     said = capsys.readouterr().out
     assert note in said and "perhaps vy (50%)" in said
     assert "# channel = 'Seitwärts [km/h]'" in (tmp_path / "log.toml").read_text(encoding="utf-8")
@@ -350,7 +349,7 @@ def test_two_channels_that_may_be_a_y_are_named_beside_a_v_y_that_is_read(log, t
         'ay, equally; declare it by --columns "ay=INS_AccLateral [m/s^2]"'
     )
     assert note in got.notes
-    assert main(["channels", str(path)]) == 0
+    assert typed("channels", path) == 0
     assert note in capsys.readouterr().out
     told = read_recording(path, columns={"ay": "INS_AccLateral [m/s^2]"})
     assert not any("left aside" in one for one in told.notes)
@@ -365,7 +364,7 @@ def test_two_channels_that_may_be_a_y_are_named_where_no_v_y_is_there(log, tmp_p
     assert "column vy (or ay, from which it is estimated) is missing; did you mean 'INS_Acc" in said
     assert "'ESP_LatAcc [m/s^2]' for ay, equally?" in said
     assert 'declare it by --columns "ay=INS_AccLateral [m/s^2]"' in said
-    assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 1
+    assert typed("channels", path, "--write", tmp_path / "log.toml") == 1
     said = capsys.readouterr().out
     assert "vy (lateral velocity) is missing, ay can replace it: 'INS_AccLateral" in said
     assert '--columns "ay=INS_AccLateral [m/s^2]"\n' in said
@@ -380,7 +379,7 @@ def test_words_that_are_proposed_for_a_log_without_units_read_it(log, tmp_path, 
     }
     columns |= {"Steering_Angle": 16.0 * np.degrees(log.delta_f)}
     path = written(tmp_path / "vbox.csv", log, columns)
-    assert main(["channels", str(path), "--write", str(tmp_path / "log.toml")]) == 1
+    assert typed("channels", path, "--write", tmp_path / "log.toml") == 1
     said = capsys.readouterr().out
     assert "perhaps r in deg/s (70%)" in said
     words = re.findall(
@@ -394,8 +393,7 @@ def test_words_that_are_proposed_for_a_log_without_units_read_it(log, tmp_path, 
     ]
     told = dict(word.replace("RATIO", "16").split("=", 1) for word in words)
     got = read_recording(path, columns=told)
-    for name in ("v_x", "v_y", "r", "delta_f", "a_y"):
-        assert np.allclose(getattr(got, name), getattr(log, name), atol=1e-6)
+    assert_read(got, log)
     text = (tmp_path / "log.toml").read_text(encoding="utf-8")
     completed = re.sub(r"^# (?=\[|channel|unit|ratio)", "", text, flags=re.M)
     completed = completed.replace("ratio =", "ratio = 16.0")
@@ -407,5 +405,5 @@ def test_words_that_are_proposed_for_a_log_without_units_read_it(log, tmp_path, 
 def test_a_sideslip_beside_a_v_y_that_is_read_is_said_to_be_none(log, tmp_path, capsys):
     slip = {"sideSlip [deg]": np.degrees(np.arctan2(log.v_y, log.v_x)), "vyCG [m/s]": log.v_y}
     path = written(tmp_path / "log.csv", log, in_degrees(log) | slip)
-    assert main(["channels", str(path)]) == 0
+    assert typed("channels", path) == 0
     assert "beta, not read beside vy" in capsys.readouterr().out

@@ -11,7 +11,7 @@ from identifier.certificate import Certificate, Property
 from identifier.driving import Driving
 from identifier.paper.design import PaperIdentifier, design_text, read_design
 from models.vehicle import sedan
-from tireid.cli import main
+from tests.tireid.conftest import json_of, typed
 from tireid.commands.certificate_table import (
     advised,
     certificate_text,
@@ -23,7 +23,7 @@ from tireid.commands.certificate_table import (
 def checked(capsys, *words):
     """Exit code and what was printed."""
     capsys.readouterr()
-    code = main(["check", *(str(word) for word in words)])
+    code = typed("check", *words)
     return code, capsys.readouterr()
 
 
@@ -98,7 +98,7 @@ def test_the_folder_has_figures_certificate_and_design(capsys, tmp_path):
     for name in ("locus.png", "bounds.png"):
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
     assert (folder / "certificate.txt").read_text(encoding="utf-8") == said.out
-    numbers = json.loads((folder / "certificate.json").read_text(encoding="utf-8"))
+    numbers = json_of(folder / "certificate.json")
     assert (numbers["method"], numbers["verdict"]) == ("integral", "pass")
     assert checked(capsys, "--paper", "--out", folder)[0] == 2  # nothing is replaced unasked
 
@@ -124,7 +124,7 @@ def test_without_options_it_says_what_is_certified_of_what_identify_uses(capsys,
     least, most = held["grip_static_axle_loads"]
     assert re.search(rf"grip_static_axle_loads +{number(least)} to {number(most)}\n", said.out)
     assert set(held) <= set(said.out.split())
-    numbers = json.loads((tmp_path / "judged" / "certificate.json").read_text(encoding="utf-8"))
+    numbers = json_of(tmp_path / "judged" / "certificate.json")
     assert numbers["limits"] == held
     code, said = checked(capsys, "--json")
     assert (code, json.loads(said.out)) == (0, numbers)
@@ -169,13 +169,13 @@ def test_advice_is_given_for_what_does_not_pass_and_says_what_to_do():
 
 def test_the_same_file_gives_the_same_verdict_and_options_are_said(tmp_path, capsys):
     words = ["--bandwidth", "0.5", "--slip", "0.09", "--noise-r", "0.02"]
-    assert main(["check", "--paper", "--out", str(tmp_path / "judged"), *words, "--json"]) == 0
+    assert typed("check", "--paper", "--out", tmp_path / "judged", *words, "--json") == 0
     path = tmp_path / "judged" / "design.toml"
     there = json.loads(capsys.readouterr().out)
     assert read_design(path).driving == Driving(**there["conditions"])
-    main(["check", "--design", str(path), "--json"])
+    typed("check", "--design", path, "--json")
     assert json.loads(capsys.readouterr().out) == there
-    main(["check", "--design", str(path)])
+    typed("check", "--design", path)
     assert "conditions: as stored in the design\n" in capsys.readouterr().out
-    main(["check", "--design", str(path), "--slip", "0.2"])
+    typed("check", "--design", path, "--slip", "0.2")
     assert "as stored in the design, but for --slip" in capsys.readouterr().out

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tireid.cli import build_parser, main, one_line
+from tests.tireid.conftest import typed
+from tireid.cli import build_parser, one_line
 from tireid.commands import COMMANDS
 from tireid.commands.options import method_name
 
@@ -18,7 +19,7 @@ from tireid.commands.options import method_name
 )
 def test_wrong_words_are_one_line_with_exit_code_2(capsys, words):
     with pytest.raises(SystemExit) as stop:
-        main(words)
+        typed(*words)
     assert stop.value.code == 2
     said = capsys.readouterr().err.strip().splitlines()
     assert len(said) == 1
@@ -26,10 +27,10 @@ def test_wrong_words_are_one_line_with_exit_code_2(capsys, words):
 
 
 def test_without_a_word_it_tells_what_there_is(capsys):
-    assert main([]) == 0
+    assert typed() == 0
     alone = capsys.readouterr().out
     with pytest.raises(SystemExit):
-        main(["--help"])
+        typed("--help")
     assert alone == capsys.readouterr().out
 
 
@@ -96,7 +97,7 @@ def test_an_interruption_is_said_and_leaves_nothing(monkeypatch, capsys, tmp_pat
         raise KeyboardInterrupt
 
     monkeypatch.setattr("identifier.paper_study.run_study", interrupted)
-    assert main(["paper", "--out", str(tmp_path / "out")]) == 130
+    assert typed("paper", "--out", tmp_path / "out") == 130
     assert "interrupted" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
@@ -104,13 +105,13 @@ def test_an_interruption_is_said_and_leaves_nothing(monkeypatch, capsys, tmp_pat
 def test_an_output_folder_whose_links_go_in_a_circle_is_one_line(tmp_path, capsys):
     (tmp_path / "out").symlink_to("out")
     for more in ([], ["--force"]):
-        assert main(["check", "--out", str(tmp_path / "out"), *more]) == 2
+        assert typed("check", "--out", tmp_path / "out", *more) == 2
         error = capsys.readouterr().err.splitlines()[-1]
         assert (
             error == f"tireid check: error: {tmp_path / 'out'}: too many levels of symbolic links"
         )
-    words = ["fleet", "learn", "log.csv", "--vehicle", "car.toml", "--out", str(tmp_path / "out")]
-    assert main(words) == 2
+    words = ["fleet", "learn", "log.csv", "--vehicle", "car.toml", "--out", tmp_path / "out"]
+    assert typed(*words) == 2
     assert [one.name for one in tmp_path.iterdir()] == ["out"]
 
 
@@ -122,6 +123,5 @@ def test_the_backend_of_a_notebook_is_not_asked_for_by_a_command(tmp_path):
         env={**os.environ, "MPLBACKEND": backend},
         capture_output=True,
         text=True,
-        check=False,
     )
     assert answer.returncode == 0, answer.stderr

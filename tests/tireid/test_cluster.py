@@ -15,7 +15,7 @@ import pytest
 import tireid.cluster
 from models.recordings import LogMap
 from models.vehicle import sedan
-from tireid.cli import main
+from tests.tireid.conftest import typed
 from tireid.cluster import ClusterError, cluster
 from tireid.fleet.learn import LearnLog, find_logs, learn_fleet, on_a_cluster, read_car
 from tireid.fleet.store import Store
@@ -120,6 +120,10 @@ def test_a_worker_of_threads_is_told_how_to_start_as_processes(tmp_path, capsys)
     assert line.endswith(f"dask worker {address} --nworkers -1 --nthreads 1")
 
 
+def bytes_of(out):
+    return [one.read_bytes() for one in sorted(Path(out).rglob("*.parquet"))]
+
+
 def test_a_worker_that_is_killed_loses_nothing_and_the_bytes_are_the_same(logs, tmp_path):
     pytest.importorskip("pyarrow", reason="needs pyarrow and fsspec")
     for k in range(8):
@@ -141,8 +145,7 @@ def test_a_worker_that_is_killed_loses_nothing_and_the_bytes_are_the_same(logs, 
 
         learn_fleet(tasks, work, there, on_a_cluster(elsewhere), kill_one)
     assert killed and killed[0] < len(tasks)
-    files = [sorted((tmp_path / out).rglob("*.parquet")) for out in ("here", "there")]
-    assert [one.read_bytes() for one in files[0]] == [one.read_bytes() for one in files[1]]
+    assert bytes_of(tmp_path / "here") == bytes_of(tmp_path / "there")
 
 
 def test_logs_of_relative_paths_are_learnt_by_workers_in_another_folder(
@@ -155,16 +158,15 @@ def test_logs_of_relative_paths_are_learnt_by_workers_in_another_folder(
     monkeypatch.chdir(tmp_path)
     words = ["fleet", "learn", "*.csv", "--vehicle", "car.toml"]
     for out, more in (("here", ["--jobs", "1"]), ("there", ["--scheduler", address])):
-        assert main([*words, "--out", out, *more]) == 0
+        assert typed(*words, "--out", out, *more) == 0
         printed = capsys.readouterr()
         assert "2 identified now, 0 before; 0 not valid, 0 could not be used" in printed.out
         assert "threads" not in printed.err
-    files = [sorted(Path(out).rglob("*.parquet")) for out in ("here", "there")]
-    assert [one.read_bytes() for one in files[0]] == [one.read_bytes() for one in files[1]]
+    assert bytes_of("here") == bytes_of("there")
 
 
-def wait_until_open(port, patience=20.0):
-    until = time.monotonic() + patience
+def wait_until_open(port):
+    until = time.monotonic() + 20.0
     while time.monotonic() < until:
         with socket.socket() as probe:
             if probe.connect_ex(("127.0.0.1", port)) == 0:
@@ -177,10 +179,10 @@ def test_the_command_names_what_is_wrong_with_the_cluster(logs, tmp_path, monkey
     pytest.importorskip("pyarrow", reason="needs pyarrow and fsspec")
     monkeypatch.setattr(tireid.cluster, "PATIENCE", 1.0)
     nobody = f"tcp://127.0.0.1:{free_port()}"
-    words = ["fleet", "learn", str(logs / "slalom.csv"), "--vehicle", str(logs / "car.toml")]
-    words += ["--out", str(tmp_path / "out"), "--scheduler", nobody]
-    assert main(words) == 2
+    words = ["fleet", "learn", logs / "slalom.csv", "--vehicle", logs / "car.toml"]
+    words += ["--out", tmp_path / "out", "--scheduler", nobody]
+    assert typed(*words) == 2
     assert f"{nobody}: no Dask scheduler answers there" in capsys.readouterr().err
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert main(words) == 2
+    assert typed(*words) == 2
     assert "needs Dask: pip install dask distributed (" in capsys.readouterr().err

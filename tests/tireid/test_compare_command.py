@@ -2,7 +2,6 @@
 
 import csv
 import html
-import json
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -15,8 +14,7 @@ from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
 from tests.rivals import INSTALLED, needs_rivals
-from tests.tireid.conftest import refusal
-from tireid.cli import main
+from tests.tireid.conftest import json_of, page_in, refusal, typed
 from tireid.commands.compare_results import _ERROR_COLUMNS
 from tireid.figures.compare import short_names
 from tireid.output import write_json
@@ -28,33 +26,31 @@ METHODS_TRIED = ("integral", "linear", *SIGNAL, "fit")
 
 @pytest.fixture(scope="module")
 def words(logs):
-    return ["compare", f"{logs / 'slalom.csv'}", f"{logs / 'quick.csv'}", "--vehicle",
-            f"{logs / 'car.toml'}"]  # fmt: skip
+    return ["compare", logs / "slalom.csv", logs / "quick.csv", "--vehicle",
+            logs / "car.toml"]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def result(words, tmp_path_factory):
     out = tmp_path_factory.mktemp("compare") / "out"
     words = [*words, "--method", *METHODS_TRIED]
-    assert main([*words, "--out", str(out)]) == 0
+    assert typed(*words, "--out", out) == 0
     return out
 
 
 @pytest.fixture(scope="module")
 def numbers(result):
-    return json.loads((result / "compare.json").read_text())
+    return json_of(result / "compare.json")
 
 
-def linear_error(path, stiffness=None):
-    """RMSE per axle of C α with the small-angle slip of (3), the best C where none is given [N]."""
+def linear_error(path, stiffness):
+    """RMSE per axle of C α with the small-angle slip of (3) [N]."""
     recording, car = read_recording(path), sedan()
     v_y, r, force = recording.v_y, recording.r, recording.axle_force
     alpha = (
         recording.u
         - np.column_stack([v_y + car.l_f * r, v_y - car.l_r * r]) / (recording.v_x[:, None])
     )
-    if stiffness is None:
-        stiffness = (alpha * force).sum(axis=0) / (alpha**2).sum(axis=0)
     error = np.sqrt(np.mean((alpha * stiffness - force) ** 2, axis=0))
     return dict(zip(("front", "rear"), error, strict=True)), np.sqrt(np.mean(force**2, axis=0))
 
@@ -91,13 +87,13 @@ def test_a_signal_estimator_has_no_frozen_error(numbers, result):
 @pytest.mark.usefixtures("undrawn")
 def test_the_table_says_which_baselines_know_lag_and_offsets(words, tmp_path, capsys):
     out, names = tmp_path / "out", ("linear", "textbook_ekf", "magic_formula_ekf")
-    assert main([*words, "--method", *names, "--out", str(out)]) == 0
+    assert typed(*words, "--method", *names, "--out", out) == 0
     learnt = "magic_formula_ekf: lag of the tires and offsets of the sensors are identified"
     without = "textbook_ekf: the textbook's, without lag and offsets"
     for text in (
         capsys.readouterr().out,
         (out / "tables.txt").read_text(),
-        (out / "report.html").read_text(),
+        page_in(out),
     ):
         assert learnt in text
         assert html.escape(without) in text or without in text
@@ -118,8 +114,8 @@ def test_without_true_forces_methods_are_judged_by_the_motion(
     blind = [without_forces(logs / f"{n}.csv", tmp_path / f"{n}.csv") for n in ("slalom", "quick")]
     out = tmp_path / "out"
     line = [command, *blind, vehicle, car, "--method", *METHODS_TRIED, "--accept"]
-    assert main([*line, "--out", str(out)]) == 0
-    data = json.loads((out / "compare.json").read_text())
+    assert typed(*line, "--out", out) == 0
+    data = json_of(out / "compare.json")
     assert (data["judged_by"], numbers["judged_by"]) == ("motion", "truth")
     shares = {name: data["methods"][name]["percent"]["online"] for name in METHODS_TRIED}
     true = {name: numbers["methods"][name]["percent"]["online"] for name in METHODS_TRIED}
@@ -140,15 +136,15 @@ def test_a_method_that_needs_an_accelerometer_is_left_out_where_a_log_has_none(
 ):
     out, quick = tmp_path / "out", without_a_y(logs / "quick.csv", tmp_path / "blind.csv")
     words = [words[0], words[1], quick, *words[3:]]
-    assert main([*words, "--method", "inertial", "linear", "--out", str(out)]) == 0
+    assert typed(*words, "--method", "inertial", "linear", "--out", out) == 0
     why = "inertial: left out, it learns from ay and blind has none"
-    for text in ((out / "tables.txt").read_text(), (out / "report.html").read_text()):
+    for text in ((out / "tables.txt").read_text(), page_in(out)):
         assert why in text
     told = capsys.readouterr()
     assert why in told.out and why in told.err
-    numbers = json.loads((out / "compare.json").read_text())
+    numbers = json_of(out / "compare.json")
     assert list(numbers["methods"]) == ["linear"] and list(numbers["left_out"]) == ["inertial"]
-    assert main([*words, "--method", "inertial", "--out", str(tmp_path / "other")]) == 2
+    assert typed(*words, "--method", "inertial", "--out", tmp_path / "other") == 2
     assert "blind has none" in capsys.readouterr().err
 
 
@@ -189,10 +185,10 @@ def assert_shares(row, error, size):
 
 
 def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
-    page = (result / "report.html").read_text(encoding="utf-8")
+    page = page_in(result)
     assert faults_of(page) == []
     told = outline(page).text
-    numbers = json.loads((result / "compare.json").read_text())
+    numbers = json_of(result / "compare.json")
     best = min(
         (m["percent"]["other"], name)
         for name, m in numbers["methods"].items()
@@ -228,9 +224,10 @@ def test_wrong_words_are_one_clear_line_and_leave_nothing(
 def test_without_a_log_the_plant_drives(tmp_path, laid_out):
     out = tmp_path / "out"
     words = ["compare", "--method", "linear"]
-    assert main([*words, "--out", str(out)]) == 0
-    data = json.loads((out / "compare.json").read_text())
+    assert typed(*words, "--out", out) == 0
+    data = json_of(out / "compare.json")
     assert set(data["recordings"]) == {"slalom_20", "step_steer", "lane_change", "slalom_25"}
+    assert not (out / "side_slip.png").exists(), "no method tells it"
 
 
 @pytest.mark.heavy
@@ -240,16 +237,16 @@ def test_a_recording_that_teaches_nothing_right_makes_the_exit_code(
 ):
     log = read_recording(logs / "slalom.csv")
     write_recording(replace(log, v_y=-log.v_y), tmp_path / "mirrored.csv")
-    words = ["compare", str(tmp_path / "mirrored.csv"), "--vehicle", str(logs / "car.toml")]
+    words = ["compare", tmp_path / "mirrored.csv", "--vehicle", logs / "car.toml"]
     words += ["--no-check", "--method", "linear"]
-    assert main([*words, "--out", str(tmp_path / "another")]) == 0
+    assert typed(*words, "--out", tmp_path / "another") == 0
     assert "verdict" not in capsys.readouterr().out
     words.append("fit")
-    assert main([*words, "--out", str(tmp_path / "refused")]) == 3
-    assert "0 of 1" in (tmp_path / "refused" / "report.html").read_text(encoding="utf-8")
+    assert typed(*words, "--out", tmp_path / "refused") == 3
+    assert "0 of 1" in page_in(tmp_path / "refused")
     assert "default identified on mirrored: verdict: NOT VALID" in capsys.readouterr().out
-    assert main([*words, "--accept", "--out", str(tmp_path / "accepted")]) == 0
-    found = json.loads((tmp_path / "accepted" / "compare.json").read_text())["verdict"]
+    assert typed(*words, "--accept", "--out", tmp_path / "accepted") == 0
+    found = json_of(tmp_path / "accepted" / "compare.json")["verdict"]
     assert found["mirrored"]["valid"] is False
 
 
@@ -265,11 +262,11 @@ def test_a_rival_that_is_not_installed_is_told_where_it_is(tmp_path, capsys, mon
     words = ["--method", "joint_ekf", "--out", tmp_path / "out"]
     assert told in refusal(capsys, ["compare", *words])
     with pytest.raises(SystemExit):
-        main(["identify", "log.csv", "--vehicle", "car.toml", *map(str, words)])
+        typed("identify", "log.csv", "--vehicle", "car.toml", *words)
     assert told in capsys.readouterr().err
     with pytest.raises(ValueError, match=told):
         make_method("joint_ekf", sedan())
-    assert main(["compare", "log.csv", "--out", str(tmp_path / "out")]) == 2
+    assert typed("compare", "log.csv", "--out", tmp_path / "out") == 2
     left_out = "without magic_formula_ekf, textbook_ekf, linear_kf, joint_ekf, which are not inst"
     assert left_out in capsys.readouterr().err
     assert (ROOT / "benchmarks/rivals/pyproject.toml").is_file()
@@ -283,7 +280,7 @@ def test_runs_of_one_file_are_named_by_the_run_alone():
 def test_what_diverged_is_null_in_the_file_and_not_infinite(tmp_path):
     shares = Shares(np.inf, 6.0, None)._asdict()
     write_json(tmp_path / "compare.json", {"percent": shares, "online_N": asdict(INFINITE)})
-    assert json.loads((tmp_path / "compare.json").read_text()) == {
+    assert json_of(tmp_path / "compare.json") == {
         "percent": {"online": None, "in_sample": 6.0, "other": None},
         "online_N": {"front": None, "rear": None},
     }

@@ -1,6 +1,5 @@
 """The end of the demo: the car drives on what it learnt, and the report shows the film."""
 
-import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,18 +8,13 @@ import pytest
 from codegen import find_compiler
 from models.vehicle import sedan
 from mpc.tires.tire import curves_at
+from tests.tireid.conftest import json_of
 from tireid.commands import demo as demo_drive
 from tireid.commands.demo import NOT_DRIVEN, drive_section, drive_story, drive_text
-from tireid.commands.demo_story import run_story
 from tireid.driving import results as drive_results
 from tireid.driving.results import Drives
 from tireid.figures import film as frames
 from tireid.report import Picture
-
-
-@pytest.fixture(scope="module")
-def story():
-    return run_story()
 
 
 @pytest.fixture
@@ -37,9 +31,7 @@ def test_learnt_tires_steer_as_the_true_ones_and_learning_stays_on_the_road(stor
     rms = {
         folder: {
             label: scores["rms_e_y_m"]
-            for label, scores in json.loads((tmp_path / folder / "summary.json").read_text())[
-                "drives"
-            ].items()
+            for label, scores in json_of(tmp_path / folder / "summary.json")["drives"].items()
         }
         for folder in ("drive", "drive_slippery")
     }

@@ -8,13 +8,7 @@ from codegen import find_compiler
 from tireid import exporting
 from tireid.commands import demo as demo_package
 from tireid.commands.demo import NOT_BUILT, package_section, ship, shipped_text
-from tireid.commands.demo_story import run_story
 from tireid.exporting import SelfTestError
-
-
-@pytest.fixture(scope="module")
-def story():
-    return run_story()
 
 
 @pytest.fixture(autouse=True, scope="module")

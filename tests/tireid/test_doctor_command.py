@@ -1,6 +1,5 @@
 """`tireid doctor` as a user meets it: a faulty log goes to a valid verdict without an editor."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,7 @@ from identifier.doctor import Diagnosis, Finding
 from identifier.verdict import Verdict
 from models.recordings import LogMap, Repair, read_recording, write_recording
 from tests.pages import faults_of
-from tireid.cli import main
+from tests.tireid.conftest import json_of, learn_words, page_in, typed
 from tireid.diagnoses import _size_text, with_doctor, write_repair
 
 RATIO = 14.6
@@ -20,8 +19,8 @@ RATIO = 14.6
 def clinic(tmp_path_factory):
     """A car's file, a good log, and one in km/h and degrees, with the steering wheel's angle."""
     folder = tmp_path_factory.mktemp("clinic")
-    assert main(["init", str(folder / "car.toml")]) == 0
-    assert main(["sample", str(folder / "good.csv")]) == 0
+    assert typed("init", folder / "car.toml") == 0
+    assert typed("sample", folder / "good.csv") == 0
     good = read_recording(folder / "good.csv")
     bad = replace(
         good,
@@ -36,9 +35,7 @@ def clinic(tmp_path_factory):
 
 
 def doctor(clinic, log, *words):
-    return main(
-        ["doctor", str(clinic / log), "--vehicle", str(clinic / "car.toml"), *map(str, words)]
-    )
+    return typed("doctor", clinic / log, "--vehicle", clinic / "car.toml", *words)
 
 
 def test_of_the_same_log_these_tests_ask_the_doctor_once(clinic, diagnoses):
@@ -72,40 +69,40 @@ def test_repaired_by_the_doctor_the_log_is_learnt_and_valid(clinic, tmp_path, ca
     repair = LogMap.from_toml(log_map).repair
     assert repair.factor["v_x"] == pytest.approx(1.0 / 3.6)
     assert -np.radians(1.0) / repair.factor["delta_f"] == pytest.approx(RATIO, rel=0.03)
-    summary = json.loads((out / "summary.json").read_text())
+    summary = json_of(out / "summary.json")
     assert summary["applied"] == repair.tables()
     assert summary["after"]["healthy"] and not summary["healthy"]
-    assert faults_of((out / "report.html").read_text(encoding="utf-8")) == []
+    assert faults_of(page_in(out)) == []
     assert (out / "slip.png").read_bytes().startswith(b"\x89PNG")
-    words = ["identify", str(clinic / "bad.csv"), "--vehicle", str(clinic / "car.toml")]
+    words = learn_words(clinic, "bad.csv")
     learnt = tmp_path / "learnt"
-    assert main([*words, "--log", str(log_map), "--out", str(learnt)]) == 0
+    assert typed(*words, "--log", log_map, "--out", learnt) == 0
     assert "verdict: valid" in capsys.readouterr().out
 
 
 def test_identify_refuses_a_faulty_log_and_names_the_doctor(clinic, tmp_path, capsys):
-    words = ["identify", str(clinic / "bad.csv"), "--vehicle", str(clinic / "car.toml")]
-    assert main([*words, "--out", str(tmp_path / "out")]) == 2
+    words = learn_words(clinic, "bad.csv")
+    assert typed(*words, "--out", tmp_path / "out") == 2
     assert "tireid doctor LOG" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("unmade")
 def test_identify_repairs_what_is_sure_and_says_so(clinic, tmp_path, capsys):
     out, log_map = tmp_path / "out", tmp_path / "log.toml"
-    words = ["identify", str(clinic / "bad.csv"), "--vehicle", str(clinic / "car.toml")]
-    assert main([*words, "--repair", str(log_map), "--out", str(out)]) == 0
+    words = learn_words(clinic, "bad.csv")
+    assert typed(*words, "--repair", log_map, "--out", out) == 0
     told = capsys.readouterr().out
     assert "repaired, in identification and replay: factor.r" in told
     assert "verdict: valid" in told
-    found = json.loads((out / "doctor.json").read_text())
+    found = json_of(out / "doctor.json")
     assert found["applied"] == LogMap.from_toml(log_map).repair.tables()
-    assert "Doctor" in (out / "report.html").read_text(encoding="utf-8")
+    assert "Doctor" in page_in(out)
 
 
 def test_with_repair_a_log_that_no_repair_mends_is_refused_all_the_same(clinic, tmp_path, capsys):
-    words = ["identify", clinic / "good.csv", "--vehicle", clinic / "car.toml", "--repair"]
+    words = [*learn_words(clinic, "good.csv"), "--repair"]
     words += [tmp_path / "log.toml", "--replay", clinic / "bad.csv", "--out", tmp_path / "out"]
-    assert main([str(word) for word in words]) == 2
+    assert typed(*words) == 2
     assert "bad: " in capsys.readouterr().err.splitlines()[-1]
     assert not (tmp_path / "out").exists()
 
@@ -128,9 +125,8 @@ def test_what_is_found_in_a_log_that_its_map_repairs_is_taken_out_after_that(tmp
         code="factor", channel="r", confidence=1.0, repair=Repair(factor={"r": 0.5}), sure=True
     )
     diagnosis = Diagnosis(name="log", findings=(halved,), unobservable=())
-    written = write_repair(tmp_path / "log.toml", told, diagnosis)
-    assert LogMap.from_toml(tmp_path / "log.toml") == written
-    assert written.repair == Repair(
+    write_repair(tmp_path / "log.toml", told, diagnosis)
+    assert LogMap.from_toml(tmp_path / "log.toml").repair == Repair(
         factor={"r": 0.5}, offset={"r": 0.05}, vehicle={"mass": 1500.0}
     )  # (r - 0.1) / 2
 

@@ -38,7 +38,7 @@ COURSE = Path.from_waypoints(
 )
 
 
-def made_up(path: Path, off: float) -> Drive:
+def made_up(path, off):
     """A drive with invented signals that is `off` [m] to the left of its path on the average."""
     t = np.arange(0.0, path.length / SPEED, PERIOD)
     s, wave, none = SPEED * t, np.sin(2.0 * t), np.zeros_like(t)

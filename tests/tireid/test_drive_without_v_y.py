@@ -7,9 +7,8 @@ import tireid as ti
 from identifier.tire_model import load_model
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
-from tests.tireid.conftest import refusal
+from tests.tireid.conftest import page_in, refusal, table_of, typed
 from tests.tireid.test_drive_command import bend, summary_of  # noqa: F401
-from tireid.cli import main
 from tireid.commands.drive import parse_fault
 from tireid.driving import learn as drive_learn
 
@@ -20,22 +19,18 @@ TOLD = ("v_y_estimated_m_s", "v_y_estimated_sd_m_s", "side_slip_observable", "a_
 def result(bend, tmp_path_factory):  # noqa: F811
     """Tires that go on learning and linear ones, at 90 % of the grip, without v_y."""
     out = tmp_path_factory.mktemp("imu") / "out"
-    words = ["drive", "--sensors", "imu", "--path", str(bend), "--tires", "learning", "linear"]
+    words = ["drive", "--sensors", "imu", "--path", bend, "--tires", "learning", "linear"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(drive_learn, "DURATION", 20.0)
         patch.setattr(drive_learn, "_GROWS", 15.0)
-        assert main([*words, "--film", "none", "--out", str(out)]) == 0
+        assert typed(*words, "--film", "none", "--out", out) == 0
     return out
-
-
-def columns(file):
-    return np.genfromtxt(file, delimiter=",", names=True)
 
 
 @pytest.mark.heavy
 def test_the_car_drives_as_well_as_with_v_y(result, bend, tmp_path, undrawn):  # noqa: F811
-    words = ["drive", "--path", str(bend), "--weights", str(result / "weights.json")]
-    assert main([*words, "--film", "none", "--out", str(tmp_path / "full")]) == 0
+    words = ["drive", "--path", bend, "--weights", result / "weights.json"]
+    assert typed(*words, "--film", "none", "--out", tmp_path / "full") == 0
     full, drives = summary_of(tmp_path / "full"), summary_of(result)["drives"]
     assert drives["learning"]["completed"]
     assert drives["learning"]["rms_e_y_m"] < 1.5 * full["rms_e_y_m"]
@@ -43,7 +38,7 @@ def test_the_car_drives_as_well_as_with_v_y(result, bend, tmp_path, undrawn):  #
 
 
 def test_the_files_hold_what_was_told_in_place_of_what_was_not_measured(result):
-    drive = columns(result / "drive.csv")
+    drive = table_of(result / "drive.csv")
     assert set(TOLD) < set(drive.dtype.names)
     assert "v_y_measured_m_s" not in drive.dtype.names
     error = drive["v_y_estimated_m_s"] - drive["v_y_m_s"]
@@ -59,7 +54,7 @@ def test_the_files_hold_what_was_told_in_place_of_what_was_not_measured(result):
 
 
 def test_the_report_shows_the_side_slip_that_was_told(result):
-    page = (result / "report.html").read_text(encoding="utf-8")
+    page = page_in(result)
     assert faults_of(page) == []
     told, text = summary_of(result)["lateral_velocity"], outline(page).text
     assert f"{told['rms_error_deg']:.2f}°" in text
@@ -69,10 +64,10 @@ def test_the_report_shows_the_side_slip_that_was_told(result):
 @pytest.mark.heavy
 def test_what_has_all_sensors_says_nothing_of_it(bend, result, tmp_path, capsys, undrawn):  # noqa: F811
     """And names them or not: the same bits."""
-    words = ["drive", "--path", str(bend), "--weights", str(result / "weights.json")]
+    words = ["drive", "--path", bend, "--weights", result / "weights.json"]
     for name, more in (("named", ["--sensors", "full"]), ("default", [])):
-        assert main([*words, *more, "--film", "none", "--out", str(tmp_path / name)]) == 0
-    named, default = (columns(tmp_path / name / "drive.csv") for name in ("named", "default"))
+        assert typed(*words, *more, "--film", "none", "--out", tmp_path / name) == 0
+    named, default = (table_of(tmp_path / name / "drive.csv") for name in ("named", "default"))
     for name in named.dtype.names:
         assert name == "solve_time_s" or np.array_equal(named[name], default[name])
     assert "v_y_measured_m_s" in named.dtype.names and not set(TOLD) & set(named.dtype.names)
@@ -83,10 +78,10 @@ def test_what_has_all_sensors_says_nothing_of_it(bend, result, tmp_path, capsys,
 
 
 def test_the_line_that_is_printed_says_how_right_it_was(result, bend, tmp_path, capsys, undrawn):  # noqa: F811
-    words = ["drive", "--sensors", "imu", "--path", str(bend), "--film", "none"]
-    words += ["--weights", str(result / "weights.json"), "--no-noise", "--speed", "70%"]
+    words = ["drive", "--sensors", "imu", "--path", bend, "--film", "none"]
+    words += ["--weights", result / "weights.json", "--no-noise", "--speed", "70%"]
     capsys.readouterr()
-    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    assert typed(*words, "--out", tmp_path / "out") == 0
     printed = capsys.readouterr().out
     assert "no noise, no v_y" in printed
     assert "frozen: v_y estimated to 0.0" in printed

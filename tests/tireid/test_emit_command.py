@@ -6,7 +6,7 @@ import pytest
 import tireid as ti
 from identifier.methods import make_method
 from models.tires import MagicFormula
-from tireid.cli import main
+from tests.tireid.conftest import typed
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def stored(tmp_path_factory, logs):
 
 def refused(capsys, *words):
     """Return the one line of an error."""
-    assert main(["emit", *map(str, words)]) == 2
+    assert typed("emit", *words) == 2
     (line,) = [one for one in capsys.readouterr().err.splitlines() if "error" in one]
     return line
 
@@ -31,7 +31,7 @@ def test_several_outputs_are_written_at_once(stored, tmp_path, capsys):
     tire = ti.TireModel.load(stored / "tire.json")
     words = ["--tir", "car.tir", "--ggv", "ggv.csv", "--out", "understeer.csv"]
     words = [word if word.startswith("--") else str(tmp_path / word) for word in words]
-    assert main(["emit", str(stored / "tire.json"), "--understeer", *words]) == 0
+    assert typed("emit", stored / "tire.json", "--understeer", *words) == 0
     printed = capsys.readouterr()
     names = {"car_front.tir", "car_rear.tir", "ggv.csv", "understeer.csv"}
     assert {path.name for path in tmp_path.iterdir()} == names
@@ -44,9 +44,9 @@ def test_several_outputs_are_written_at_once(stored, tmp_path, capsys):
         one = MagicFormula.from_tir(tmp_path / f"car_{axle}.tir")
         pair = 2.0 * float(one.forces(0.02, 0.0, 0.0, 0.5 * load).F_y)
         assert pair == pytest.approx(tire.force(0.02, axle), rel=0.03)
-    again = ["emit", str(stored / "tire.json"), "--tir", str(tmp_path / "car.tir"), "--force"]
+    again = ["emit", stored / "tire.json", "--tir", tmp_path / "car.tir", "--force"]
     before = (tmp_path / "car_rear.tir").read_bytes()
-    assert main(again) == 0
+    assert typed(*again) == 0
     assert (tmp_path / "car_rear.tir").read_bytes() == before
 
 

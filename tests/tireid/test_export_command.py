@@ -17,24 +17,20 @@ from identifier.verdict import calibrated
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.rivals import rival
-from tests.tireid.conftest import refusal
+from tests.tireid.conftest import json_of, refusal, typed
 from tireid import exporting
-from tireid.cli import main
 from tireid.commands import export as export_command
 from tireid.run import Run
 
 CAR = sedan()
 
 
-@pytest.fixture(autouse=True)
-def quick(monkeypatch):
-    """Costs on Arm have tests of their own."""
-    monkeypatch.setattr(exporting, "measure", lambda *_: [])
+pytestmark = pytest.mark.usefixtures("unmeasured")
 
 
 def test_a_package_is_complete(tmp_path):
     out = tmp_path / "package"
-    assert main(["export", "--out", str(out), "--paper", "--name", "car"]) == 0
+    assert typed("export", "--out", out, "--paper", "--name", "car") == 0
     for path in (
         "include/car.h",
         "src/car.c",
@@ -55,25 +51,25 @@ def test_learnt_weights_are_shipped(tmp_path, logs):
     model = identify(recording, CAR, make_method("integral", CAR)).freeze(7.0)
     model.save(tmp_path / "weights.json")
     out = tmp_path / "package"
-    assert main(["export", "--out", str(out), "--weights", str(tmp_path / "weights.json")]) == 0
+    assert typed("export", "--out", out, "--weights", tmp_path / "weights.json") == 0
     weights = CompiledPackage.from_folder(out).weights
     np.testing.assert_array_equal(weights["W"], model.weights.W)
 
 
 def test_single_precision_is_the_default_of_the_build(tmp_path):
-    assert main(["export", "--out", str(tmp_path / "a"), "--single"]) == 0
+    assert typed("export", "--out", tmp_path / "a", "--single") == 0
     config = tmp_path / "a" / "include" / "tireid_config.h"
     assert "#define TIREID_SINGLE 1" in config.read_text()
-    assert json.loads((tmp_path / "a" / "tireid.json").read_text())["precision"] == "float"
+    assert json_of(tmp_path / "a" / "tireid.json")["precision"] == "float"
 
 
 @pytest.mark.heavy
 def test_a_y_is_an_input_where_it_is_asked_for(tmp_path, capsys):
     for words, inputs in (([], "v_x, v_y, r, delta_f, delta_r"), (["--with-a-y"], "delta_r, a_y")):
-        assert main(["export", "--out", str(tmp_path / f"a{len(words)}"), *words]) == 0
+        assert typed("export", "--out", tmp_path / f"a{len(words)}", *words) == 0
         told = [line for line in capsys.readouterr().err.splitlines() if "reads" in line]
         assert told[0].endswith(f" {inputs}")
-    manifest = json.loads((tmp_path / "a1" / "tireid.json").read_text())
+    manifest = json_of(tmp_path / "a1" / "tireid.json")
     assert manifest["inputs"][-1]["name"] == "a_y"
     assert "bank" in [one["name"] for one in manifest["carried"]]
 
@@ -96,7 +92,7 @@ def test_what_was_learnt_without_a_lateral_velocity_goes_on_without_it(
     CAR.to_toml(tmp_path / "car.toml")
     out, weights = tmp_path / "package", str(tmp_path / "weights.json")
     words = ["--weights", weights, "--fmu"]
-    assert main(["export", "--out", str(out), *words]) == 0
+    assert typed("export", "--out", out, *words) == 0
     told = capsys.readouterr().err
     assert "reads v_x, r, delta_f, delta_r, a_y; v_y is an output" in told
     package = CompiledPackage.from_folder(out)
@@ -110,10 +106,7 @@ def test_what_was_learnt_without_a_lateral_velocity_goes_on_without_it(
     assert "| `v_y_sd` | m/s |" in text and "without v_y" in text
     for version in (2, 3):
         assert (out / f"tireid_fmi{version}.fmu").stat().st_size > 10_000
-    assert (
-        main(["export", "--out", str(tmp_path / "b"), "--weights", weights, "--method", "axle"])
-        == 0
-    )
+    assert typed("export", "--out", tmp_path / "b", "--weights", weights, "--method", "axle") == 0
     assert "v_y is an output" not in capsys.readouterr().err
 
 
@@ -127,7 +120,7 @@ def test_a_word_that_is_no_truth_value_of_a_stored_model_is_refused(tmp_path):
 
 def test_the_frozen_network_lies_beside_the_c(tmp_path):
     pytest.importorskip("onnx", reason="needs the package onnx")
-    assert main(["export", "--out", str(tmp_path / "a"), "--paper", "--onnx"]) == 0
+    assert typed("export", "--out", tmp_path / "a", "--paper", "--onnx") == 0
     assert (tmp_path / "a" / "tireid.onnx").stat().st_size > 500
 
 
@@ -150,7 +143,7 @@ def test_bad_words_are_one_line_and_leave_nothing(words, complaint, tmp_path, ca
 
 def test_missing_tools_are_said_in_the_readme(monkeypatch, tmp_path):
     monkeypatch.setattr(figures, "missing_tools", lambda: ("arm-none-eabi-gcc",))
-    assert main(["export", "--out", str(tmp_path / "a"), "--paper"]) == 0
+    assert typed("export", "--out", tmp_path / "a", "--paper") == 0
     assert "Not measured: arm-none-eabi-gcc" in (tmp_path / "a" / "README.md").read_text()
 
 
@@ -163,7 +156,7 @@ def test_beside_a_tracker_the_identifier_lies_in_a_folder_of_its_own(monkeypatch
     monkeypatch.setattr(exporting, "write_tracker", seen)
     monkeypatch.setattr(export_command, "say", said.append)
     out = tmp_path / "package"
-    assert main(["export", "--out", str(out), "--paper", "--mpc"]) == 0
+    assert typed("export", "--out", out, "--paper", "--mpc") == 0
     assert said[0] == "identifier", "and nothing else, when the tracker is to be written"
     assert (out / "identifier" / "include" / "tireid.h").is_file()
     assert not (out / "include").exists()
@@ -172,9 +165,9 @@ def test_beside_a_tracker_the_identifier_lies_in_a_folder_of_its_own(monkeypatch
 def test_the_band_is_exported_as_it_was_calibrated(tmp_path, logs, capsys):
     run = identify(read_recording(logs / "slalom.csv"), CAR, make_method("axle", CAR))
     calibrated(run).save(tmp_path / "weights.json")
-    words = ["export", "--band", "--weights", str(tmp_path / "weights.json")]
-    assert main([*words, "--out", str(tmp_path / "told")]) == 0
-    manifest = json.loads((tmp_path / "told" / "tireid.json").read_text())
+    words = ["export", "--band", "--weights", tmp_path / "weights.json"]
+    assert typed(*words, "--out", tmp_path / "told") == 0
+    manifest = json_of(tmp_path / "told" / "tireid.json")
     assert manifest["band"] == calibrated(run).calibration.to_dict()
     assert "half_band" in (tmp_path / "told" / "include" / "tireid_config.h").read_text()
     assert exporting.UNCALIBRATED not in capsys.readouterr().err
@@ -183,14 +176,14 @@ def test_the_band_is_exported_as_it_was_calibrated(tmp_path, logs, capsys):
 
 
 def test_a_band_that_nobody_calibrated_is_said_and_a_method_without_one_refused(tmp_path, capsys):
-    assert main(["export", "--band", "--out", str(tmp_path / "fresh")]) == 0
+    assert typed("export", "--band", "--out", tmp_path / "fresh") == 0
     assert exporting.UNCALIBRATED in capsys.readouterr().err
-    assert main(["export", "--band", "--paper", "--out", str(tmp_path / "paper")]) == 2
+    assert typed("export", "--band", "--paper", "--out", tmp_path / "paper") == 2
     assert "cannot tell how sure it is: it has no band" in capsys.readouterr().err
     assert not (tmp_path / "paper").exists()
 
 
 def test_caution_without_a_tracker_is_refused(tmp_path, capsys):
-    assert main(["export", "--caution", "0.5", "--out", str(tmp_path / "out")]) == 2
+    assert typed("export", "--caution", "0.5", "--out", tmp_path / "out") == 2
     assert "--caution goes with --mpc" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -1,6 +1,5 @@
 """`tireid export --mpc`: what it writes and what it refuses."""
 
-import json
 import shutil
 import subprocess
 
@@ -16,23 +15,20 @@ from models.vehicle import sedan
 from mpc.export import processor as figures
 from mpc.tires import prediction_tire
 from tests.rivals import rival
-from tireid import exporting
-from tireid.cli import main
+from tests.tireid.conftest import json_of, typed
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 CAR = sedan()
 
 
 @pytest.fixture(autouse=True)
-def quick(monkeypatch):
-    """Costs on Arm have tests of their own."""
-    monkeypatch.setattr(exporting, "measure", lambda *_: [])
+def quick(monkeypatch, unmeasured):
     monkeypatch.setattr(figures, "missing_tools", lambda: ("arm-none-eabi-gcc",))
 
 
 def test_both_packages_and_what_joins_them_are_complete(tmp_path, capsys):
     out = tmp_path / "package"
-    assert main(["export", "--out", str(out), "--mpc", "--name", "car"]) == 0
+    assert typed("export", "--out", out, "--mpc", "--name", "car") == 0
     for path in (
         "README.md",
         "CMakeLists.txt",
@@ -60,14 +56,12 @@ def test_a_car_named_as_the_example_builds_and_drives(tmp_path):
     if shutil.which("cmake") is None:
         pytest.skip("needs cmake")
     out = tmp_path / "package"
-    assert main(["export", "--out", str(out), "--mpc", "--paper", "--name", "car", "--single"]) == 0
+    assert typed("export", "--out", out, "--mpc", "--paper", "--name", "car", "--single") == 0
     for command in ("cmake -B build", "cmake --build build", "ctest --test-dir build"):
-        answer = subprocess.run(
-            command.split(), cwd=out, capture_output=True, text=True, check=False
-        )
+        answer = subprocess.run(command.split(), cwd=out, capture_output=True, text=True)
         assert answer.returncode == 0, answer.stdout + answer.stderr
     assert "#define CAR_MPC_SINGLE 1" in (out / "mpc" / "include" / "car_mpc_config.h").read_text()
-    assert json.loads((out / "mpc" / "car_mpc.json").read_text())["precision"] == "float"
+    assert json_of(out / "mpc" / "car_mpc.json")["precision"] == "float"
 
 
 @pytest.mark.heavy
@@ -75,11 +69,8 @@ def test_the_tracker_begins_with_learnt_weights_and_another_car(tmp_path, logs):
     model = identify(read_recording(logs / "slalom.csv"), CAR, make_method("axle", CAR)).freeze(7.0)
     model.save(tmp_path / "weights.json")
     out = tmp_path / "package"
-    assert (
-        main(["export", "--out", str(out), "--mpc", "--weights", str(tmp_path / "weights.json")])
-        == 0
-    )
-    manifest = json.loads((out / "mpc" / "tireid_mpc.json").read_text())
+    assert typed("export", "--out", out, "--mpc", "--weights", tmp_path / "weights.json") == 0
+    manifest = json_of(out / "mpc" / "tireid_mpc.json")
     np.testing.assert_array_equal(manifest["params"]["weights"], prediction_tire(model).weights)
     assert manifest["params"]["car"] == list(CAR.bicycle[:4])
 
@@ -88,7 +79,7 @@ def test_the_tracker_begins_with_learnt_weights_and_another_car(tmp_path, logs):
 @pytest.mark.parametrize("law", [rival("linear_kf"), "lagged_ekf"])
 def test_a_method_without_a_tire_for_c_is_refused_in_one_line(law, tmp_path, capsys):
     out = tmp_path / "package"
-    assert main(["export", "--out", str(out), "--mpc", "--method", law]) == 2
+    assert typed("export", "--out", out, "--mpc", "--method", law) == 2
     error = [line for line in capsys.readouterr().err.splitlines() if "error" in line]
     assert len(error) == 1
     assert "hand" in error[0]
@@ -98,6 +89,6 @@ def test_a_method_without_a_tire_for_c_is_refused_in_one_line(law, tmp_path, cap
 def test_without_a_compiler_nothing_is_left_behind(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("mpc.realtime.instance.load_library", lambda *_, **__: None)
     out = tmp_path / "package"
-    assert main(["export", "--out", str(out), "--mpc"]) == 2
+    assert typed("export", "--out", out, "--mpc") == 2
     assert "--mpc: no C compiler" in capsys.readouterr().err
     assert not out.exists()

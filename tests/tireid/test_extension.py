@@ -10,7 +10,8 @@ from codegen.plugins import installed as installed_names
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.tires import LinearTire
-from tireid.cli import build_parser, main
+from tests.tireid.conftest import typed
+from tireid.cli import build_parser
 
 CAR = ti.sedan()
 POINTS = """[tireid.methods]
@@ -93,7 +94,7 @@ def test_an_exporter_is_a_command_that_reads_a_model(tmp_path, capsys):
     run = ti.identify(ti.sample_recording(CAR), CAR, "held_still", check=False)
     tire = run.freeze()
     tire.save(tmp_path / "model.json")
-    assert main(["points", str(tmp_path / "model.json"), str(tmp_path / "points.csv")]) == 0
+    assert typed("points", tmp_path / "model.json", tmp_path / "points.csv") == 0
     points = np.loadtxt(tmp_path / "points.csv", delimiter=",")
     np.testing.assert_allclose(points[:, 1:], tire.force(points[:, 0]), rtol=1e-12)
     listed = build_parser([]).format_help()
@@ -112,6 +113,6 @@ def test_the_list_of_commands_imports_none_and_says_which_is_broken(capsys):
     assert "points the curves of a model as points" in listed and "fleet" in listed
     assert "absent cannot be imported" in listed
     assert not [name for name in set(sys.modules) - before if name.startswith(("their", "tireid."))]
-    assert main(["absent"]) == 2
+    assert typed("absent") == 2
     [line] = capsys.readouterr().err.splitlines()
     assert "command absent (their_absent) cannot be imported: No module named" in line

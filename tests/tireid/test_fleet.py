@@ -1,7 +1,6 @@
 """Many logs, here a few: learnt once, kept whatever happens, merged, and watched."""
 
 import hashlib
-import json
 import os
 import shutil
 import signal
@@ -18,7 +17,7 @@ from identifier.tire_model import load_model
 from identifier.verdict import judge_identification
 from models.recordings import LogMap, read_recording, write_recording
 from models.vehicle import sedan
-from tireid.cli import main
+from tests.tireid.conftest import json_of, typed
 from tireid.fleet.learn import (
     LearnLog,
     Learnt,
@@ -61,8 +60,8 @@ def there(fleet, monkeypatch):
 
 
 def learns(out, *more):
-    words = ["fleet", "learn", "*/*/*.csv", "--vehicle", CAR, "--tags", TAGS, "--out", str(out)]
-    return main([*words, "--jobs", "1", *more])
+    words = ["fleet", "learn", "*/*/*.csv", "--vehicle", CAR, "--tags", TAGS, "--out", out]
+    return typed(*words, "--jobs", "1", *more)
 
 
 @pytest.fixture(scope="module")
@@ -139,16 +138,16 @@ def test_a_car_file_that_changed_is_another_setting_and_never_counts_twice(
 ):
     monkeypatch.chdir(garage)
     words = ["fleet", "learn", "*.csv", "--vehicle", "car.toml", "--jobs", "1", "--out", "store"]
-    assert main(words) == 0
+    assert typed(*words) == 0
     replace(sedan(), mass=1510.0, chassis=None).to_toml("car.toml", overwrite=True)
-    assert main(words) == 0
+    assert typed(*words) == 0
     assert "2 identified now, 0 before" in capsys.readouterr().out
-    assert main(["fleet", "merge", "store", "--all", "--out", "merged"]) == 2
+    assert typed("fleet", "merge", "store", "--all", "--out", "merged") == 2
     assert "are of cars whose files differ" in capsys.readouterr().err
-    assert main(["fleet", "merge", "store", "--all", "--by", "setting", "--out", "merged"]) == 0
-    assert [one["logs"] for one in json.loads(Path("merged/models.json").read_text())] == [2, 2]
+    assert typed("fleet", "merge", "store", "--all", "--by", "setting", "--out", "merged") == 0
+    assert [one["logs"] for one in json_of(Path("merged/models.json"))] == [2, 2]
     shutil.rmtree(sorted(Path("store").iterdir())[0])  # a setting is a folder
-    assert main(["fleet", "merge", "store", "--all", "--out", "once"]) == 0
+    assert typed("fleet", "merge", "store", "--all", "--out", "once") == 0
 
 
 @pytest.fixture
@@ -375,8 +374,8 @@ def test_a_log_that_kills_workers_of_a_cluster_is_learnt_once_it_can(tmp_path):
 
 def test_models_are_merged_by_what_logs_have_in_common(store, tmp_path, capsys):
     out = tmp_path / "merged"
-    assert main(["fleet", "merge", store, "--all", "--by", "vehicle,week", "--out", str(out)]) == 0
-    told = json.loads((out / "models.json").read_text())
+    assert typed("fleet", "merge", store, "--all", "--by", "vehicle,week", "--out", out) == 0
+    told = json_of(out / "models.json")
     groups = [(one["vehicle"], one["week"], one["logs"]) for one in told]
     assert groups == [
         (car, week, 2) for car in ("blue", "red") for week in ("2026-W09", "2026-W10")
@@ -388,17 +387,17 @@ def test_models_are_merged_by_what_logs_have_in_common(store, tmp_path, capsys):
 
 def test_days_are_watched_and_an_alarm_that_lasts_is_the_exit_code(store, tmp_path, capsys):
     words = ["fleet", "watch", store, "--all", "--baseline", "5"]
-    assert main([*words, "--out", str(tmp_path / "quiet")]) == 0
+    assert typed(*words, "--out", tmp_path / "quiet") == 0
     assert "no change was noticed" in capsys.readouterr().out
-    assert json.loads((tmp_path / "quiet" / "days.json").read_text()) == []  # seconds, no minute
+    assert json_of(tmp_path / "quiet" / "days.json") == []  # seconds, no minute
 
 
 def test_wrong_words_are_refused_in_one_line(store, tmp_path, capsys, monkeypatch):
     def said(*words):
-        assert main(["fleet", *words]) == 2
+        assert typed("fleet", *words) == 2
         return capsys.readouterr().err.splitlines()[-1]
 
-    learn = ["learn", "*/*/*.csv", "--out", str(tmp_path / "x"), "--vehicle"]
+    learn = ["learn", "*/*/*.csv", "--out", tmp_path / "x", "--vehicle"]
     assert "names no log" in said("learn", "none/*.csv", "--out", "x", "--vehicle", "cars/red.toml")
     assert "{vehicle} is no tag" in said(*learn, CAR)
     assert "each name once" in said(*learn, "cars/red.toml", "--tags", "{a}/{a}.csv")

@@ -5,7 +5,7 @@ import pytest
 
 from models.recordings import read_recording
 from tests.models.logs.drive_in_every_format import FORMATS, write
-from tireid.cli import main
+from tests.tireid.conftest import learn_words, typed
 
 COLUMNS = {"v_x": "vx", "v_y": "vy", "r": "r", "delta_f": "delta_f", "a_y": "ay"}
 OTHERS = [name for name in FORMATS if name != "CSV"]
@@ -22,14 +22,14 @@ def driven(logs):
 def words_of(written):
     """How a drive in a file is told to a command."""
     told = [f"{COLUMNS[name]}={channel}" for name, channel in written.names.items()]
-    dbc = [] if written.dbc is None else ["--dbc", str(written.dbc)]
-    return [str(written.path), "--columns", *told, *dbc]
+    dbc = [] if written.dbc is None else ["--dbc", written.dbc]
+    return [written.path, "--columns", *told, *dbc]
 
 
 def summary_of(format, folder, driven, logs):
     written = write(format, folder, *driven)
-    words = ["identify", *words_of(written), "--vehicle", str(logs / "car.toml")]
-    assert main([*words, "--freeze", "4", "7", "--out", str(folder / "out")]) == 0
+    words = learn_words(logs, *words_of(written))
+    assert typed(*words, "--freeze", "4", "7", "--out", folder / "out") == 0
     return (folder / "out" / "summary.json").read_bytes()
 
 
@@ -55,7 +55,7 @@ def test_channels_writes_a_map_that_reads_the_same_recording_from_every_format(
     t, columns = driven
     written = write(format, tmp_path, t, columns)
     told = tmp_path / "log.toml"
-    assert main(["channels", *words_of(written), "--write", str(told)]) == 0
+    assert typed("channels", *words_of(written), "--write", told) == 0
     recording = read_recording(written.path, log_map=told)
     assert recording.name == "drive"
     assert np.array_equal(recording.t, t)

@@ -14,7 +14,7 @@ from identifier.paper.design import PaperIdentifier, design_text
 from identifier.paper.network import Network
 from models.recordings import RecordingError, read_recording
 from models.vehicle import sedan
-from tireid.cli import main
+from tests.tireid.conftest import learn_words, typed
 from tireid.output import MARKER, OutputError, output_folder
 
 NINES = "9" * 5000
@@ -23,7 +23,7 @@ HEADER = "t,vx,vy,r,delta_f,Fyf,Fyr"
 
 def refused(capsys, words, said):
     """The command refuses its input in one line that holds what is said, and prints no result."""
-    assert main([str(word) for word in words]) == 2
+    assert typed(*words) == 2
     out, err = capsys.readouterr()
     assert out == ""
     lines = [line for line in err.splitlines() if "error:" in line]
@@ -159,7 +159,7 @@ def test_numbers_of_no_car_never_reach_linear_algebra(
 ):
     path = log(tmp_path / "log.csv", column, value)
     sedan().to_toml(tmp_path / "car.toml")
-    words = ["identify", path, "--vehicle", tmp_path / "car.toml", "--out", tmp_path / "out"]
+    words = [*learn_words(tmp_path, path), "--out", tmp_path / "out"]
     refused(capsys, [*words, *unchecked], said)
     assert not (tmp_path / "out").exists()
 
@@ -185,7 +185,7 @@ def test_a_gzip_bomb_and_too_many_rows_are_refused(capsys, tmp_path, monkeypatch
 def test_a_log_without_end_is_refused(capsys, tmp_path):
     sedan().to_toml(tmp_path / "car.toml")
     (tmp_path / "log.csv").symlink_to("/dev/zero")
-    words = ["identify", tmp_path / "log.csv", "--vehicle", tmp_path / "car.toml"]
+    words = learn_words(tmp_path, "log.csv")
     refused(capsys, [*words, "--out", tmp_path / "out"], "a device, pipe or socket")
     refused(capsys, ["check", "--design", "/dev/zero"], "a device, pipe or socket")
 
@@ -211,9 +211,9 @@ def test_a_limit_that_is_raised_lets_the_file_in(tmp_path, monkeypatch):
     text = design_text(replace(PaperIdentifier.for_vehicle(sedan()), network=Network(hidden=128)))
     path = tmp_path / "design.toml"
     path.write_text(changed(text, "hidden", "129"))
-    assert main(["check", "--design", str(path)]) == 2
+    assert typed("check", "--design", path) == 2
     monkeypatch.setenv("TIREID_LIMITS", "hidden=129")
-    assert main(["check", "--design", str(path)]) in (0, 1)
+    assert typed("check", "--design", path) in (0, 1)
 
 
 @pytest.mark.parametrize(
@@ -242,6 +242,6 @@ def test_a_hostile_marker_makes_a_folder_foreign(tmp_path, marker):
 @pytest.mark.parametrize("redirection", [">&-", ">/dev/full", "| true", ">&- 2>&- <&-"])
 def test_a_closed_standard_output_is_no_traceback(redirection):
     command = f"{sys.executable} -m tireid.cli --help {redirection}"
-    ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False)
+    ran = subprocess.run(["bash", "-c", command], capture_output=True, text=True)
     assert ran.returncode == (74 if "full" in redirection else 0)
     assert "Traceback" not in ran.stderr

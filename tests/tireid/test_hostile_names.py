@@ -8,11 +8,9 @@ from shutil import which
 
 import pytest
 
-from identifier.export import processor as figures
 from identifier.methods import make_method
 from models.vehicle import sedan
-from tireid import exporting
-from tireid.cli import main
+from tests.tireid.conftest import json_of, typed
 from tireid.emitting import emit
 
 ORDER = "x\nexecute_process(COMMAND ${CMAKE_COMMAND} -E touch ran)\n#"
@@ -34,24 +32,17 @@ NAMES = {
 }
 
 
-@pytest.fixture(autouse=True)
-def quick(monkeypatch):
-    monkeypatch.setattr(exporting, "measure", lambda *_: [])
-    monkeypatch.setattr(figures, "measure", lambda *_: [])
+pytestmark = pytest.mark.usefixtures("unmeasured")
 
 
 def car_called(name, folder):
     """A car file; JSON's escapes are those of TOML."""
-    text = sedan_text(folder)
+    sedan().to_toml(folder / "sedan.toml", overwrite=True)
+    text = (folder / "sedan.toml").read_text()
     quoted = json.dumps(name).replace("\x7f", "\\u007f")
     file = folder / "car.toml"
     file.write_text(re.sub("^name = .*$", lambda _: f"name = {quoted}", text, flags=re.M))
     return file
-
-
-def sedan_text(folder):
-    sedan().to_toml(folder / "sedan.toml", overwrite=True)
-    return (folder / "sedan.toml").read_text()
 
 
 def built(folder):
@@ -62,7 +53,7 @@ def built(folder):
         ["cmake", "--build", "build"],
         ["ctest", "--test-dir", "build"],
     ):
-        answer = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+        answer = subprocess.run(words, cwd=folder, capture_output=True, text=True)
         assert answer.returncode == 0, answer.stdout + answer.stderr
 
 
@@ -82,10 +73,10 @@ def test_a_name_is_a_comment_in_what_other_tools_read(name, tmp_path):
 def test_a_package_is_built_and_nothing_else_is_run(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     out = tmp_path / "out"
-    assert main(["export", "--out", str(out), "--vehicle", str(car_called(name, tmp_path))]) == 0
+    assert typed("export", "--out", out, "--vehicle", car_called(name, tmp_path)) == 0
     built(out)
     assert not list(tmp_path.rglob("ran"))
-    assert json.loads((out / "tireid.json").read_text())["vehicle"]["name"] == name
+    assert json_of(out / "tireid.json")["vehicle"]["name"] == name
     for file in out.rglob("*.*"):
         if file.suffix in (".c", ".h", ".md", ".txt"):
             text = file.read_text(encoding="utf-8")
@@ -98,12 +89,12 @@ def test_no_name_and_no_word_commands_the_terminal(tmp_path, capsys, monkeypatch
     car = car_called(bell, tmp_path)
     log = tmp_path / f"log{bell}.csv"
     log.write_text(f"t,vx{bell}\n0,1\n")
-    assert main(["check", "--vehicle", str(car)]) in (0, 1)
-    assert main(["check", "--design", str(tmp_path / f"no{bell}.toml")]) == 2
-    assert main(["identify", str(log), "--vehicle", str(car), "--out", "out"]) == 2
-    assert main(["--debug", "identify", str(log), "--vehicle", str(car), "--out", "out"]) == 2
+    assert typed("check", "--vehicle", car) in (0, 1)
+    assert typed("check", "--design", tmp_path / f"no{bell}.toml") == 2
+    assert typed("identify", log, "--vehicle", car, "--out", "out") == 2
+    assert typed("--debug", "identify", log, "--vehicle", car, "--out", "out") == 2
     with pytest.raises(SystemExit):
-        main(["check", f"--{bell}"])
+        typed("check", f"--{bell}")
     said = capsys.readouterr()
     assert "owned" in said.out
     assert "owned" in said.err

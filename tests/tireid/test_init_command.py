@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from models.vehicle import Chassis, Vehicle, sedan
-from tireid.cli import main
+from tests.tireid.conftest import typed
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 def test_what_it_writes_is_read_with_stated_estimates(tmp_path, capsys):
     path = tmp_path / "car.toml"
-    assert main(["init", str(path)]) == 0
+    assert typed("init", path) == 0
     car, model = Vehicle.from_toml(path), sedan()
     assert (car.mass, car.l_f, car.l_r) == (model.mass, model.l_f, model.l_r)
     assert car.yaw_inertia == pytest.approx(car.mass * car.l_f * car.l_r, rel=1e-12)
@@ -23,7 +23,7 @@ def test_what_it_writes_is_read_with_stated_estimates(tmp_path, capsys):
     assert car.cornering_stiffness_front == pytest.approx(14.0 * front, rel=1e-12)
     assert car.cornering_stiffness_rear == pytest.approx(14.0 * rear, rel=1e-12)
     assert car.chassis is None
-    assert main(["check", "--vehicle", str(path)]) == 0
+    assert typed("check", "--vehicle", path) == 0
     said = capsys.readouterr()
     told = "estimated, as the vehicle file leaves it out: yaw_inertia = 2674 kg m2"
     assert (said.out + said.err).count(told) == 1
@@ -31,7 +31,7 @@ def test_what_it_writes_is_read_with_stated_estimates(tmp_path, capsys):
 
 def test_with_the_comment_signs_taken_away_it_is_a_car_that_can_be_simulated(tmp_path):
     path = tmp_path / "car.toml"
-    assert main(["init", str(path)]) == 0
+    assert typed("init", path) == 0
     text = path.read_text(encoding="utf-8")
     path.write_text(re.sub(r"(?m)^# (?=\w+ = |\[chassis\])", "", text), encoding="utf-8")
     car = Vehicle.from_toml(path)
@@ -60,7 +60,7 @@ def test_where_the_center_of_gravity_comes_from_is_asked(
     monkeypatch.setattr(terminal, "isatty", lambda: True)
     monkeypatch.setattr("sys.stdin", terminal)
     path = tmp_path / "car.toml"
-    assert main(["init", str(path), *options]) == 0
+    assert typed("init", path, *options) == 0
     assert Vehicle.from_toml(path).center_of_gravity_sd == sd
     assert ("weighed or data-sheet" in capsys.readouterr().err) == (not options)
 
@@ -68,13 +68,13 @@ def test_where_the_center_of_gravity_comes_from_is_asked(
 def test_nothing_is_replaced_unasked(tmp_path, capsys):
     path = tmp_path / "car.toml"
     path.write_text("precious", encoding="utf-8")
-    assert main(["init", str(path)]) == 2
+    assert typed("init", path) == 2
     assert "exists: choose another, or add --force" in capsys.readouterr().err
     assert path.read_text(encoding="utf-8") == "precious"
-    assert main(["init", str(path), "--force"]) == 0
+    assert typed("init", path, "--force") == 0
     assert path.read_text(encoding="utf-8") != "precious"
-    assert main(["init", str(tmp_path / "car.txt")]) == 2
-    assert main(["init", str(tmp_path / "none" / "car.toml")]) == 2
+    assert typed("init", tmp_path / "car.txt") == 2
+    assert typed("init", tmp_path / "none" / "car.toml") == 2
     assert (
         capsys.readouterr().err.strip().endswith(f"{tmp_path / 'none'}: no such file or directory")
     )

@@ -1,7 +1,6 @@
 """The output folder: whole or as before, and nothing of the user's is ever lost."""
 
 import errno
-import json
 import os
 import subprocess
 import sys
@@ -10,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.tireid.conftest import json_of
 from tireid import exchange as exchange_module
 from tireid import output as output_module
 from tireid.exchange import ClaimedError, claim, exchange
@@ -49,7 +49,7 @@ def test_a_folder_appears_with_all_that_was_written(tmp_path):
     write(tmp_path / "deep" / "out")
     assert content(tmp_path / "deep") == {"out/result.txt": "new"}
     assert [entry.name for entry in (tmp_path / "deep").iterdir()] == ["out"]
-    marker = json.loads((tmp_path / "deep" / "out" / MARKER).read_text())
+    marker = json_of(tmp_path / "deep" / "out" / MARKER)
     assert marker["files"]["result.txt"][0] == len("new")
 
 
@@ -133,13 +133,13 @@ def test_a_failing_body_leaves_the_old_folder_and_no_scratch(tmp_path):
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
-def fail_to_rename(monkeypatch, *, onto):
-    """Let the new folder fail to take its place; return the list of such failures."""
+def fail_to_rename(monkeypatch, *, onto, names=("new",)):
+    """Let folders of some names fail to take a place; return the list of such failures."""
     rename = Path.rename
     failures = []
 
     def failing(self, target):
-        if Path(target) == onto and self.name == "new":
+        if Path(target) == onto and self.name in names:
             failures.append(self)
             raise OSError("disk trouble")
         return rename(self, target)
@@ -162,15 +162,7 @@ def test_a_rename_that_fails_restores_the_old_folder(tmp_path, monkeypatch):
 
 def test_an_old_folder_that_cannot_be_put_back_is_kept_aside(tmp_path, monkeypatch, capsys):
     write(tmp_path / "out", "old")
-    rename = Path.rename
-
-    def failing(self, target):
-        if Path(target) == tmp_path / "out":
-            raise OSError("disk trouble")
-        return rename(self, target)
-
-    monkeypatch.setattr(output_module, "exchange", lambda *_: False)
-    monkeypatch.setattr(Path, "rename", failing)
+    fail_to_rename(monkeypatch, onto=tmp_path / "out", names=("new", "old"))
     with pytest.raises(OSError, match="disk trouble"):
         write(tmp_path / "out", "new", force=True)
     (kept,) = tmp_path.iterdir()
@@ -292,7 +284,6 @@ def ran(program, folder):
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
         capture_output=True,
         text=True,
-        check=False,
         timeout=120,
     )
     assert answer.returncode == 0, answer.stderr

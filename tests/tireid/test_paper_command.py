@@ -1,6 +1,5 @@
 """Tables I and II: the pattern is there in the medians, the committed numbers are those we get."""
 
-import json
 import re
 from dataclasses import replace
 from itertools import islice
@@ -28,7 +27,7 @@ from identifier.paper_study import (
 from models.vehicle import sedan
 from tests.conftest import PNG
 from tests.pages import faults_of, outline
-from tireid.cli import main
+from tests.tireid.conftest import json_of, page_in, typed
 from tireid.commands.paper import _PAPER, table_text, write_study
 from tireid.figures.forces import force_figure
 
@@ -159,9 +158,9 @@ def test_a_law_that_diverges_is_counted_and_does_not_stop_the_command(study, tmp
     some = {**slalom, "instantaneous": ({},) * 20, "integral": ({}, *slalom["integral"][1:])}
     wild = replace(study, errors={"slalom": some})
     write_study(tmp_path, wild)
-    lost = json.loads((tmp_path / "diverged.json").read_text())
+    lost = json_of(tmp_path / "diverged.json")
     assert lost == {"slalom": {"instantaneous": 20, "integral": 1, "instantaneous_scaled": 0}}
-    assert json.loads((tmp_path / "tables.json").read_text())["slalom"]["instantaneous"] == {}
+    assert json_of(tmp_path / "tables.json")["slalom"]["instantaneous"] == {}
     assert {path.name for path in tmp_path.glob("*.png")} == {
         "fig1_scheme.png",
         "slalom_errors.png",
@@ -180,7 +179,7 @@ def test_a_law_that_diverges_is_counted_and_does_not_stop_the_command(study, tmp
 @pytest.mark.heavy
 def test_the_committed_tables_are_those_we_compute(study):
     """Changed behavior shows here: run `tireid paper` and look at the difference."""
-    expected = json.loads(EXPECTED.read_text())
+    expected = json_of(EXPECTED)
     computed = study.tables()
     assert computed.keys() == expected.keys()
     assert all(
@@ -203,13 +202,13 @@ def test_the_papers_values_are_those_of_its_tables():
 
 
 def test_paper_command_writes_tables_and_figures(tmp_path, capsys, laid_out):
-    assert main(["paper", "--seeds", "2", "--out", str(tmp_path / "out")]) == 0
+    assert typed("paper", "--seeds", "2", "--out", tmp_path / "out") == 0
     printed = capsys.readouterr().out
     assert "0.4077" in printed
     assert "instantaneous at eta/lambda" in printed
     assert "instantaneous: certificate: fail" in printed
     assert "integral: certificate: warn" in printed
-    tables = json.loads((tmp_path / "out" / "tables.json").read_text())
+    tables = json_of(tmp_path / "out" / "tables.json")
     assert list(tables["slalom"]["integral"]) == columns("slalom")
     assert len(columns("slalom")) == 9
     spread = tables["step_steer"]["instantaneous_scaled"]["past_against_online_35"]
@@ -224,13 +223,12 @@ def test_paper_command_writes_tables_and_figures(tmp_path, capsys, laid_out):
 
 
 @pytest.mark.heavy
-def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys):
+def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys, unmeasured):
     monkeypatch.setattr(tireid.commands.demo, "SEEDS", 2)
-    monkeypatch.setattr("tireid.exporting.measure", lambda *_: [])  # has tests of its own
-    monkeypatch.setattr("tireid.commands.demo.drive_story", lambda *_: {})  # so has this
+    monkeypatch.setattr("tireid.commands.demo.drive_story", lambda *_: {})  # has tests of its own
     monkeypatch.setattr("tireid.figures.style.figure_png", lambda *_, **__: PNG)
-    assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
-    page = (tmp_path / "demo" / "report.html").read_text()
+    assert typed("demo", "--out", tmp_path / "demo") == 0
+    page = page_in(tmp_path / "demo")
     assert page.count("data:image/") >= 8
     assert len(page) < 4e6 and faults_of(page) == []
     told = outline(page).text

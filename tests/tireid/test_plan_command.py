@@ -1,27 +1,25 @@
 """`tireid plan`: files, table and refusals."""
 
-import json
-
 import numpy as np
 import pytest
 
-from tireid.cli import main
+from tests.tireid.conftest import json_of, table_of, typed
 
 
 def plan(out, *words):
-    return main(["plan", "--speed", "15", "--time", "4", *words, "--out", str(out)])
+    return typed("plan", "--speed", "15", "--time", "4", *words, "--out", out)
 
 
 def test_the_best_steering_is_written_and_all_maneuvers_are_ranked(tmp_path, capsys, undrawn):
     out = tmp_path / "plan"
     assert plan(out, "--steering-ratio", "15", "--area", "100", "12") == 0
     assert {"steering.csv", "summary.json"} <= {one.name for one in out.iterdir()}
-    rows = np.genfromtxt(out / "steering.csv", delimiter=",", names=True)
+    rows = table_of(out / "steering.csv")
     np.testing.assert_allclose(
         rows["hand_wheel_deg"], np.degrees(15.0 * rows["delta_f_rad"]), atol=1e-5
     )
     assert (rows["v_x_m_s"] == 15.0).all() and rows["delta_f_rad"][0] == 0.0
-    found = json.loads((out / "summary.json").read_text())["maneuvers"]
+    found = json_of(out / "summary.json")["maneuvers"]
     errors = [one["expected_error"] for one in found]
     assert errors == sorted(errors)
     fit = [one for one in found if one["fits"]]

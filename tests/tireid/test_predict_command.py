@@ -1,6 +1,5 @@
 """`tireid predict`: what a stored model says of a log, with truth and without, on another car."""
 
-import csv
 import json
 from dataclasses import replace
 
@@ -10,12 +9,10 @@ import pytest
 import tireid as ti
 from identifier.methods import make_method
 from models.friction import Friction, FrictionChange
-from models.maneuvers import RandomSteer
-from models.plant import Plant
 from models.recordings import read_recording, write_recording
+from tests.identifier.conftest import steered
 from tests.pages import faults_of
-from tests.tireid.conftest import refusal
-from tireid.cli import main
+from tests.tireid.conftest import json_of, page_in, refusal, table_of, typed
 
 
 @pytest.fixture(scope="module")
@@ -38,11 +35,8 @@ def weaker(data, share):
 
 
 def predicted(out, *words, status=0):
-    assert main(["predict", *(str(word) for word in words), "--out", str(out)]) == status
-    with (out / "forces.csv").open(encoding="utf-8") as file:
-        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(file)]
-    columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
-    return json.loads((out / "summary.json").read_text(encoding="utf-8")), columns
+    assert typed("predict", *words, "--out", out) == status
+    return json_of(out / "summary.json"), table_of(out / "forces.csv")
 
 
 def test_it_says_what_the_interface_says(model, logs, tmp_path, capsys, undrawn):
@@ -65,7 +59,7 @@ def test_it_leaves_a_report_with_figures(model, logs, tmp_path, capsys):
     for name, asked in (("with", logs / "quick.csv"), ("without", tmp_path / "blind.csv")):
         out = tmp_path / name
         summary, _ = predicted(out, model, asked)
-        page = (out / "report.html").read_text(encoding="utf-8")
+        page = page_in(out)
         assert faults_of(page) == []
         for figure in ("slip", "forces", "motion"):
             assert (out / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
@@ -80,12 +74,12 @@ def test_it_leaves_a_report_with_figures(model, logs, tmp_path, capsys):
 
 
 def test_a_refused_answer_looks_refused(model, logs, tmp_path, undrawn):
-    data = json.loads(model.read_text(encoding="utf-8"))
+    data = json_of(model)
     path = tmp_path / "weak.json"
     weak = {**weaker(data, 0.5), "valid": False}
     path.write_text(json.dumps(weak), encoding="utf-8")
     predicted(tmp_path / "out", path, logs / "quick.csv", status=3)
-    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    page = page_in(tmp_path / "out")
     assert '<div class="bad"><dt>the verdict' in page and 'class="struck"' in page
     assert "NOT VALID. Axle force over slip angle" in page
     assert '<li class="bad">' in page and "was not valid on its identification drive" in page
@@ -99,7 +93,7 @@ def test_without_truth_it_says_what_of_the_motion_is_explained(
     write_recording(log, tmp_path / "blind.csv")
     summary, columns = predicted(tmp_path / "out", model, tmp_path / "blind.csv")
     assert (summary["rmse_N"], summary["rms_force_N"]) == (None, None)
-    assert not [name for name in columns if "true" in name]
+    assert not [name for name in columns.dtype.names if "true" in name]
     assert 0.9 < summary["motion"]["explained_lateral"] <= 1.0
     said = capsys.readouterr().out
     assert "cannot be given in newtons" in said
@@ -109,7 +103,7 @@ def test_without_truth_it_says_what_of_the_motion_is_explained(
 
 def test_a_model_of_half_the_force_explains_less(model, logs, tmp_path, undrawn):
     """(1/2)² of the mean square stays: three quarters are explained, by the lateral balance."""
-    data = json.loads(model.read_text(encoding="utf-8"))
+    data = json_of(model)
     weak = weaker(data, 0.5)
     path = tmp_path / "weak.json"
     path.write_text(json.dumps(weak), encoding="utf-8")
@@ -143,14 +137,14 @@ def test_it_says_how_often_the_band_held(logs, tmp_path, capsys, undrawn):
     said = f"in {100.0 * held[0]:.0f} / {100.0 * held[1]:.0f} % of the windows of 0.3 s"
     assert said in capsys.readouterr().out
     assert min(held) > 0.7
-    table = np.genfromtxt(tmp_path / "out" / "forces.csv", delimiter=",", names=True)
+    table = table_of(tmp_path / "out" / "forces.csv")
     for k, axle in enumerate(("Fyf", "Fyr")):
         half = table[f"{axle}_half_band_N"]
         away = np.abs(table[f"{axle}_predicted_N"] - table[f"{axle}_true_N"])
         share = np.mean(away[half > 0.0] <= half[half > 0.0])
         assert summary["truth_within_band"][k] == pytest.approx(share, abs=0.01)
         assert share > 0.7
-    weak = weaker(json.loads((tmp_path / "model.json").read_text()), 0.6)
+    weak = weaker(json_of(tmp_path / "model.json"), 0.6)
     (tmp_path / "weak.json").write_text(json.dumps(weak))
     weak, _ = predicted(tmp_path / "weak", tmp_path / "weak.json", logs / "quick.csv", status=3)
     assert max(weak["windows_within_band"]) < 0.6
@@ -196,30 +190,27 @@ def test_what_cannot_be_asked_is_one_line_and_leaves_nothing(
         "CAR": tmp_path / "other.toml",
     }
     out = tmp_path / "out"
-    line = ["predict", *(str(names.get(word, word)) for word in words), "--out", str(out)]
+    line = ["predict", *(str(names.get(word, word)) for word in words), "--out", out]
     assert told in refusal(capsys, line)
     assert not out.exists()
 
 
 def test_a_folder_is_replaced_only_when_told(model, logs, tmp_path, capsys, undrawn):
     out = tmp_path / "out"
-    line = ["predict", str(model), str(logs / "quick.csv"), "--out", str(out)]
-    assert [main(line), main(line), main([*line, "--force"])] == [0, 2, 0]
+    line = ["predict", model, logs / "quick.csv", "--out", out]
+    assert [typed(*line), typed(*line), typed(*line, "--force")] == [0, 2, 0]
     assert "add --force" in capsys.readouterr().err
 
 
 def test_another_road_is_told_with_its_friction(model, tmp_path, capsys, undrawn):
-    steering = RandomSteer(
-        amplitude=0.05, frequency=0.6, seed=5, onset=1.0, rate_limit=0.8, duration=24.0
-    )
     wet = Friction(changes=(FrictionChange(scale=0.5, at_time=10.0),))
-    run = Plant(ti.sedan()).simulate(steering, speed=20.0, friction=wet)
+    run = steered(5, 24.0, amplitude=0.05, friction=wet)
     write_recording(replace(run.recording(), axle_force=None), tmp_path / "wet.csv")
     out = tmp_path / "out"
     summary, _ = predicted(out, model, tmp_path / "wet.csv", "--accept")
     (road,) = summary["friction"]["roads"]
     assert 10.0 < road["first"] < 14.0 and abs(road["ratio"] - 0.5) < 3.0 * road["sd"]
-    table = np.genfromtxt(out / "friction.csv", delimiter=",", names=True)
+    table = table_of(out / "friction.csv")
     assert table["another"][table["t_s"] > road["first"] + 1.0].min() > 0.5
     assert "of the friction of the identification drive" in capsys.readouterr().out
 
@@ -254,5 +245,5 @@ def test_a_drive_that_cannot_judge_is_amber_and_no_failure(model, logs, tmp_path
         }
         said = capsys.readouterr().out
         assert "verdict: cannot judge, " in said and "NOT VALID" not in said
-        page = (tmp_path / name / "report.html").read_text(encoding="utf-8")
+        page = page_in(tmp_path / name)
         assert '<div class="doubt"><dt>the verdict' in page and 'class="struck"' not in page

@@ -23,8 +23,8 @@ def streams(monkeypatch):
     return err, out
 
 
-def worked(clock, seconds=10, parts=None):
-    work = progress.Progress("work", parts)
+def worked(clock, seconds=10):
+    work = progress.Progress("work")
     for quarter in range(1, 4 * seconds + 1):
         clock[0] += 0.25
         work(quarter / (4 * seconds))

@@ -12,7 +12,6 @@ from tireid.figures.style import figure_png
 from tireid.report import (
     Headline,
     Marked,
-    Paragraph,
     Picture,
     Report,
     Section,
@@ -23,34 +22,34 @@ from tireid.report import (
 
 PNG = figure_png(Figure(figsize=(1.0, 1.0)), resolution=20)
 SECTIONS = [
-    Section(heading="What & why", blocks=[Paragraph(text="a < b <script>alert(1)</script>")]),
+    Section("What & why", ["a < b <script>alert(1)</script>"]),
     Section(
-        heading="Results",
-        blocks=[
+        "Results",
+        [
             Table(
-                caption='Errors of "axles"',
-                header=["law", "RMSE [kN]"],
-                rows=[["integral", 0.33856], ["other", "0.4 (0.3 to 0.5)"], ["diverged", None]],
+                'Errors of "axles"',
+                ["law", "RMSE [kN]"],
+                [["integral", 0.33856], ["other", "0.4 (0.3 to 0.5)"], ["diverged", None]],
             ),
-            Picture(image=PNG, caption='Forces "over" time'),
-            Picture(image=PNG, caption="Slip <angle>"),
+            Picture(PNG, 'Forces "over" time'),
+            Picture(PNG, "Slip <angle>"),
         ],
     ),
 ]
 
 
-def page_of(title: str, sections: list[Section], summary: str = "") -> str:
+def page_of(title, sections, summary=""):
     return report_html(Report(title=title, sections=sections, summary=summary))
 
 
-def outside_references(page: str) -> list[str]:
+def outside_references(page):
     """Everything that a page would fetch: sources and links that are not in the page itself."""
     found = re.findall(r"""(?:src|href|data|action)\s*=\s*["']?([^"'\s>]+)""", page)
     found += re.findall(r"url\(([^)]*)\)|@import\s+(\S+)", page)
     return [str(one) for one in found if not str(one).startswith(("data:image/png;base64,", "#"))]
 
 
-def test_report_needs_nothing_but_itself() -> None:
+def test_report_needs_nothing_but_itself():
     page = page_of("A title", SECTIONS)
     assert outside_references(page) == []
     assert "http" not in page and "<script" not in page and "<link" not in page
@@ -58,12 +57,12 @@ def test_report_needs_nothing_but_itself() -> None:
     assert [b64decode(str(image).split(",")[1]) for image in images] == [PNG, PNG]
 
 
-def test_a_reference_to_another_file_would_be_seen() -> None:
+def test_a_reference_to_another_file_would_be_seen():
     for planted in ('<img src="a.png">', "<a href='http://b'>", "<style>@import c;</style>"):
         assert outside_references(planted)
 
 
-def test_report_says_everything_it_was_given_and_nothing_as_markup() -> None:
+def test_report_says_everything_it_was_given_and_nothing_as_markup():
     parser = outline(page_of("A <title>", SECTIONS, summary="In & short"))
     for text in (
         "A <title>",
@@ -82,38 +81,38 @@ def test_report_says_everything_it_was_given_and_nothing_as_markup() -> None:
     assert "script" not in tags and "angle" not in tags
 
 
-def test_columns_of_numbers_are_aligned_right_and_gaps_are_dashes() -> None:
-    table = Table(caption="c", header=["a", "b"], rows=[["x", -1.5], ["y", float("nan")]])
-    page = page_of("T", [Section(heading="h", blocks=[table])])
+def test_columns_of_numbers_are_aligned_right_and_gaps_are_dashes():
+    table = Table("c", ["a", "b"], [["x", -1.5], ["y", float("nan")]])
+    page = page_of("T", [Section("h", [table])])
     assert '<td>x</td><td class="number">\N{MINUS SIGN}1.5</td>' in page
     assert '<td>y</td><td class="number">\N{EN DASH}</td>' in page
 
 
-def test_rows_that_do_not_fit_and_pictures_that_are_none_are_refused(tmp_path: Path) -> None:
+def test_rows_that_do_not_fit_and_pictures_that_are_none_are_refused(tmp_path):
     with pytest.raises(ValueError, match="must have 2 cells, it has 1"):
-        Table(caption="c", header=["a", "b"], rows=[["x"]])
+        Table("c", ["a", "b"], [["x"]])
     (tmp_path / "a.png").write_text("not a picture")
     with pytest.raises(ValueError, match="must be SVG, PNG"):
-        Picture(image=tmp_path / "a.png", caption="c")
+        Picture(tmp_path / "a.png", "c")
     with pytest.raises(FileNotFoundError):
-        Picture(image=tmp_path / "missing.png", caption="c")
+        Picture(tmp_path / "missing.png", "c")
 
 
-def test_what_something_is_worth_is_seen() -> None:
+def test_what_something_is_worth_is_seen():
     table = Table(
-        caption="c",
-        header=["", "front"],
-        rows=[["stiffness", Marked("127 ± 5", "struck", "not valid")]],
+        "c",
+        ["", "front"],
+        [["stiffness", Marked("127 ± 5", "struck", "not valid")]],
     )
     page = report_html(
         Report(
             title="t",
-            sections=[Section(heading="h", blocks=[table])],
+            sections=[Section("h", [table])],
             numbers=[
                 Headline("NOT VALID", "the verdict", "bad"),
                 Headline([Marked("1"), Marked("2", "unknown", "not <known>")], "two axles"),
             ],
-            lead=[Picture(image=PNG, caption="the curve")],
+            lead=[Picture(PNG, "the curve")],
             warnings=[Marked("not valid: a", "bad"), "note: b"],
         )
     )
@@ -129,13 +128,13 @@ def test_what_something_is_worth_is_seen() -> None:
     assert faults_of(page) == []
 
 
-def test_report_replaces_the_old_one_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_report_replaces_the_old_one_whole(tmp_path, monkeypatch):
     path = tmp_path / "report.html"
     write_report(path, Report(title="First", sections=SECTIONS))
     first = path.read_text(encoding="utf-8")
     assert first == page_of("First", SECTIONS)
 
-    def fail(self: Path, target: Path) -> Path:
+    def fail(self, target):
         raise OSError("disk full")
 
     monkeypatch.setattr(Path, "replace", fail)
@@ -154,24 +153,24 @@ def test_report_replaces_the_old_one_whole(tmp_path: Path, monkeypatch: pytest.M
         ("In &amp; short", "In `short`", "a back-tick"),
     ],
 )
-def test_a_fault_of_a_page_would_be_seen(old: str, new: str, fault: str) -> None:
+def test_a_fault_of_a_page_would_be_seen(old, new, fault):
     page = page_of("T", SECTIONS, summary="In & short")
     assert old in page
     assert fault in faults_of(page.replace(old, new))
 
 
-def test_commands_are_written_letter_by_letter_and_our_letters_with_their_index() -> None:
+def test_commands_are_written_letter_by_letter_and_our_letters_with_their_index():
     rows = [["command", "tireid drive --fault v_y:biased:3:inf:0.5"]]
-    table = Table(caption="of v_y", header=["a", "b"], rows=rows, verbatim=True)
-    page = page_of("T", [Section(heading="h", blocks=[table])])
+    table = Table("of v_y", ["a", "b"], rows, verbatim=True)
+    page = page_of("T", [Section("h", [table])])
     assert "--fault v_y:biased:3:inf:0.5</td>" in page
     assert "of <i>v</i><sub>y</sub>" in page
 
 
-def test_a_film_and_a_drawing_are_embedded_as_what_they_are() -> None:
+def test_a_film_and_a_drawing_are_embedded_as_what_they_are():
     for content, kind in ((b"<?xml and more", "svg+xml"), (b"GIF89a and more", "gif")):
-        picture = Picture(image=content, caption="c", read="how")
-        parser = outline(page_of("t", [Section(heading="h", blocks=[picture])]))
+        picture = Picture(content, "c", "how")
+        parser = outline(page_of("t", [Section("h", [picture])]))
         (image,) = (attributes["src"] for tag, attributes in parser.tags if tag == "img")
         assert str(image).startswith(f"data:image/{kind};base64,")
         assert b64decode(str(image).split(",")[1]) == content

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import tireid as ti
-from tireid.cli import main
+from tests.tireid.conftest import typed
 
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sample")
-    assert main(["sample", str(folder / "log.csv"), "--car", str(folder / "car.toml")]) == 0
+    assert typed("sample", folder / "log.csv", "--car", folder / "car.toml") == 0
     return folder
 
 
@@ -42,13 +42,13 @@ def test_what_cannot_be_written_is_refused_before_it_is_driven(
 ):
     monkeypatch.chdir(written)
     before = (written / "log.csv").read_bytes()
-    assert main(["sample", *words]) == 2
+    assert typed("sample", *words) == 2
     assert told in capsys.readouterr().err
     assert (written / "log.csv").read_bytes() == before
     assert not (written / "new.csv").exists()
 
 
 def test_another_seed_is_another_drive(written, tmp_path):
-    assert main(["sample", str(tmp_path / "log.csv.gz"), "--seed", "1"]) == 0
+    assert typed("sample", tmp_path / "log.csv.gz", "--seed", "1") == 0
     other, log = ti.read_recording(tmp_path / "log.csv.gz"), ti.read_recording(written / "log.csv")
     assert not np.array_equal(other.v_y, log.v_y)

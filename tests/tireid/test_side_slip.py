@@ -1,6 +1,5 @@
 """Side slip that methods tell: its error by another road, in tables, files, reports and figures."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +11,7 @@ from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.rivals import INSTALLED
-from tireid.cli import main
+from tests.tireid.conftest import json_of, typed
 from tireid.figures.side_slip import side_slip_figure
 
 CAR = sedan()
@@ -27,22 +26,15 @@ def slalom(logs):
 @pytest.fixture(scope="module")
 def result(logs, tmp_path_factory):
     out = tmp_path_factory.mktemp("side_slip") / "out"
-    words = ["compare", f"{logs / 'slalom.csv'}", f"{logs / 'quick.csv'}", "--vehicle"]
-    words += [f"{logs / 'car.toml'}", "--method", "linear", *TOLD]
-    assert main([*words, "--out", str(out)]) == 0
+    words = ["compare", logs / "slalom.csv", logs / "quick.csv", "--vehicle"]
+    words += [logs / "car.toml", "--method", "linear", *TOLD]
+    assert typed(*words, "--out", out) == 0
     return out
 
 
 @pytest.fixture(scope="module")
 def methods(result):
-    return json.loads((result / "compare.json").read_text())["methods"]
-
-
-def test_without_a_method_that_tells_there_is_no_figure(logs, tmp_path, undrawn):
-    words = ["compare", f"{logs / 'slalom.csv'}", "--vehicle", f"{logs / 'car.toml'}"]
-    words += ["--method", "linear", "--out", str(tmp_path / "out")]
-    assert main(words) == 0
-    assert not (tmp_path / "out" / "side_slip.png").exists()
+    return json_of(result / "compare.json")["methods"]
 
 
 def test_a_sample_too_slow_does_not_count_and_one_that_is_off_does(slalom):

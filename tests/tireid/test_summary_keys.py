@@ -3,12 +3,11 @@
 summary_keys.json lists them by what they lie in: those of all methods, and what a method adds.
 """
 
-import json
 from pathlib import Path
 
 import pytest
 
-from tireid.cli import main
+from tests.tireid.conftest import json_of, typed
 
 EXPECTED = Path(__file__).with_name("summary_keys.json")
 NAMES = {"slalom": "LOG", "8": "TIME"}  # of the log, and when its run was frozen
@@ -28,11 +27,11 @@ def keys_of(table, above=""):
 
 
 def summary_keys(folder):
-    return keys_of(json.loads((folder / "summary.json").read_text()))
+    return keys_of(json_of(folder / "summary.json"))
 
 
 def listed(command, method):
-    rows = [json.loads(EXPECTED.read_text())[f"{command} {of}"] for of in ("all", method)]
+    rows = [json_of(EXPECTED)[f"{command} {of}"] for of in ("all", method)]
     return {
         f"{above}/{key}".lstrip("/")
         for table in rows
@@ -44,11 +43,11 @@ def listed(command, method):
 @pytest.mark.parametrize("method", ["fit", "axle", "integral"])
 def test_identify_and_predict_write_the_keys_that_are_listed(method, logs, tmp_path, undrawn):
     log, out = str(logs / "slalom.csv"), tmp_path / "out"
-    car = ["--vehicle", str(logs / "car.toml"), "--accept"]
-    assert main(["identify", log, *car, "--method", method, "--out", str(out)]) == 0
+    car = ["--vehicle", logs / "car.toml", "--accept"]
+    assert typed("identify", log, *car, "--method", method, "--out", out) == 0
     assert summary_keys(out) == listed("identify", method)
-    asked = ["predict", str(out / "weights.json"), log, "--out", str(tmp_path / "p")]
-    assert main([*asked, "--accept"]) == 0
+    asked = ["predict", out / "weights.json", log, "--out", tmp_path / "p"]
+    assert typed(*asked, "--accept") == 0
     assert summary_keys(tmp_path / "p") == listed("predict", method)
 
 

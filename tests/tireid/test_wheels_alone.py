@@ -1,19 +1,18 @@
 """Logs of an IMU, wheel speeds and steering alone, wheels that spin included: learnt end to end."""
 
-import csv
-import json
 import tomllib
 
 import numpy as np
 import pytest
 
 import tireid as ti
-from models.maneuvers import RandomSteer
-from models.plant import Plant
 from models.recordings import LogMap, read_recording
 from models.recordings.wheels import Wheels
+from tests.identifier.conftest import steered
+from tests.models.test_wheel_logs import write
 from tests.models.wheel_speeds import anti_lock, gentle_slip, shown, spin
-from tireid.cli import main
+from tests.tireid.conftest import json_of, learn_words, typed
+from tests.tireid.test_without_v_y import missed
 
 CAR = ti.sedan()
 RADIUS = np.array([0.314, 0.315, 0.318, 0.317])
@@ -21,15 +20,7 @@ RPM = 30.0 / np.pi
 
 
 def driven(seed, amplitude, speed):
-    steer = RandomSteer(
-        amplitude=np.radians(amplitude),
-        frequency=0.5,
-        seed=seed,
-        onset=4.0,
-        rate_limit=1.0,
-        duration=29.99,
-    )
-    return Plant(CAR).simulate(steer, speed=speed, name=f"drive{seed}")
+    return steered(seed, 29.99, amplitude=np.radians(amplitude), onset=4.0, speed=speed)
 
 
 @pytest.fixture(scope="module")
@@ -65,9 +56,7 @@ def errors(run, recording):
     history = ti.identify(recording, CAR, check=False)
     exact = run.recording()
     away = np.degrees(history.recording.v_y / history.recording.v_x - run.v_y / run.v_x)[400:]
-    missed = history.freeze().predict(exact) - exact.axle_force
-    share = np.sqrt((missed**2).mean(axis=0) / (exact.axle_force**2).mean(axis=0))
-    return float(np.sqrt(np.mean(away**2))), float(share.max())
+    return np.sqrt(np.mean(away**2)), missed(history.freeze(), exact).max()
 
 
 def test_side_slip_and_forces_stay_right_while_driven_wheels_spin(run, wheels):
@@ -83,14 +72,6 @@ def test_side_slip_and_forces_stay_right_while_driven_wheels_spin(run, wheels):
     assert slip < 1.3 * slip_of_exact + 0.02
     assert force < 1.2 * force_of_exact + 0.01
     assert slip_of_mean > 1.5 * slip
-
-
-def write(path, data):
-    with path.open("w", newline="") as file:
-        table = csv.writer(file)
-        table.writerow(data)
-        table.writerows(np.column_stack([*data.values()]).tolist())
-    return str(path)
 
 
 def logger(run, wheels, **more):
@@ -116,7 +97,7 @@ def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
 ):
     CAR.to_toml(tmp_path / "car.toml")
     alone = write(tmp_path / "alone.csv", logger(run, wheels))
-    assert main(["channels", alone]) == 1  # turns, and nobody knows of which radius
+    assert typed("channels", alone) == 1  # turns, and nobody knows of which radius
     said = capsys.readouterr().out
     assert "wheel_fl: speed of the front left wheel" in said
     assert "a rate of turns: give the radius of the wheels, in m, by [wheels] radius" in said
@@ -126,18 +107,18 @@ def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
     gnss = first.v_x + 0.05 * np.random.default_rng(3).normal(size=first.t.size)
     both = write(tmp_path / "both.csv", logger(first, slips, **{"Ground Speed [km/h]": 3.6 * gnss}))
     told = tmp_path / "log.toml"
-    assert main(["channels", both, "--write", str(told)]) == 0
+    assert typed("channels", both, "--write", told) == 0
     assert "wheels roll by vx" in capsys.readouterr().out
     data = tomllib.loads(told.read_text())
     np.testing.assert_allclose(data["wheels"]["radius"], RADIUS, rtol=0.005)
-    assert main(["channels", alone, "--log", str(told)]) == 0
+    assert typed("channels", alone, "--log", told) == 0
     out = tmp_path / "out"
-    words = ["identify", alone, "--vehicle", str(tmp_path / "car.toml"), "--log", str(told)]
-    assert main([*words, "--out", str(out), "--accept"]) == 0
+    words = [*learn_words(tmp_path, alone), "--log", told]
+    assert typed(*words, "--out", out, "--accept") == 0
     captured = capsys.readouterr()
     assert (
         "there is no column 'Ground Speed [km/h]': vx is computed from the wheels" in captured.err
     )
     assert "vx is computed from wheel_fl, wheel_fr, wheel_rl, wheel_rr" in captured.err
     assert "a log has no lateral velocity: fit learns" in captured.err
-    assert json.loads((out / "summary.json").read_text())
+    assert json_of(out / "summary.json")

@@ -1,7 +1,5 @@
 """Logs of an IMU, wheel speed and steering alone: read, identified, judged and predicted."""
 
-import csv
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,36 +8,18 @@ import pytest
 import tireid as ti
 from identifier.axle import AxleIdentifier
 from identifier.estimate.method import FitMethod
-from models.maneuvers import RandomSteer, SampledSteer
+from models.maneuvers import SampledSteer
 from models.plant import Plant
 from models.recordings import RecordingError, read_recording, write_recording
-from tireid.cli import main
+from tests.identifier.conftest import steered
+from tests.identifier.estimate.test_latent import blind as as_logged
+from tests.tireid.conftest import columns_of, json_of, learn_words, table_of, typed
 
 CAR = ti.sedan()
 
 
-def driven(seed, duration=24.0):
-    maneuver = RandomSteer(
-        amplitude=np.radians(4.0),
-        frequency=0.5,
-        seed=seed,
-        onset=1.0,
-        rate_limit=1.0,
-        duration=duration - 0.01,
-    )
-    return Plant(CAR).simulate(maneuver, speed=20.0, name=f"drive{seed}").recording()
-
-
-def as_logged(exact, seed=1):
-    """The drive as noisy inertial sensors show it, without v_y and without truth."""
-    rng, n = np.random.default_rng(seed), len(exact)
-    return replace(
-        exact,
-        v_y=None,
-        r=exact.r + 0.002 * rng.normal(size=n),
-        a_y=exact.a_y + 0.05 + 0.1 * rng.normal(size=n),
-        axle_force=None,
-    )
+def driven(seed):
+    return steered(seed, 23.99, amplitude=np.radians(4.0)).recording()
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +124,8 @@ def test_without_v_y_there_are_no_slip_angles(exact):
 
 
 def test_a_frame_without_vy_is_taken_where_ay_is_there(exact):
-    columns = {"t": exact.t, "vx": exact.v_x, "r": exact.r, "delta_f": exact.delta_f}
+    columns = columns_of(exact)
+    del columns["vy"]
     told = read_recording(columns | {"ay": exact.a_y})
     assert told.v_y is None
     assert "no lateral velocity is read" in " ".join(told.notes)
@@ -153,7 +134,8 @@ def test_a_frame_without_vy_is_taken_where_ay_is_there(exact):
 
 
 def test_a_log_that_contradicts_itself_without_v_y_is_refused(exact):
-    columns = {"t": exact.t, "vx": exact.v_x, "r": exact.r, "delta_f": exact.delta_f}
+    columns = columns_of(exact)
+    del columns["vy"]
     with pytest.raises(RecordingError, match="change the sign of ay"):
         read_recording(columns | {"ay": -exact.a_y})
     with pytest.raises(RecordingError, match="delta_f must be in rad"):
@@ -167,32 +149,29 @@ def test_a_written_recording_leaves_out_what_was_estimated(history, tmp_path):
 
 @pytest.mark.usefixtures("unmade")
 def test_the_command_learns_and_tells_side_slip_with_its_deviation(log, exact, tmp_path, capsys):
-    words = ["identify", str(log), "--vehicle", str(tmp_path / "car.toml")]
-    assert main([*words, "--out", str(tmp_path / "out")]) == 0
+    words = learn_words(tmp_path, log)
+    assert typed(*words, "--out", tmp_path / "out") == 0
     said = capsys.readouterr()
     assert "fit learns, and estimates it" in said.err
     assert "side slip was estimated to ±" in said.out
     assert "the log has no lateral velocity" in said.out
-    with (tmp_path / "out" / "forces.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    told, sd = (
-        np.array([float(row[c]) for row in rows]) for c in ("v_y_estimated_m_s", "v_y_sd_m_s")
-    )
-    assert np.mean(np.abs(told - exact.v_y) < 2.0 * sd) > 0.8
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    told = table_of(tmp_path / "out" / "forces.csv")
+    away = np.abs(told["v_y_estimated_m_s"] - exact.v_y)
+    assert np.mean(away < 2.0 * told["v_y_sd_m_s"]) > 0.8
+    summary = json_of(tmp_path / "out" / "summary.json")
     assert summary["law"] == "fit"
 
 
 def test_the_doctor_and_channels_say_what_they_cannot_see_of_it(log, tmp_path, capsys):
-    assert main(["doctor", str(log), "--vehicle", str(tmp_path / "car.toml")]) == 0
+    assert typed("doctor", log, "--vehicle", tmp_path / "car.toml") == 0
     assert "the log has no lateral velocity" in capsys.readouterr().out
-    assert main(["channels", str(log)]) == 0
+    assert typed("channels", log) == 0
     assert "without vy, identify estimates it" in capsys.readouterr().out
 
 
 def test_a_method_that_needs_v_y_is_refused_in_one_line(log, tmp_path, capsys):
-    words = ["identify", str(log), "--vehicle", str(tmp_path / "car.toml"), "--method", "axle"]
-    assert main([*words, "--out", str(tmp_path / "out")]) == 2
+    words = [*learn_words(tmp_path, log), "--method", "axle"]
+    assert typed(*words, "--out", tmp_path / "out") == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert "there is no vy, from which AxleIdentifier learns" in said
     assert not (tmp_path / "out").exists()

@@ -136,7 +136,7 @@ def _channels_text(
     seen: Mapping[str, Channel],
     signals: Mapping[str, Signal],
     proposal: Proposal,
-    known: frozenset[str] = frozenset(),
+    known: frozenset[str],
 ) -> str:
     rows = [["channel", "unit", "Hz", "samples", "from", "to", "is"]]
     for one in listed:

@@ -64,7 +64,6 @@ _CONDITIONS = {  # by field of the declared driving: its option, and what that s
     "noise_delta": ("--noise-delta RAD", "largest error of delta"),
 }
 _OF_ALL = ("v_x", "friction")  # conditions of which not gains alone are judged
-_TEXT, _NUMBERS, _DESIGN = "certificate.txt", "certificate.json", "design.toml"
 
 
 def declare(new: Any) -> None:
@@ -118,10 +117,10 @@ def run(options: argparse.Namespace) -> int:
     with ExitStack() as stack:  # where a part fails, none is there
         if options.out is not None:
             folder = stack.enter_context(output_folder(options.out, force=options.force))
-            write_json(folder / _NUMBERS, numbers)
-            write_file(folder / _TEXT, f"{text}\n")
+            write_json(folder / "certificate.json", numbers)
+            write_file(folder / "certificate.txt", f"{text}\n")
             if paper is not None:
-                write_file(folder / _DESIGN, design_text(paper))
+                write_file(folder / "design.toml", design_text(paper))
                 learnt = identify(drive_to_learn(), vehicle, paper)
                 draw_check(folder, learnt, paper.operation(vehicle, driving), certificate)
     tell(json.dumps(numbers, indent=2) if options.json else text)

@@ -218,10 +218,10 @@ def write_compare_report(
     }
     blocks: list[Block] = [
         Table(
-            caption=f"{course.measure}, front / rear, in percent of the rms force (and N), mean "
+            f"{course.measure}, front / rear, in percent of the rms force (and N), mean "
             f"over {len(comparison.names)} recordings." + "".join(f" {line}." for line in said),
-            header=rows[0],
-            rows=rows[1:],
+            rows[0],
+            rows[1:],
         ),
         *drawings(figures, captions),
     ]
@@ -234,7 +234,7 @@ def write_compare_report(
         numbers=[*verdicts_headline(verdicts, learnt, "good"), *_compare_headlines(comparison)],
         warnings=[*_compare_warnings(comparison), *of_each],
         sections=[
-            Section(heading="Errors of the methods", blocks=blocks),
+            Section("Errors of the methods", blocks),
             origin(command, course.vehicle, course.recordings, seed=str(comparison.seed)),
         ],
     )

@@ -104,11 +104,11 @@ def drive_text(driven: Mapping[str, Driven]) -> str:
 def drive_section(driven: Mapping[str, Driven], folder: Path) -> page.Section:
     heading = "The car drives on the identified tires"
     if not driven:
-        return page.Section(heading=heading, blocks=[page.Paragraph(text=NOT_DRIVEN)])
+        return page.Section(heading, [NOT_DRIVEN])
     slippery = driven[_SLIPPERY]
     blocks: list[page.Block] = [
-        page.Paragraph(
-            text="A model predictive tracker steers the car around the cones. It plans 2 s ahead, "
+        (
+            "A model predictive tracker steers the car around the cones. It plans 2 s ahead, "
             "100 times a second, with noisy sensors and 20 ms of delay. In the middle of the "
             "slalom the friction drops to half, which is the limit of this path, and no tracker "
             "gets this friction. One tracker goes on identifying: its tire is replaced where "
@@ -116,26 +116,26 @@ def drive_section(driven: Mapping[str, Driven], folder: Path) -> page.Section:
             "others keep the tires that were frozen before, or the linear ones."
         ),
         page.Picture(
-            image=folder / _SLIPPERY / f"drive.{_FILM}",
-            caption="The drive of the learning car; outlines are the others.",
-            read=READ["film"],
+            folder / _SLIPPERY / f"drive.{_FILM}",
+            "The drive of the learning car; outlines are the others.",
+            READ["film"],
         ),
         *_scores(slippery, "Deviation and the rest along the path."),
         *known_blocks(slippery.drives.runs, slippery.figures),
-        page.Paragraph(
-            text="The lane change of ISO 3888-2 at 90 % of the lateral acceleration that the tires "
+        (
+            "The lane change of ISO 3888-2 at 90 % of the lateral acceleration that the tires "
             "can give: with the frozen model the tracker drives as well as with the true tires. "
             f"The film is {LANE_CHANGE}/drive.{_FILM}."
         ),
         *_scores(driven[LANE_CHANGE], "Deviation and the rest along the lane change."),
     ]
-    return page.Section(heading=heading, blocks=blocks)
+    return page.Section(heading, blocks)
 
 
 def _scores(one: Driven, caption: str) -> list[page.Block]:
     case = f"{headline(one.drives.conditions)}."
     return [
-        page.Table(caption=case, header=SCORES, rows=score_rows(one.drives.runs)),
+        page.Table(case, SCORES, score_rows(one.drives.runs)),
         *drawings(one.figures, {"errors": caption}),
     ]
 
@@ -215,8 +215,7 @@ def package_section(shipped: Shipped) -> page.Section:
         "writes; here it is compiled, tested and run over the slalom, beside Python."
     )
     lines = (intro, *shipped_text(shipped).splitlines())
-    blocks = [page.Paragraph(text=line) for line in lines]
-    return page.Section(heading="The identifier as C for a controller", blocks=blocks)
+    return page.Section("The identifier as C for a controller", lines)
 
 
 _REFERENCE = (
@@ -261,17 +260,17 @@ def _demo_report(
 
 def _learn(figures: Mapping[str, bytes], model: TireModel, verdict: Verdict) -> page.Section:
     return page.Section(
-        heading="Identified tires",
-        blocks=[
-            page.Paragraph(
-                text="The car is a double-track model of a mid-size sedan: roll, load transfer, "
+        "Identified tires",
+        [
+            (
+                "The car is a double-track model of a mid-size sedan: roll, load transfer, "
                 "tire relaxation and combined slip on Magic Formula tires, integrated at 1 ms. It "
                 f"drives a slalom at {SPEED:g} m/s. The identifier gets what any log has, "
                 "speed, lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it "
                 "gets no force."
             ),
-            page.Paragraph(
-                text="Each axle has a force curve of slip, a sum of tanh units that is odd and "
+            (
+                "Each axle has a force curve of slip, a sum of tanh units that is odd and "
                 "saturates. Slip is lagged by the relaxation of the tire, which is identified "
                 "too, and moved by the sway of the body. The curves are identified by recursive "
                 "least squares from motion alone; where nothing was excited the prior remains. "
@@ -294,23 +293,23 @@ def _learn(figures: Mapping[str, bytes], model: TireModel, verdict: Verdict) -> 
 def _predict(story: Story, figures: Mapping[str, bytes]) -> page.Section:
     columns = ["frozen", "of rms"]
     blocks: list[page.Block] = [
-        page.Paragraph(
-            text="The same frozen weights predict two other maneuvers, not used for "
+        (
+            "The same frozen weights predict two other maneuvers, not used for "
             "identification: beside them the paper's network and law, identified on the same "
             "slalom with gains from the phase margin of their loop."
         ),
         page.Table(
-            caption="RMSE of the axle force, both axles together [kN], and the frozen error as a "
+            "RMSE of the axle force, both axles together [kN], and the frozen error as a "
             "share of the rms force.",
-            header=["drive", "axle, online", *columns, "paper, online", *columns],
-            rows=[[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
+            ["drive", "axle, online", *columns, "paper, online", *columns],
+            [[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
     for name in list(STORY)[1:]:
         caption = f"The axle identifier, frozen after the slalom, on the {name.replace('_', ' ')}."
         image = figures[f"replay_{name}"]
-        blocks.append(page.Picture(image=image, caption=caption, read=READ["replay"]))
-    return page.Section(heading="Prediction of validation drives", blocks=blocks)
+        blocks.append(page.Picture(image, caption, READ["replay"]))
+    return page.Section("Prediction of validation drives", blocks)
 
 
 def _paper_study(story: Story, study: Study, figures: Mapping[str, bytes]) -> page.Section:
@@ -322,18 +321,18 @@ def _paper_study(story: Story, study: Study, figures: Mapping[str, bytes]) -> pa
         "step_steer": "Table I of the paper beside ours, RMSE of the axle force [kN].",
     }
     blocks: list[page.Block] = [
-        page.Paragraph(
-            text="The paper's network, its gains from the phase margin of their loop, beside the "
+        (
+            "The paper's network, its gains from the phase margin of their loop, beside the "
             "axle identifier above: figures, certificate and bounds are in the folder "
             f"paper_network. {page.printed(certified).capitalize()}."
         ),
         page.Picture(
-            image=SCHEME.with_suffix(".svg"),
-            caption="The identifier, as Fig. 1 of the paper; orange is what the laws differ in, "
+            SCHEME.with_suffix(".svg"),
+            "The identifier, as Fig. 1 of the paper; orange is what the laws differ in, "
             "and where a freeze cuts.",
         ),
-        page.Paragraph(
-            text=f"{_REFERENCE} freezes the weights at an instant and replays the past with "
+        (
+            f"{_REFERENCE} freezes the weights at an instant and replays the past with "
             "them: a law that follows the instant forgets earlier driving. "
             f"{page.printed(MEASURES_MEAN)}"
         ),
@@ -342,10 +341,10 @@ def _paper_study(story: Story, study: Study, figures: Mapping[str, bytes]) -> pa
         blocks.append(study_table(maneuver, study, caption))
         if f"{maneuver}_errors" in figures:  # a law that diverged on every seed has none
             what = "The table as a picture; hollow marks are the paper's values."
-            blocks.append(page.Picture(image=figures[f"{maneuver}_errors"], caption=what))
+            blocks.append(page.Picture(figures[f"{maneuver}_errors"], what))
     said = (MEANING, settings(GAINS, NETWORK).splitlines()[0])
-    blocks += [page.Paragraph(text=page.printed(one)) for one in said]
-    return page.Section(heading="The paper's study", blocks=blocks, folded=True)
+    blocks += [page.printed(one) for one in said]
+    return page.Section("The paper's study", blocks, folded=True)
 
 
 _TITLE = "tireid: lateral tire forces, identified while driving"

@@ -117,16 +117,15 @@ def drive_to_learn() -> Recording:
 
 def plant_recordings(
     vehicle: Vehicle,
-    rng: np.random.Generator | None = None,
+    rng: np.random.Generator,
     drives: Mapping[str, tuple[Maneuver, float]] = DRIVES,
 ) -> tuple[Recording, ...]:
     """Drive the plant of a vehicle through every maneuver.
 
-    rng : of the noise of `SENSORS`; None measures exactly.   drives : maneuver and speed [m/s].
+    rng : of the noise of `SENSORS`.   drives : maneuver and speed [m/s].
     """
     plant = Plant(vehicle)
-    sensors = None if rng is None else SENSORS
     return tuple(
-        plant.simulate(maneuver, speed=speed, name=name).recording(sensors, rng)
+        plant.simulate(maneuver, speed=speed, name=name).recording(SENSORS, rng)
         for name, (maneuver, speed) in drives.items()
     )

@@ -131,7 +131,7 @@ def _header() -> list[str]:
 
 def study_table(maneuver: str, study: paper_study.Study, caption: str) -> Table:
     head = [printed(word) for word in _header()]
-    return Table(caption=caption, header=head, rows=_rows(maneuver, study))
+    return Table(caption, head, _rows(maneuver, study))
 
 
 def table_text(maneuver: str, study: paper_study.Study) -> str:

@@ -27,7 +27,7 @@ from tireid.figures.tires import slip_figure
 from tireid.identified import error_cells
 from tireid.learning import replay
 from tireid.progress import say, tell
-from tireid.reports.common import READ, REPORT, origin
+from tireid.reports.common import REPORT, drawings, origin
 from tireid.reports.identify import (
     band_sentence,
     curve_drawing,
@@ -236,23 +236,15 @@ def write_predict_report(
     error, found = prediction.against_truth, list[page.Block]()
     if error is not None:
         found.append(error_table([[recording.name, *error_numbers(error, prediction.true_force)]]))
-    found += [page.Paragraph(text=page.printed(line)) for line in lines.splitlines()]
+    found += [page.printed(line) for line in lines.splitlines()]
     captions = {
         "motion": "Mean force over windows of 0.3 s: from the motion, and from the model.",
-        "forces": "Axle forces over time.",
+        "replay": "Axle forces over time.",
         "friction": "Friction of the road over that of the identification drive.",
     }
-    found += [
-        page.Picture(
-            image=figures[name],
-            caption=caption,
-            read=READ["replay" if name == "forces" else name],
-        )
-        for name, caption in captions.items()
-        if name in figures
-    ]
+    found += drawings({**figures, "replay": figures["forces"]}, captions)
     if band := band_sentence(model):
-        found.append(page.Paragraph(text=band))
+        found.append(band)
     report = page.Report(
         title=f"Tires of {source.name} on {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, not used for "
@@ -265,7 +257,7 @@ def write_predict_report(
         warnings=[*verdict_warnings(verdict), *notes],
         sections=[
             verdict_section(verdict),
-            page.Section(heading="What it predicts", blocks=found),
+            page.Section("What it predicts", found),
             *sensors_section(model, [recording]),
             origin(
                 command,

@@ -264,11 +264,11 @@ def write_drive_report(
         numbers=_drive_headlines(runs),
         warnings=_drive_warnings(runs),
         sections=[
-            Section(heading="How the car drove", blocks=_drive_blocks(runs, figures, film)),
-            Section(heading="The tracker's tires", blocks=known_blocks(runs, figures)),
+            Section("How the car drove", _drive_blocks(runs, figures, film)),
+            Section("The tracker's tires", known_blocks(runs, figures)),
             Section(
-                heading="Timing",
-                blocks=drawings(figures, {"solve_times": "How long a step took."}),
+                "Timing",
+                drawings(figures, {"solve_times": "How long a step took."}),
             ),
             origin(
                 command,
@@ -320,12 +320,10 @@ def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
 def _drive_blocks(
     runs: Sequence[ClosedLoop], figures: Mapping[str, bytes], film: Path | None
 ) -> list[Block]:
-    blocks: list[Block] = [
-        Table(caption="Scores of the drives.", header=SCORES, rows=score_rows(runs))
-    ]
+    blocks: list[Block] = [Table("Scores of the drives.", SCORES, score_rows(runs))]
     if film is not None:
         caption = f"The drive on {runs[0].label} tires; outlines are the other cars."
-        blocks.append(Picture(image=film, caption=caption, read=READ["film"]))
+        blocks.append(Picture(film, caption, READ["film"]))
     captions = {
         "path": "The path from above.",
         "errors": "Deviation, heading, acceleration and speed along the path.",
@@ -344,5 +342,5 @@ def known_blocks(runs: Sequence[ClosedLoop], figures: Mapping[str, bytes]) -> li
     notes = [[run.label, f"{t:.2f}", printed(text)] for run in runs for t, text in run.drive.notes]
     if notes:
         header = ["tires", "time [s]", "what"]
-        blocks.append(Table(caption="Decisions along the way.", header=header, rows=notes))
+        blocks.append(Table("Decisions along the way.", header, notes))
     return blocks

@@ -26,7 +26,7 @@ with Path(__file__).with_name("read.toml").open("rb") as file:
 def drawings(figures: Mapping[str, bytes], captions: Mapping[str, str]) -> list[Picture]:
     """Return the figures that there are of some, by their captions."""
     return [
-        Picture(image=figures[name], caption=text, read=READ[name])
+        Picture(figures[name], text, READ[name])
         for name, text in captions.items()
         if name in figures
     ]
@@ -71,9 +71,9 @@ def origin(
         *([name.replace("_", " "), value] for name, value in others.items()),
     ]  # fmt: skip
     table = Table(
-        caption="What went in; equal hashes are equal numbers.",
-        header=["what", "value"],
-        rows=rows,
+        "What went in; equal hashes are equal numbers.",
+        ["what", "value"],
+        rows,
         verbatim=True,
     )
-    return Section(heading="To compute it again", blocks=[table])
+    return Section("To compute it again", [table])

@@ -61,17 +61,15 @@ def write_identify_report(
         ],
         sections=[
             verdicts.verdict_section(verdict),
-            page.Section(
-                heading="Identified tires", blocks=learnt_blocks(found.method, model, figures)
-            ),
+            page.Section("Identified tires", learnt_blocks(found.method, model, figures)),
             *verdicts.sensors_section(model, found.drives),
             page.Section(
-                heading="How well it predicts",
-                blocks=[*_evaluated(evaluated), *_errors(found, figures)],
+                "How well it predicts",
+                [*_evaluated(evaluated), *_errors(found, figures)],
             ),
             page.Section(
-                heading="What went in",
-                blocks=drawings(figures, {"inputs": f"Signals of {learnt.recording.name}."}),
+                "What went in",
+                drawings(figures, {"inputs": f"Signals of {learnt.recording.name}."}),
             ),
             diagnosis_section(diagnosis),
             origin(
@@ -142,7 +140,7 @@ def curve_drawing(figures: Mapping[str, bytes], verdict: Verdict) -> page.Pictur
     """Return the learnt curve with its band, the first figure of a report."""
     word = "" if verdict.valid else f"{verdict.word[0].upper()}{verdict.word[1:]}. "
     caption = f"{word}Axle force over slip angle: drive, curve and its band."
-    return page.Picture(image=figures["slip"], caption=caption, read=READ["slip"])
+    return drawings(figures, {"slip": caption})[0]
 
 
 def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
@@ -184,17 +182,15 @@ def _extrapolated(model: TireModel, recording: Recording) -> list[str]:
 def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, bytes]) -> list[page.Block]:
     facts = [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
     blocks: list[page.Block] = [
-        page.Paragraph(
-            text="Slip has the sign of the paper, so that curves rise: positive slip pushes to the "
+        (
+            "Slip has the sign of the paper, so that curves rise: positive slip pushes to the "
             "left. curve.csv has the curve with its uncertainty, weights.json the model."
         )
     ]
     if facts:
-        blocks.append(
-            page.Table(caption=f"Parameters of the tires, {law}.", header=["", *AXLES], rows=facts)
-        )
+        blocks.append(page.Table(f"Parameters of the tires, {law}.", ["", *AXLES], facts))
     if band := band_sentence(model):
-        blocks.append(page.Paragraph(text=band))
+        blocks.append(band)
     captions = {
         "side_slip": "Side slip as it was estimated.",
         "learnt": "Estimates over time.",
@@ -231,9 +227,7 @@ def _evaluated(evaluated: Mapping[str, Verdict]) -> list[page.Block]:
         "The verdict on each replayed drive, as of tireid predict, and the error over the force "
         "in the motion."
     )
-    return [
-        page.Table(caption=caption, header=["drive", "verdict", "front [%]", "rear [%]"], rows=rows)
-    ]
+    return [page.Table(caption, ["drive", "verdict", "front [%]", "rear [%]"], rows)]
 
 
 def _errors(found: Results, figures: Mapping[str, bytes]) -> list[page.Block]:
@@ -252,21 +246,20 @@ def _errors(found: Results, figures: Mapping[str, bytes]) -> list[page.Block]:
     if "forces" in figures:
         caption = f"Axle forces over time: {'online, and ' * online}replayed with frozen weights."
         read = READ["forces" if online else "replay"]
-        blocks.append(page.Picture(image=figures["forces"], caption=caption, read=read))
+        blocks.append(page.Picture(figures["forces"], caption, read))
     for name, image in figures.items():
         if name.startswith("replay_"):
             caption = f"The frozen model on {name.removeprefix('replay_')}."
-            blocks.append(page.Picture(image=image, caption=caption, read=READ["replay"]))
+            blocks.append(page.Picture(image, caption, READ["replay"]))
     return blocks
 
 
 def error_table(rows: Sequence[Sequence[page.Cell]], more: str = "") -> page.Table:
     """Return a table of errors, of rows of a name and `error_numbers`."""
     return page.Table(
-        caption="RMSE of the axle force, and its share of the rms force where there is a "
-        f"truth{more}.",
-        header=["drive", "front [N]", "share", "rear [N]", "share"],
-        rows=rows,
+        f"RMSE of the axle force, and its share of the rms force where there is a truth{more}.",
+        ["drive", "front [N]", "share", "rear [N]", "share"],
+        rows,
     )
 
 

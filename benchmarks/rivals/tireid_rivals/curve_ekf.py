@@ -30,7 +30,15 @@ from identifier.baselines.curves import (
     unlagged,
     wheel_slip,
 )
-from identifier.baselines.lagged_ekf import CARRY, PORTS, SHAPE, axle_loads, midpoint, motion_rate
+from identifier.baselines.lagged_ekf import (
+    CARRY,
+    PORTS,
+    SHAPE,
+    axle_loads,
+    corrected,
+    midpoint,
+    motion_rate,
+)
 from identifier.method import Method
 from identifier.setup import Port, Setup
 from identifier.tire_model import TireModel
@@ -74,17 +82,11 @@ def _correct(
     R : covariance of the measurement (2, 2).   x : the measurement (2,).
     follow : whether it counts for the first two all the same.
     """
-    S = P[:2, :2] + R
-    gain = P[:, :2] @ ca.inv_minor(S)
-    innovation = x - estimate[:2]
-    deviation = ca.sqrt(ca.vertcat(S[0, 0], S[1, 1]))
-    trusted = ca.fmin(ca.fmax(innovation, -outlier * deviation), outlier * deviation)
-    leading = innovation if follow else trusted
-    move = ca.vertcat(gain[:2, :] @ leading, gain[2:, :] @ trusted)
-    keep = ca.SX.eye(estimate.numel())
-    keep[:, :2] -= gain
-    after = keep @ P @ keep.T + gain @ R @ gain.T  # Joseph
-    return estimate + move, (after + after.T) / 2
+    H, innovation = ca.SX.eye(estimate.numel())[:2, :], x - estimate[:2]
+    most = outlier * ca.sqrt(ca.diag(P[:2, :2] + R))
+    trusted = corrected(P, H, R, ca.fmin(ca.fmax(innovation, -most), most))
+    leading = corrected(P, H, R, innovation) if follow else trusted
+    return estimate + ca.vertcat(leading.move[:2], trusted.move[2:]), trusted.P
 
 
 _CONSTANTS = ("noise", "walk", "limit", "prior", "learning_speed")

@@ -29,8 +29,9 @@ from identifier.baselines.lagged_ekf import (
     midpoint,
     motion_rate,
 )
+from identifier.baselines.lagged_ekf import PORTS as CARRIED
 from identifier.method import Method, require_fresh
-from identifier.setup import AXLE_FORCE, COVARIANCE, Port, Setup
+from identifier.setup import AXLE_FORCE, Port, Setup
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters, linear_axle_force
 from models.rules import require_positive
@@ -40,9 +41,7 @@ PORTS = (
     AXLE_FORCE,
     Port("v_y", "m/s", "lateral velocity at the center of gravity, positive to the left"),
     Port("v_y_sd", "m/s", "standard deviation of v_y"),
-    Port("estimate", "m/s; rad/s; -", "v_y, r and the unknowns of the tires"),
-    Port("P", "of estimate", "covariance of estimate", rule=COVARIANCE),
-    Port("before", "rad; rad; m/s", "delta_f, delta_r and v_x of the last sample"),
+    *CARRIED[1:-1],
     Port("running", "-", "1 after a sample in motion that was understood"),
 )
 LIMITS = (2.0, 2.0, 1.5, 1.5)  # of |θ|: stiffness within a factor of 7.4, friction of 4.5
