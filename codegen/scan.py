@@ -75,24 +75,15 @@ class _Memory(NamedTuple):
     record: Mapping[str, Array]
 
 
-class Slopes(NamedTuple):
-    """Slopes that run along: the step's output `factors` makes rows of them.
-
-    The scan then carries `tangent` beside the states, and an output `slopes` comes out.
-    some : parameters whose slopes are asked for, by column.
-    """
-
-    program: Program
-    some: Sequence[int]
-
-
 class Scan:
     """A step function run over samples, `carry, outputs = step(carry, sample, constants)`.
     step : a function with named, dense ports. An input `p` named in `carry` has an output `p_next`
         of the same shape. Its name becomes part of a C identifier.
     over : inputs with one row a sample. Every other input is constant.
     flags : of the compiler; None takes `codegen.compiler.FLAGS`.
-    slopes : those that run along; None where there are none.
+    slopes : those that run along, of which the step's output `factors` makes rows, and the
+        parameters that they are asked for, by column; None where there are none. The scan then
+        carries `tangent` beside the states, and an output `slopes` comes out.
     """
 
     def __init__(
@@ -102,7 +93,7 @@ class Scan:
         carry: tuple[str, ...],
         over: tuple[str, ...],
         flags: tuple[str, ...] | None = None,
-        slopes: Slopes | None = None,
+        slopes: tuple[Program, Sequence[int]] | None = None,
     ) -> None:
         name = step.name()
         self._size_in = {p: step.size_in(p) for p in step.name_in()}
@@ -119,12 +110,13 @@ class Scan:
             raise ValueError(f"{name}: inputs and outputs must be dense")
         self._place_in = {p: step.index_in(p) for p in self._size_in}
         self._place_out = {p: step.index_out(p) for p in self._size_out}
-        self.slopes = slopes
+        self._program = None if slopes is None else slopes[0]
         if slopes is not None:  # their ports stand behind those of the step, which knows nothing
-            program, self._columns = slopes.program, slopes.program.columns(slopes.some)
+            program, some = slopes
+            self._columns = program.columns(some)
             size = len(program.rows) * int(self._columns[1])
             self._size_in[TANGENT] = self._size_out[f"{TANGENT}_next"] = size, 1
-            self._size_out[SLOPES] = len(program.shown), len(slopes.some)
+            self._size_out[SLOPES] = len(program.shown), len(some)
             self._place_in[TANGENT] = max(step.sz_arg(), step.n_in())
             self._place_out[f"{TANGENT}_next"] = max(step.sz_res(), step.n_out())
             self._place_out[SLOPES] = self._place_out[f"{TANGENT}_next"] + 1
@@ -153,8 +145,8 @@ class Scan:
         generator.add(self.step)
         try:
             source, rows = generator.dump() + "#include <string.h>\n", ""
-            if self.slopes is not None:
-                source += self.slopes.program.source(name)
+            if self._program is not None:
+                source += self._program.source(name)
                 at, out = self._place_in[TANGENT], self._place_out
                 columns = f"(const long long*)call_arg[{at + 1}]"
                 rows = f"{name}_rows(call_res[{out[FACTORS]}], call_arg[{at}], "
@@ -259,7 +251,7 @@ class Scan:
         given: list[tuple[int, NDArray[Any], bool]] = [
             (self._place_in[p], packed[p], p in self.over) for p in self._size_in
         ]
-        if self.slopes is not None:
+        if self._program is not None:
             given.append((self._place_in[TANGENT] + 1, self._columns, False))
         begins: list[NDArray[Any] | None] = [None] * (max(place for place, *_ in given) + 1)
         strides = [0] * len(begins)
@@ -319,8 +311,8 @@ class Scan:
                     if port != SLOPES:
                         buffer.set_res(step.index_out(port), here.data)
                 evaluate()
-                if self.slopes is not None:  # its tangent is carried last
-                    program, c = self.slopes.program, out[FACTORS]
+                if self._program is not None:  # its tangent is carried last
+                    program, c = self._program, out[FACTORS]
                     program.follow(c, now[-1], following[-1], out[SLOPES], self._columns)
                 now, following = following, now
 

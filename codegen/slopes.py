@@ -25,7 +25,7 @@ class Dual(NamedTuple):
     rows: Mapping[int, Any] = {}
 
 
-class Row(NamedTuple):
+class _Row(NamedTuple):
     """A row of slopes, by numbers of factors.
     terms : rows and their factors; -1 - k is the row of state k before the sample.
     slopes : parameters and the slopes over them.
@@ -108,7 +108,7 @@ class Tape:
             columns = slopes.sparsity().get_triplet()[1]
             terms = {place.get(one, one): factor for one, factor in dual.rows.items()}
             over = {column: slopes.nz[k] for k, column in enumerate(columns)}
-            rows.append(Row(numbered(terms), numbered(over)))
+            rows.append(_Row(numbered(terms), numbered(over)))
         places = [place[row] for row in ends]
         return ca.vertcat(*factors), Program(rows, places[: len(states)], places[len(states) :])
 
@@ -118,7 +118,7 @@ class Program(NamedTuple):
     states : rows of the states after a sample.   shown : rows that come out.
     """
 
-    rows: Sequence[Row]
+    rows: Sequence[_Row]
     states: Sequence[int]
     shown: Sequence[int]
 

@@ -251,7 +251,7 @@ def _turning(name: str, recording: Recording) -> Array:
 def _clock_jump(recording: Recording, moving: Mapping[str, Array]) -> Finding | None:
     """Return where the clock jumped, None where it did not."""
     again, dt = facts.logged_again(moving), recording.dt
-    jump = next(iter(facts.tears(moving, facts.SMOOTH)), None) if again is None else None
+    jump = next(iter(facts.tears(moving)), None) if again is None else None
     if again is not None:
         at, size, confidence, deviation = again[0], -again[1] * dt, CERTAIN, 0.0
     elif jump is not None:

@@ -14,7 +14,7 @@ from codegen.arrays import Array, thinning
 from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
 from models.recordings.record import ALL
-from models.recordings.samples import SMOOTH, tears
+from models.recordings.samples import tears
 from models.vehicle import GRAVITY, Vehicle
 
 FASTEST = 0.01  # [s]: sampled faster, samples are averaged
@@ -141,7 +141,7 @@ def _tears(recording: Recording, within: slice, every: int) -> set[int]:
     names = ("v_x", "v_y", "r", "delta_f")
     signals = {name: recording.needed(name)[within] for name in names}
     moving = {name: signal for name, signal in signals.items() if np.ptp(signal) > 0.0}
-    return {within.start + at // every * every for at, _ in tears(moving, SMOOTH) if at >= every}
+    return {within.start + at // every * every for at, _ in tears(moving) if at >= every}
 
 
 def _piece(

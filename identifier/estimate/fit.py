@@ -36,7 +36,7 @@ from identifier.motion.parameters import INDEX, NAMES
 from models.recordings import Recording, joined
 from models.vehicle import GRAVITY, Vehicle
 
-log = logging.getLogger("tireid.estimate")
+_log = logging.getLogger("tireid.estimate")
 
 _BLOCK = 600.0  # [s] that are estimated at once
 _BLIND = 300.0  # [s] of a log without v_y that teach: those of hardest cornering
@@ -124,7 +124,7 @@ def fit(
         beliefs = before.after(known.counted(share)) if parts else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         if not found.ended:
-            log.warning("%s: the descent ended at its limit, not where nothing was left to gain",
+            _log.warning("%s: the descent ended at its limit, not where nothing was left to gain",
                         recordings[0].name)  # fmt: skip
         found, roads = with_roads(drives, vehicle, beliefs, found)
         here = _reach(drives, roads, found, vehicle)

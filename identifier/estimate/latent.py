@@ -343,7 +343,7 @@ class _Latent:
     # The optimum.
 
     def begin(
-        self, stiffer: float = 0.0, late: "Lateness | None" = None
+        self, stiffer: float = 0.0, late: "_Lateness | None" = None
     ) -> tuple[Array, Array, float]:
         """Return states whose rear axle does not slip, the parameters that are believed, and how
         firmly.
@@ -490,7 +490,7 @@ class Learnt(NamedTuple):
 
 
 def learn_latent(
-    nodes: Nodes, vehicle: Vehicle, beliefs: Priors, late: "Lateness | None" = None
+    nodes: Nodes, vehicle: Vehicle, beliefs: Priors, late: "_Lateness | None" = None
 ) -> Learnt:
     """Return what the nodes of a drive teach.
 
@@ -538,7 +538,7 @@ def learn_latent(
     )
 
 
-class Lateness(NamedTuple):
+class _Lateness(NamedTuple):
     """By how much a_y is later than the yaw rate [s], and what was found with it: states z (n, 8)
     at times t (n,), and all parameters p.
     """
@@ -549,7 +549,7 @@ class Lateness(NamedTuple):
     p: Array
 
 
-def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> Lateness:
+def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> _Lateness:
     """Return by how much a_y is later than the yaw rate, where that is no small matter.
 
     It is the delay with which the minute of hardest cornering is explained best, found as a
@@ -576,7 +576,7 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> Lateness
     on_time = problem(0.0, priors)
     t, R, small = on_time.nodes.t, on_time.R, _SMALL_DELAY * scale
     z, p, least = on_time.descend(*on_time.begin(_STARTS[0]), R, enough=_NEARLY)
-    none, late = Lateness(0.0, t, z, p), 0.0
+    none, late = _Lateness(0.0, t, z, p), 0.0
     for k in range(_LOOKS):
         most = _ITERATIONS if k else _FEW
         z, p, reached = problem(late, open_).descend(z, p, _NEAR, R, enough=_NEARLY, most=most)
@@ -597,7 +597,7 @@ def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> Lateness
     variance = np.diag(then.spread(z, p, R)[1])[then.moves == delay]
     if late < 0.0:
         return none._replace(seconds=late)
-    return Lateness(late, t, z, p) if late > _SURELY_LATE * np.sqrt(variance[0]) else none
+    return _Lateness(late, t, z, p) if late > _SURELY_LATE * np.sqrt(variance[0]) else none
 
 
 @one_thread

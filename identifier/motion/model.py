@@ -28,7 +28,7 @@ import casadi as ca
 
 from codegen import Scan
 from codegen.compiler import FLAGS
-from codegen.scan import FACTORS, Slopes
+from codegen.scan import FACTORS
 from codegen.slopes import Dual, Program, Tape
 from identifier.axle.car import step_function, symbols
 from identifier.axle.gate import GateState, Plausibility, gate
@@ -86,7 +86,7 @@ def motion_scan(columns: Columns = ()) -> Scan:
     """
     step, program = _motion_step(bool(columns))
     of = [NAMES.index(name) for name in columns]
-    slopes = None if program is None else Slopes(program, of)
+    slopes = None if program is None else (program, of)
     carry, over = ("state", "was_on"), ("signals", "rates")
     return Scan(step, carry=carry, over=over, flags=_SIMD, slopes=slopes)
 

@@ -28,7 +28,7 @@ _BLOCK = 5  # samples in a row that were logged before, of all signals
 _SIDE = 12  # samples on each side of a jump
 _JUMP = 5.5  # of the usual disagreement of both sides of a jump, in two signals
 _ALSO = 2.5  # of the same disagreement, in a third signal
-SMOOTH = frozenset(("v_y", "r", "v_x"))  # that no car can change at once, as it can its steering
+_SMOOTH = frozenset(("v_y", "r", "v_x"))  # that no car can change at once, as it can its steering
 _SHORTEST_JUMP = 4.0  # samples that a jump has at least: less is a late sample
 
 
@@ -254,14 +254,14 @@ def logged_again(signals: Mapping[str, Array]) -> tuple[int, int] | None:
     return None
 
 
-def tears(signals: Mapping[str, Array], smooth: frozenset[str]) -> list[tuple[int, float]]:
+def tears(signals: Mapping[str, Array]) -> list[tuple[int, float]]:
     """Return where both sides of an instant disagree in several signals, and by how many samples.
 
     The clearest is first; none is nearer to a clearer one than both sides are long.
-    signals : that move (n,).   smooth : names of those that cannot jump, of which one must.
+    signals : that move (n,), by name.
     """
     names = list(signals)
-    if len(names) < 3 or not smooth & set(names) or signals[names[0]].size <= 20 * _SIDE:
+    if len(names) < 3 or not _SMOOTH & set(names) or signals[names[0]].size <= 20 * _SIDE:
         return []
     # Of a parabola through each side: its value and its slope between both.
     value, slope = np.linalg.pinv(np.vander(np.arange(_SIDE) + 0.5, 3, increasing=True))[:2]
@@ -274,7 +274,7 @@ def tears(signals: Mapping[str, Array], smooth: frozenset[str]) -> list[tuple[in
         scores.append(size / np.maximum(np.maximum(usual, 0.8 * busy), 1e-300))
         jumps.append(jump)
     third, second = np.sort(np.stack(scores), axis=0)[[-3, -2]]
-    surest = np.max([scores[k] for k, name in enumerate(names) if name in smooth], axis=0)
+    surest = np.max([scores[k] for k, name in enumerate(names) if name in _SMOOTH], axis=0)
     clear = np.flatnonzero((np.minimum(second, surest) >= _JUMP) & (third >= _ALSO))
     scale = np.array([np.std(signal) for signal in signals.values()])
     found: list[tuple[int, float]] = []

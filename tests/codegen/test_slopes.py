@@ -6,7 +6,6 @@ import pytest
 
 import codegen.scan
 from codegen import Scan
-from codegen.scan import Slopes
 from codegen.slopes import Tape
 
 N, CARRY = 6, ("state",)
@@ -44,7 +43,7 @@ def test_slopes_of_chosen_parameters_are_those_of_the_whole_run(monkeypatch, com
     if not compiled:
         monkeypatch.setattr(codegen.scan, "load_library", lambda *_: None)
     step, program = made()
-    scan = Scan(step, carry=CARRY, over=("u",), slopes=Slopes(program, some))
+    scan = Scan(step, carry=CARRY, over=("u",), slopes=(program, some))
     rng = np.random.default_rng(1)
     u = np.column_stack([rng.standard_normal(N), [1, 1, 1, 0, 1, 1]])  # a sample that is left out
     p = rng.standard_normal(3)
