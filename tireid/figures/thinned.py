@@ -51,10 +51,10 @@ def _outermost(signals: Iterable[Array], of: int) -> _Samples:
     """
     found = []
     for signal in signals:
-        begins = np.arange(0, len(signal), -(-of // COLUMNS))
-        for column in np.split(np.arange(len(signal)), begins[1:]):
-            values = signal[column]
-            found += [column[values.argmin(axis=0)], column[values.argmax(axis=0)]]
+        width = -(-of // COLUMNS)
+        for first in range(0, len(signal), width):
+            values = signal[first : first + width]
+            found += [first + values.argmin(axis=0), first + values.argmax(axis=0)]
     return np.unique(np.hstack(found))
 
 
