@@ -275,6 +275,8 @@ def main() -> int:
     parser.add_argument("--record", action="store_true", help="write benchmarks/results")
     parser.add_argument("--before", type=Path, help="another checkout, beside which all runs")
     options = parser.parse_args()
+    if options.before is not None and not (options.before / "tireid").is_dir():
+        parser.error(f"--before {options.before}: there is no checkout of tireid")
     targets = Targets("speed")
     with tempfile.TemporaryDirectory(prefix="tireid-speed-") as made:
         folder = Path(made)

@@ -17,6 +17,7 @@ from identifier.run import History
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tests.tireid.test_drive_figures import FIGURES as DRIVEN
+from tireid.figures import style
 from tireid.figures.forces import (
     force_figure,
     inputs_figure,
@@ -159,6 +160,18 @@ def test_nothing_is_clipped_and_no_legend_covers_data(draw):
     for box in boxes:
         for axes in figure.axes:
             assert not box.overlaps(axes.get_window_extent())
+
+
+def test_no_label_lies_on_the_numbers_of_its_axis():
+    figure, panels = style.axle_panels([2.0, 1.0], sharex="col")
+    for axes in panels.ravel():
+        axes.plot([0.0, 1.0], [-0.0275, 0.0275])
+        axes.set_ylabel("residual [kN]")
+    figure.canvas.draw()
+    for axes in panels[:, 0]:
+        label = axes.yaxis.label.get_window_extent()
+        numbers = [one.get_window_extent() for one in axes.get_yticklabels()]
+        assert not any(label.overlaps(box) for box in numbers)
 
 
 def test_same_data_give_the_same_bytes_and_leave_matplotlib_alone(tmp_path):

@@ -32,7 +32,9 @@ from identifier.run import History
 PAGE = 7.16  # width of both columns of a paper [in]
 RESOLUTION = 200  # [dots per inch]
 _LINE, _ENTRY = 0.15, 0.19  # of text, and of a legend [in]
-_NUMBERS = 0.46  # of the left axis, and their distances [in]
+_NUMBERS = 0.46  # of the left axis, and their distances [in], at least
+_DIGIT, _TICK = 0.085, 0.12  # of a number there, and between numbers and axis [in]
+_MOST_DIGITS = 7  # of a number: powers of ten are written shorter than they are spelled
 _NEAR = 0.07  # [in]
 _WHITE = {254: 255}  # as it comes out of a palette
 # s: of a clock that begins later, as a Unix time does, only the last digits are shown
@@ -97,7 +99,13 @@ class _Margins(LayoutEngine):
         lines = _LINE * max(1 + text.count("\n") if text else 0 for text in titles)
         numbered = any(one.get_xlabel() for one in fig.axes[: -grid.ncols])
         names = _LINE * max(1 + one.get_ylabel().count("\n") for one in fig.axes)
-        left, below = _NUMBERS + names, 2.0 * _LINE + _NEAR
+        numbers = [
+            len(text)
+            for one in fig.axes[:: grid.ncols]
+            for text in one.yaxis.get_major_formatter().format_ticks(list(one.get_yticks()))
+        ]
+        widest = _TICK + _DIGIT * min(max(numbers, default=0), _MOST_DIGITS)
+        left, below = max(_NUMBERS, widest) + names, 2.0 * _LINE + _NEAR
         gap = lines + 1.5 * _NEAR + (below if numbered else 0.0)
         top = lines + _NEAR + self.entries * _ENTRY
         each = (height - top - below - _NEAR - (grid.nrows - 1) * gap) / grid.nrows
