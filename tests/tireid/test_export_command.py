@@ -8,7 +8,6 @@ import pytest
 
 from codegen import find_compiler
 from codegen import processor as figures
-from identifier.export.compiled import CompiledPackage
 from identifier.frozen import FrozenModelError
 from identifier.methods import make_method
 from identifier.run import identify
@@ -17,6 +16,7 @@ from identifier.verdict import calibrated
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.rivals import rival
+from tests.shipped import Shipped
 from tests.tireid.conftest import json_of, refusal, typed
 from tireid import exporting
 from tireid.commands import export as export_command
@@ -52,7 +52,7 @@ def test_learnt_weights_are_shipped(tmp_path, logs):
     model.save(tmp_path / "weights.json")
     out = tmp_path / "package"
     assert typed("export", "--out", out, "--weights", tmp_path / "weights.json") == 0
-    weights = CompiledPackage.from_folder(out).weights
+    weights = Shipped.from_folder(out).weights
     np.testing.assert_array_equal(weights["W"], model.weights.W)
 
 
@@ -95,7 +95,7 @@ def test_what_was_learnt_without_a_lateral_velocity_goes_on_without_it(
     assert typed("export", "--out", out, *words) == 0
     told = capsys.readouterr().err
     assert "reads v_x, r, delta_f, delta_r, a_y; v_y is an output" in told
-    package = CompiledPackage.from_folder(out)
+    package = Shipped.from_folder(out)
     np.testing.assert_array_equal(package.weights["W"], model.W)
     run, expected = package.run(drive), identify(drive, CAR, method, start=model)
     assert (run.status == 0).all()

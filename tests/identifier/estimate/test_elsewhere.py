@@ -15,7 +15,6 @@ from identifier.estimate.method import FitMethod
 from identifier.estimate.model import FittedModel
 from identifier.estimate.posterior import Reach
 from identifier.estimate.priors import Priors
-from identifier.export.compiled import CompiledPackage
 from identifier.export.onnx import onnx_bytes
 from identifier.export.package import build_package
 from identifier.methods import continuing
@@ -26,6 +25,7 @@ from mpc.path.gates import iso_3888_2
 from mpc.realtime import Measurement, Status, Tracker
 from mpc.tires import prediction_tire
 from mpc.tires.tire import DOUBT_STEP, Car, Point
+from tests.shipped import Shipped
 from tireid import exporting
 from tireid.driving.runs import LEARNING, given_tire, make_learner
 from tireid.driving.setup import Setup, SpeedWish
@@ -125,7 +125,7 @@ def test_the_exported_step_of_a_fit_is_its_exact_one(fitted, drive):
     method, part = FitMethod.for_vehicle(CAR), drive.taken(slice(2000, 3000))
     package = build_package(method, CAR, fitted, name="fit")
     assert not package.specialized.learnt
-    found = CompiledPackage.of(package).run(part)
+    found = Shipped.of(package).run(part)
     np.testing.assert_allclose(
         found.outputs["axle_force"], fitted.setup(0.01).output(part, "axle_force"), atol=1e-6
     )

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.export.compiled import CompiledPackage, samples_of
+from identifier.export.compiled import samples_of
 from identifier.export.fmu import fmu_text
 from identifier.export.onnx import NoOnnxError, onnx_bytes
 from identifier.export.package import build_package
@@ -14,6 +14,7 @@ from identifier.methods import make_method
 from identifier.run import identify
 from models.vehicle import sedan
 from tests.identifier.export.conftest import CALIBRATION, banded
+from tests.shipped import Shipped
 
 CAR = sedan()
 AXLE = make_method("axle", CAR)
@@ -35,7 +36,7 @@ def test_noise_widens_it_as_that_of_a_drive_with_such_sensors(package, model, sl
     drive, rng = slalom.between(20.0, 45.0), np.random.default_rng(3)
     sideways = CALIBRATION.noise[1] * rng.standard_normal(len(drive))
     noisy = replace(drive, v_y=drive.v_y + sideways)
-    compiled = CompiledPackage.of(package)
+    compiled = Shipped.of(package)
     compiled.set_adaptation(False)
     told = compiled.run(noisy).outputs["half_band"][100:, 1]
     np.testing.assert_allclose(told, model.band.over(noisy)[100:, 1], rtol=0.01)
@@ -44,8 +45,8 @@ def test_noise_widens_it_as_that_of_a_drive_with_such_sensors(package, model, sl
 
 def test_with_a_band_the_forces_are_the_same_and_it_narrows_while_the_step_learns(packages, slalom):
     rows = samples_of(slalom)[:800]
-    told = CompiledPackage.of(banded(CAR), single=False).run_samples(rows)
-    plain = CompiledPackage.of(packages["axle"], single=False).run_samples(rows).axle_force
+    told = Shipped.of(banded(CAR), single=False).run_samples(rows)
+    plain = Shipped.of(packages["axle"], single=False).run_samples(rows).axle_force
     np.testing.assert_allclose(told.axle_force, plain, rtol=1e-9, atol=1e-6)
     small = np.abs(told.axle_force[:, 0]) < 500.0
     half, number = told.outputs["half_band"][:, 0], np.arange(800)
@@ -55,7 +56,7 @@ def test_with_a_band_the_forces_are_the_same_and_it_narrows_while_the_step_learn
 def test_where_forces_read_zero_there_is_no_band(package, slalom):
     rows = samples_of(slalom)[:300]
     rows[200:, 0] = 0.3
-    told = CompiledPackage.of(package).run_samples(rows).outputs["half_band"]
+    told = Shipped.of(package).run_samples(rows).outputs["half_band"]
     assert (told[50:200] > 0.0).all()
     assert (told[280:] == 0.0).all()
 

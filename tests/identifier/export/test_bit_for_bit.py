@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from codegen.processor import PROCESSORS, missing_tools, replay
-from identifier.export.compiled import CompiledPackage, Status, samples_of
+from identifier.export.compiled import samples_of
 from identifier.export.package import run_in_virtual_machine
 from identifier.export.processor import recording_program
 from tests.identifier.export.conftest import BANKED
 from tests.kept import Kept
+from tests.shipped import Shipped, Status
 
 needs_arm = pytest.mark.skipif(bool(missing_tools()), reason=f"needs {', '.join(missing_tools())}")
 LAWS = ("integral", "axle", BANKED, "inertial")
@@ -100,7 +101,7 @@ def test_c_computes_the_bits_of_casadi_in_double(law, gaps, packages, slalom):
 
 
 def assert_the_bits_of_casadi(package, rows):
-    run = CompiledPackage.of(package, single=False)
+    run = Shipped.of(package, single=False)
     shipped = run.run_samples(rows)
     told, state = run_in_virtual_machine(package.specialized, rows)
     np.testing.assert_array_equal(shipped.axle_force, told[:, :2])
@@ -114,7 +115,7 @@ def assert_the_bits_of_casadi(package, rows):
 @pytest.mark.parametrize("law", LAWS)
 def test_float_is_within_a_tenth_of_a_newton_over_45_s(law, packages, slalom):
     double, single = (
-        CompiledPackage.of(packages[law], single=choice).run(slalom) for choice in (False, True)
+        Shipped.of(packages[law], single=choice).run(slalom) for choice in (False, True)
     )
     assert 0.0 < np.abs(double.axle_force - single.axle_force).max() <= 0.1
     if law == "inertial":

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from codegen import find_compiler
-from identifier.export.compiled import CompiledPackage, Status, samples_of
+from identifier.export.compiled import samples_of
 from identifier.export.specialize import SIDE_SLIP
 from identifier.methods import make_method
 from identifier.run import OnlineIdentifier, identify
@@ -14,6 +14,7 @@ from models.vehicle import sedan
 from tests.identifier.export.conftest import BANKED
 from tests.kept import Kept
 from tests.rivals import INSTALLED
+from tests.shipped import Shipped, Status
 
 CAR = sedan()
 TOLD = ("linear_kf",) * INSTALLED
@@ -26,7 +27,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compi
 @pytest.fixture(scope="module")
 def shipped(packages):
     """By law, what a package is computed with; each test begins anew."""
-    return Kept(lambda law: CompiledPackage.of(packages[law]))
+    return Kept(lambda law: Shipped.of(packages[law]))
 
 
 def method_of(law):

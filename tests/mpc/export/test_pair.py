@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from identifier.axle.slip import Sensors
-from identifier.export.compiled import CompiledPackage
 from identifier.export.package import build_package
 from identifier.methods import make_method
 from models.maneuvers import Slalom
@@ -22,6 +21,7 @@ from mpc.tires import prediction_tire
 from tests.kept import Kept
 from tests.mpc.export.conftest import LAWS, STRICT, c_files, put_pair
 from tests.rivals import rival
+from tests.shipped import Shipped
 
 CAR = sedan()
 SLALOM = Slalom(amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=9.99)
@@ -85,7 +85,7 @@ def test_what_is_learnt_without_v_y_is_handed_over_whole(sensing, write_pair):
     drive = replace(Plant(CAR).simulate(SLALOM, speed=20.0).recording(), v_y=None)
     drive = replace(drive, delta_f=drive.delta_f - 0.004)
     library = joined(write_pair(pair))
-    learnt = CompiledPackage.of(pair.identifier, single=False)
+    learnt = Shipped.of(pair.identifier, single=False)
     learnt.run(drive)
     weights, specialized = learnt.weights, pair.identifier.specialized
     assert np.abs(weights["sensors"]).max() > 5e-4
@@ -124,7 +124,7 @@ def taught(pairs):
     recording = Plant(CAR).simulate(SLALOM, speed=20.0).recording()
 
     def make(law):
-        learner = CompiledPackage.of(pairs[law].identifier, single=False)
+        learner = Shipped.of(pairs[law].identifier, single=False)
         learner.run(recording)
         return learner
 
@@ -189,7 +189,7 @@ def test_how_sensors_are_mounted_stays_at_a_handover(write_pair):
     fresh = design.frozen(CAR, design.setup(CAR).carry)
     start = replace(fresh, sensors=Sensors(0.01, 0.2, 0.05))
     pair = build_pair(build_package(design, CAR, start))
-    weights = CompiledPackage.of(pair.identifier, single=False).weights
+    weights = Shipped.of(pair.identifier, single=False).weights
     taken, params = handed_over(joined(write_pair(pair)), pair, weights, 1.0)
     assert taken
     np.testing.assert_allclose(params["weights"], prediction_tire(start).weights, rtol=1e-14)
