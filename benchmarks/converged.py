@@ -200,7 +200,8 @@ def iterated(
     """Iterate from a guess until the plan stays; its status is that of the last iteration."""
     instance = tracker.instance
     instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
-    instance.guess(x0)
+    instance.start[:] = x0
+    instance._library.mpc_guess(*instance._step[:2], *instance.solve_arguments[3:])
     for _ in range(most):
         before = instance.state["u"].copy()
         command = solve(tracker, x0, kappa, v_x)

@@ -161,7 +161,8 @@ class Ours:
 
     def step(self, x0: Array, kappa: Array) -> Answer:
         """Return the plan from a state, on the curvature of the stages."""
-        self.tracker.instance.shift()
+        instance = self.tracker.instance
+        instance._library.mpc_shift(*instance._step[:2])
         if self.prepared:
             self.ahead.append(prepare_solution(self.tracker, kappa, SPEED))
         told = solve(self.tracker, x0, kappa, SPEED)

@@ -15,6 +15,7 @@ import stat
 import subprocess
 import tempfile
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
@@ -141,6 +142,10 @@ class CompilationError(TireidError, RuntimeError):
     """The C compiler refused generated code; the message holds its first lines."""
 
 
+class NoCompilerError(TireidError, RuntimeError):
+    """There is no C compiler to build a package or the tracker with."""
+
+
 @cache
 def wide_vectors() -> tuple[str, ...]:
     """Return the flag for vectors of four where this processor has them; the bits stay the same."""
@@ -188,6 +193,14 @@ def _at_level(flags: tuple[str, ...], source: str) -> tuple[str, ...]:
     return tuple(f"-O{level}" if flag in ("-O1", "-O2", "-O3") else flag for flag in flags)
 
 
+def run_compiler(command: Sequence[str], folder: Path | None, what: str) -> None:
+    """Compile in a folder.   what : is compiled, for an error."""
+    answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    if answer.returncode != 0:
+        first_lines = "\n".join(answer.stderr.splitlines()[:5])
+        raise CompilationError(f"{command[0]} refused {what}:\n{first_lines}")
+
+
 def load_library(
     source: str, name: str, flags: tuple[str, ...] | None = None
 ) -> ctypes.CDLL | None:
@@ -231,12 +244,7 @@ def build_library(source: str, name: str, flags: tuple[str, ...] | None = None) 
         c_file, built = Path(scratch) / f"{name}.c", Path(scratch) / name
         write_file(c_file, source)
         command = [*words, str(c_file), "-o", str(built), "-lm"]
-        answer = subprocess.run(command, capture_output=True, text=True, check=False)
-        if answer.returncode != 0:
-            first_lines = "\n".join(answer.stderr.splitlines()[:5])
-            raise CompilationError(
-                f"{' '.join(compiler)} refused the generated code of {name}:\n{first_lines}"
-            )
+        run_compiler(command, None, f"the generated code of {name}")
         library = keep(stem, ".so", built.read_bytes())
     log.info("compiled %s in %.1f s", name, time.perf_counter() - start)
     return library

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from codegen.compiler import CompilationError
+from codegen.compiler import run_compiler
 from codegen.errors import TireidError
 from codegen.package import renamed
 from codegen.writing import write_file
@@ -23,6 +23,7 @@ CROSS_COMPILER, SIZE, EMULATOR = "arm-none-eabi-gcc", "arm-none-eabi-size", "qem
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-math-errno")
 _WRAPPED = tuple(f"-Wl,--wrap=__aeabi_{name}" for name in ("dadd", "dsub", "drsub"))
 TIMEOUT = 120.0  # s
+_PACKAGE = "the package"  # as errors name what is compiled
 
 
 class _Processor(NamedTuple):
@@ -144,7 +145,7 @@ def _build(folder: Path, program: Program, words: Sequence[str], *, single: bool
     options = [f"-D{program.name.upper()}_SINGLE={int(single)}", *program.macros]
     options += ["-Iinclude", "-Isrc", "-Itests", "-I."]
     compiler, *others = words
-    _compile_in(folder, [compiler, *options, *sources, *others, "-o", "replay"])
+    run_compiler([compiler, *options, *sources, *others, "-o", "replay"], folder, _PACKAGE)
 
 
 def _write(folder: Path, files: Mapping[str, str]) -> list[str]:
@@ -154,13 +155,6 @@ def _write(folder: Path, files: Mapping[str, str]) -> list[str]:
         (folder / path).parent.mkdir(exist_ok=True)
         write_file(folder / path, files[path])
     return sorted(path for path in wanted if path.endswith(".c") and path.startswith("src/"))
-
-
-def _compile_in(folder: Path, command: Sequence[str]) -> None:
-    answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    if answer.returncode != 0:
-        first_lines = "\n".join(answer.stderr.splitlines()[:5])
-        raise CompilationError(f"{command[0]} refused the package:\n{first_lines}")
 
 
 def _result(command: Sequence[str], folder: Path) -> Replay:
@@ -195,7 +189,7 @@ def _size_on(processor: _Processor, name: str, files: Mapping[str, str], *, sing
         define = f"-D{name.upper()}_SINGLE={int(single)}"
         for source in sources:
             words = [*processor.flags, *FLAGS, define, "-Iinclude", "-Isrc", "-c", source]
-            _compile_in(folder, [CROSS_COMPILER, *words])
+            run_compiler([CROSS_COMPILER, *words], folder, _PACKAGE)
         objects = [Path(source).with_suffix(".o").name for source in sources]
         answer = subprocess.run(
             [SIZE, *objects], cwd=folder, capture_output=True, text=True, check=True

@@ -14,7 +14,7 @@ exact at rest and knows the other side by symmetry.
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -86,8 +86,7 @@ def columns(maneuver: str) -> list[str]:
     return [ONLINE, *(frozen_column(m, t) for t in FREEZES[maneuver] for m in MEASURES)]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Trial:
+class _Trial(NamedTuple):
     """One law with one seed on one maneuver.
     replays : freeze time [s] to replay of the same recording; errors count from the onset on.
     errors : by column as `columns` names them: RMSE of both axles from the onset on [kN]; empty
@@ -132,8 +131,7 @@ def _measures(result: Replay) -> dict[str, AxleRmse | None]:
     }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Study:
+class Study(NamedTuple):
     """All errors of the study and the recordings behind them.
     errors : by maneuver, then by law: the errors [kN] by column, for each seed.
     """

@@ -233,12 +233,6 @@ class Table:
         prefix = f"{self._prefix}{key}."
         return Table(self.value(key), self._where, self._refusal, prefix)
 
-    def texts(self, key: str) -> tuple[str, ...]:
-        return tuple(self._as(tuple[str, ...], key, self.value(key)))
-
-    def wholes(self, key: str) -> tuple[int, ...]:
-        return tuple(self._as(tuple[int, ...], key, self.value(key)))
-
     def tables(self, key: str) -> list["Table"]:
         found = self.value(key)
         if not isinstance(found, list):
@@ -349,7 +343,7 @@ def changed(record: Any) -> dict[str, Any]:
 
 def toml_value(value: Any) -> str:
     """Return a text, number, truth or tuple of such as TOML has it, which reads back the same."""
-    if isinstance(value, bool):
+    if isinstance(value, int):
         return str(value).lower()
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -104,15 +104,13 @@ def _run(arguments: Sequence[str] | None) -> int:
 
 def _expected_errors() -> tuple[type[Exception], ...]:
     """Return what may go wrong without a fault in the program: input, system, compiler."""
-    from codegen import CompilationError, processor
-    from identifier.export import compiled
-    from mpc.realtime import instance
+    from codegen import processor
+    from codegen.compiler import CompilationError, NoCompilerError
     from tireid.exporting import SelfTestError
 
     return (
         *(ValueError, ArithmeticError, OSError, ImportError, MemoryError),
-        *(CompilationError, compiled.NoCompilerError, instance.NoCompilerError),
-        *(processor.ReplayError, SelfTestError),
+        *(CompilationError, NoCompilerError, processor.ReplayError, SelfTestError),
     )
 
 

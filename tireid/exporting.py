@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from codegen import find_compiler
+from codegen.compiler import NoCompilerError
 from codegen.errors import TireidError
 from codegen.processor import Cost, with_figures
 from codegen.writing import write_file
@@ -21,7 +22,6 @@ from models.vehicle import Vehicle, sedan
 from mpc.export.package import mpc_readme
 from mpc.export.pair import build_pair, frozen_start
 from mpc.export.processor import measure_mpc, mpc_figures_text, time_here
-from mpc.realtime import NoCompilerError
 from tireid.output import output_folder
 from tireid.progress import Progress
 from tireid.run import Run

@@ -2,9 +2,9 @@
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -58,8 +58,7 @@ _CURVE_POINTS = 201
 _FARTHER = 1.25  # than the slip that was driven, or is known
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Results:
+class Results(NamedTuple):
     """Models that were frozen over recordings.
 
     runs : of the method, over the recording that was learnt and over others.

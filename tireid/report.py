@@ -127,8 +127,7 @@ class Section(NamedTuple):
     folded: bool = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Report:
+class Report(NamedTuple):
     """All that a page says.
 
     summary : what a hurried reader should know, plain text.

@@ -185,10 +185,11 @@ def verdicts_warnings(verdicts: Mapping[str, Verdict], prefix: str) -> list[str 
 
     prefix : in which {} stands for the name.
     """
-    said: list[str | Marked] = []
-    for name, verdict in verdicts.items():
-        said += verdict_warnings(verdict, prefix.format(name))
-    return said
+    return [
+        said
+        for name, verdict in verdicts.items()
+        for said in verdict_warnings(verdict, prefix.format(name))
+    ]
 
 
 def verdict_section(verdict: Verdict) -> Section:

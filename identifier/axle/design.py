@@ -13,7 +13,7 @@ from codegen.arrays import Array
 from identifier.axle.band import AT_SPEEDS, CENTERS, BandCalibration
 from identifier.axle.band_step import band_numbers, hinges
 from identifier.axle.bank import UNPROVEN, RoadSlope, SlopeState, road_push
-from identifier.axle.car import car_numbers, downforce_numbers, symbols
+from identifier.axle.car import symbols
 from identifier.axle.certificate import certified
 from identifier.axle.covariance import narrowed, packed, per_variance, triangle, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings
@@ -186,10 +186,7 @@ class AxleIdentifier(Method):
                 "sensors": np.array(sensors),
             },
             constants={
-                "dt": np.array(self.dt),
-                "car": car_numbers(vehicle),
-                "scales": 1.0 / np.array(self.ladder)[None],
-                "plausibility": np.array(self.plausibility.numbers()),
+                **self.plausibility.constants(vehicle, self.ladder, self.dt),
                 "roll": np.array(self.sway.numbers()),
                 "regression": np.array(self.regression.at(self.dt)),
                 "changing": np.array(self.change.at(self.dt, self.regression.rate)),
@@ -198,7 +195,6 @@ class AxleIdentifier(Method):
                 "friction_direction": friction_direction(self.ladder),
                 "per_variance": widest,
                 "rising": rising_shares(self.ladder),
-                **downforce_numbers(vehicle),
             },
             only_with_a_y=("bank",),
             ends_run=self.plausibility.rest(self.dt),

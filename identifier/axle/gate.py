@@ -7,11 +7,14 @@ after three bad samples in a row, and while v_y and r repeat to the last bit (a 
 
 import math
 from dataclasses import astuple, dataclass
+from functools import reduce
 from typing import Any, NamedTuple
 
 import casadi as ca
+import numpy as np
 
-from identifier.axle.car import larger
+from codegen.arrays import Array
+from identifier.axle.car import car_numbers, downforce_numbers, larger
 from identifier.setup import Port
 from models.rules import require_positive_fields
 from models.vehicle import GRAVITY, Vehicle
@@ -85,6 +88,18 @@ class Plausibility:
         """Return the numbers of a step, whose port names them as the fields are."""
         return astuple(self)
 
+    def constants(self, vehicle: Vehicle, ladder: tuple[float, ...], dt: float) -> dict[str, Array]:
+        """Return what every step of curves is given: its car, time, units and these numbers.
+        ladder : slip scales of the units [rad].   dt : sampling interval [s].
+        """
+        return {
+            "dt": np.array(dt),
+            "car": car_numbers(vehicle),
+            "scales": 1.0 / np.array(ladder)[None],
+            "plausibility": np.array(self.numbers()),
+            **downforce_numbers(vehicle),
+        }
+
 
 class GateState(NamedTuple):
     """Last good sample (SI), whether the run is on (0 or 1), time of steady learning [s], and
@@ -120,10 +135,7 @@ class Gate(NamedTuple):
 
 
 def _all(*conditions: Any) -> Any:
-    result = conditions[0]
-    for condition in conditions[1:]:
-        result = ca.logic_and(result, condition)
-    return result
+    return reduce(ca.logic_and, conditions)
 
 
 def gate(limits: Any, dt: Any, last: GateState, x: Any, u: Any, v_x: Any) -> Gate:

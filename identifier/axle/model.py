@@ -19,8 +19,8 @@ from identifier.axle.band import (
     root,
     sensor_noise,
 )
-from identifier.axle.car import Car, car_numbers, downforce_numbers
-from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
+from identifier.axle.car import Car, car_numbers
+from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix, unit_slopes
 from identifier.axle.dynamics import curve_at_speed, lagged_force, series_compliance
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.prior import friction_direction
@@ -189,9 +189,7 @@ class AxleModel(TireModel):
         """Return the slope of the curves under static loads at slips [static loads/rad], (n, 2).
         slip : of front and rear axle [rad], (n, 2).
         """
-        scales = np.array(self.ladder)
-        units = np.tanh(slip[..., None] / scales)
-        slope: Array = ((1.0 - units**2) * self.W / scales).sum(axis=-1)
+        slope: Array = (unit_slopes(slip, self.ladder) * self.W).sum(axis=-1)
         return slope
 
     def estimates(self) -> tuple[Estimate, ...]:
@@ -301,15 +299,11 @@ class AxleModel(TireModel):
                 "slip": np.tile([0.0, 0.0, 1.0, 0.0], (2, 1)),
             },
             constants={
+                **self.plausibility.constants(self.vehicle, self.ladder, dt),
                 "W": self.W,
                 "own": self.beside_curve,
-                "dt": np.array(dt),
-                "car": car_numbers(self.vehicle),
-                "scales": 1.0 / np.array(self.ladder)[None],
-                "plausibility": np.array(self.plausibility.numbers()),
                 "roll": np.array(self.sway.numbers()),
                 "sensors": np.array(self.sensors),
-                **downforce_numbers(self.vehicle),
             },
             ends_run=self.plausibility.rest(dt),
         )

@@ -178,8 +178,7 @@ def cross_replay(
 SIGMAS = 2.0  # of what a method says it knows v_y to: 95 % of honest errors lie within
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class SideSlip:
+class SideSlip(NamedTuple):
     """The lateral velocity that a method estimated over a recording, and how far it was off.
     v_y : of each sample (n,) [m/s].
     v_y_sd : how well the method says it knows it (n,) [m/s]; None where it does not say.

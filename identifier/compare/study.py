@@ -1,8 +1,8 @@
 """What `tireid compare` finds out: every method on every recording, and its time."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import partial
+from typing import NamedTuple
 
 from identifier.compare.course import Course, Shares, Trial, cross_replay, shares, step_times
 from identifier.methods import REFERENCE, make_method
@@ -11,8 +11,7 @@ from models.recordings import Recording
 from models.vehicle import Vehicle
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Comparison:
+class Comparison(NamedTuple):
     """Methods side by side.
     step_times : by method, time of one compiled step [s]; REFERENCE is always among them, a method
         that learns from whole logs never.
@@ -22,7 +21,7 @@ class Comparison:
     seed: int
     trials: Mapping[str, Trial]
     step_times: Mapping[str, float]
-    left_out: Mapping[str, str] = field(default_factory=dict)
+    left_out: Mapping[str, str]
 
     @property
     def names(self) -> list[str]:

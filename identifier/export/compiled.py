@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from codegen import load_library
 from codegen.arrays import Array
+from codegen.compiler import NoCompilerError
 from codegen.errors import TireidError
 from codegen.escape import displayed
 from codegen.package import NAME, c_files, one_file
@@ -19,10 +20,6 @@ from identifier.export.specialize import INPUTS
 from identifier.refused import STALE_TIME, stale_samples, with_rests
 from models.recordings import Recording
 from models.schema import Table, read_json, read_text
-
-
-class NoCompilerError(TireidError, RuntimeError):
-    """There is no C compiler to build the package with."""
 
 
 class PackageFileError(TireidError, ValueError):

@@ -5,7 +5,6 @@ import io
 import logging
 import platform
 import shutil
-import subprocess
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -14,8 +13,8 @@ from typing import Literal, NamedTuple
 from uuid import UUID
 from xml.etree.ElementTree import Element, indent, tostring
 
-from codegen import CompilationError, find_compiler
-from codegen.compiler import KEEP_GUARDS
+from codegen import find_compiler
+from codegen.compiler import KEEP_GUARDS, run_compiler
 from codegen.escape import visible
 from codegen.package import c_files, header
 from codegen.writing import write_file
@@ -66,10 +65,7 @@ def _build_binary(target: _Target, name: str, sources: Mapping[str, bytes]) -> b
             write_file(folder / file, content)
         words = [*(file for file in sources if file.endswith(".c")), "-o", library]
         command = [*target.compiler, *KEEP_GUARDS, *_FLAGS, *words, *target.flags]
-        answer = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-        if answer.returncode != 0:
-            lines = "\n".join(answer.stderr.splitlines()[:5])
-            raise CompilationError(f"{target.compiler[0]} refused the FMU's sources:\n{lines}")
+        run_compiler(command, folder, "the FMU's sources")
         log.info("compiled %s for %s", library, target.folder_2)
         return (folder / library).read_bytes()
 

@@ -141,13 +141,6 @@ def _described(signal: Signal) -> dict[str, Any]:
 # Samples for the self-test of a package, and the forces that CasADi gives for them.
 
 
-class _Vectors(NamedTuple):
-    """Samples (n, k) in the order of the inputs, SI, and axle forces (n, 2) [N]."""
-
-    samples: Array
-    force: Array
-
-
 def synthetic_samples(specialized: SpecializedStep, n: int = _SAMPLES) -> Array:
     """Return a start from rest and turns to both sides, (n, k); arithmetic only, no noise.
 
@@ -213,13 +206,9 @@ def run_in_virtual_machine(
     return np.array(table), dict(zip(specialized.carry, state, strict=True))
 
 
-def vectors(specialized: SpecializedStep) -> _Vectors:
+def vectors_header(specialized: SpecializedStep) -> str:
     samples = synthetic_samples(specialized)
     outputs, _ = run_in_virtual_machine(specialized, samples)
-    return _Vectors(samples, outputs[:, :2])
-
-
-def vectors_header(specialized: SpecializedStep, found: _Vectors) -> str:
     double, single = _tolerances(specialized)
     kept = rules([member for member in carried_members(specialized) if member.learnt])
     names = ", ".join(port.name for port in specialized.inputs)
@@ -229,11 +218,11 @@ def vectors_header(specialized: SpecializedStep, found: _Vectors) -> str:
         f"{specialized.name}_vectors.h",
         f"Generated. Samples {names} [SI] and forces front, rear [N].",
         [
-            f"#define VECTORS {len(found.samples)}\n"
+            f"#define VECTORS {len(samples)}\n"
             f"#define VECTOR_TOLERANCE_DOUBLE {double} /* N */\n"
             f"#define VECTOR_TOLERANCE_SINGLE {single} /* N */\n" + "".join(negative[:1]),
-            f"static const double vector_input[VECTORS][{size}] = {{\n{rows(found.samples)}}};\n",
-            f"static const double vector_force[VECTORS][2] = {{\n{rows(found.force)}}};\n",
+            f"static const double vector_input[VECTORS][{size}] = {{\n{rows(samples)}}};\n",
+            f"static const double vector_force[VECTORS][2] = {{\n{rows(outputs[:, :2])}}};\n",
         ],
     )
 
@@ -269,7 +258,7 @@ def build_package(
     files = c_sources(specialized, single=single, about=about)
     files |= {
         **c_files(C, PROGRAMS, {PREFIX: name}),
-        f"tests/{name}_vectors.h": vectors_header(specialized, vectors(specialized)),
+        f"tests/{name}_vectors.h": vectors_header(specialized),
     }
     files |= cmake(files, about, flags=FLAGS, so_that="square roots without a call")
     return Package(specialized, files | {f"{name}.json": manifest_text(content, files)}, about)

@@ -10,7 +10,6 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.axle.car import car_numbers, downforce_numbers
 from identifier.axle.covariance import packed, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.design import AxleIdentifier, curve_boxes, curve_tracks, resumed_units
@@ -83,9 +82,8 @@ class InertialIdentifier(Method):
     dt: float = 0.01
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "ladder", tuple(self.ladder))  # a list would not hash
-        object.__setattr__(self, "sensor_position", tuple(self.sensor_position))
-        object.__setattr__(self, "doubt", tuple(self.doubt))
+        for name in ("ladder", "sensor_position", "doubt"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))  # a list would not hash
         doublings(self.ladder)
         require_positive(ValueError, dt=self.dt)
         require_within(ValueError, 0.5, 100.0, roll_frequency=self.roll_frequency)
@@ -213,10 +211,7 @@ class InertialIdentifier(Method):
                 "excitation": excitation,
             },
             constants={
-                "dt": np.array(self.dt),
-                "car": car_numbers(vehicle),
-                "scales": 1.0 / np.array(self.ladder)[None],
-                "plausibility": np.array(self.plausibility.numbers()),
+                **self.plausibility.constants(vehicle, self.ladder, self.dt),
                 "laws": np.array(self._laws(vehicle)),
                 "trust": np.array(trust),
                 "learning_speed": np.array(self.plausibility.learning_speed),
@@ -227,7 +222,6 @@ class InertialIdentifier(Method):
                 "compliance": compliance,
                 "doubt": np.array(self.doubt),
                 **({"along": np.array(self.along)} if self.held else {}),
-                **downforce_numbers(vehicle),
             },
             ends_run=self.plausibility.rest(self.dt),
         )

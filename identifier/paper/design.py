@@ -4,7 +4,6 @@ Its numbers may follow from the vehicle alone: lengths scale with the wheelbase 
 sqrt(L/g) (Froude), so that one rule serves a passenger car and a 1:10 model.
 """
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
@@ -44,7 +43,7 @@ from identifier.stability.operation import (
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters, bicycle
 from models.rules import require_within
-from models.schema import Table, read_toml
+from models.schema import Table, read_toml, toml_value
 from models.vehicle import GRAVITY, Vehicle
 
 _SHORTEST_STEP = 1e-4  # [s]: finer is only work
@@ -320,11 +319,7 @@ def _operation(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> O
     """
     found = disturbance(vehicle, driving, dt=design.dt, unit=design.force_unit)
     expected = expected_residual(vehicle, slip=driving.slip, friction=driving.friction)
-    feedback = estimated_input_feedback(
-        m=vehicle.mass, I_z=vehicle.yaw_inertia, l_f=vehicle.l_f, l_r=vehicle.l_r,
-        stiffness_lost=(vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear),
-        v_x=(1.0 - SPEED_SPREAD) * driving.v_x,
-    )  # fmt: skip
+    feedback = estimated_input_feedback(vehicle.bicycle, (1.0 - SPEED_SPREAD) * driving.v_x)
     estimated = design.input_source == "estimated"
     return Operation(
         n_h=design.network.hidden,
@@ -410,12 +405,4 @@ TABLES = ("gains", "network", "driving")
 
 
 def _line(record: Any, name: str) -> str:
-    return f"{name} = {_toml(getattr(record, name))}  # {COMMENTS[name]}"
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, tuple):
-        return f"[{', '.join(_toml(item) for item in value)}]"
-    if isinstance(value, float):
-        return "inf" if math.isinf(value) else repr(float(value))
-    return json.dumps(value)
+    return f"{name} = {toml_value(getattr(record, name))}  # {COMMENTS[name]}"

@@ -64,7 +64,7 @@ def gains_for(law: Law, known: Operation) -> Gains:
     eta_V = eta_W / (known.x_bar_max * bounds.W) ** 2
     if memory > 0.0:
         eta_V = min(eta_V, 0.5 * known.V_start / memory)
-    unit = replace(learning, drive=eta_V * driven, leakage=1.0, dt=0.0)
+    unit = learning._replace(drive=eta_V * driven, leakage=1.0, dt=0.0)
     by_memory = unit.kept(bounds.X) - unit.kept(0.0)
     rho_V = unit.kept(0.0) / (known.V_start - by_memory)
     return replace(free, eta_V=eta_V, rho_V=rho_V, lead=lead)

@@ -8,8 +8,7 @@ Outputs: the next carried values; f_hat (2,) [U], the network's force; axle_forc
 tire and network together; xi_tilde (2,) [U s].
 """
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 
@@ -44,8 +43,7 @@ OVER = ("x", "u", "v_x")
 GAINS = ("eta_W", "eta_V", "rho_W", "rho_V", "forgetting", "lead")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Structure:
+class Structure(NamedTuple):
     """What the step is built from; all numbers stay inputs of it.
     input_source : where the network reads the state.
     """

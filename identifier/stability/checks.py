@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -25,15 +26,13 @@ def dynamics_checks(gains: Gains, operation: Operation) -> list[Property]:
     """A_d and λ: stable as they are sampled, resolved by the step, faster than the x_hat loop.
     gains : of (8) to (12).
     """
-    import control  # takes a second to import, so only where it is needed
-
-    A_d, dt, eye = gains.matrix, operation.dt, np.eye(2)
+    A_d, dt = gains.matrix, operation.dt
     # of ξ̃' = A_d ξ̃ + (f - f_hat)
-    poles = np.asarray(control.poles(control.ss(A_d, eye, eye, np.zeros((2, 2)))))
+    poles = np.linalg.eigvals(A_d)
     step = float(np.abs(poles).max()) * dt
     sampled = np.abs(1.0 + poles * dt)
     slowest = -math.log(float(sampled.max())) / dt
-    lyapunov(A_d, eye)  # raises where P does not solve its equation
+    lyapunov(A_d, np.eye(2))  # raises where P does not solve its equation
     finer = f"slow A_d down or sample every {1e3 * dt * _LARGEST_STEP / step:.3g} ms"
     title = "fastest pole of A_d times the sampling interval"
     sampling = Property.judged("sampling", title, step, "-", limit=_LARGEST_STEP, advice=finer)
@@ -206,15 +205,9 @@ def bound_checks(
     if not operation.resolves(A_d):
         return []  # sampled like this, nothing is bounded
     trivial = trivial_bound(A_d, operation.disturbance.residual)
-    theta = small_gain(
-        A_d,
-        law=law,
-        forgetting=gains.forgetting,
-        eta_W=gains.eta_W,
-        n_h=operation.n_h,
-        dt=operation.dt,
-        direction=direction,
-    )
+    known: Any = {"law": law, "forgetting": gains.forgetting, "eta_W": gains.eta_W}
+    known |= {"n_h": operation.n_h, "direction": direction}
+    theta = small_gain(A_d, dt=operation.dt, **known)
     fewer = "" if theta < 1.0 else f"multiply eta_W by {0.9 / theta:.2g}"
     title = "theta: below 1 error and weights are proven bounded"
     entries = [
@@ -227,7 +220,8 @@ def bound_checks(
         _leakage("leakage_step_V", "V", proven.leakage_step_V, gains.rho_V),
     ]
     if gains.rho_W > 0.0:
-        entries.append(_capacity(gains, law, operation, direction))
+        capacity = steady_capacity(rho_W=gains.rho_W, **known)
+        entries.append(_capacity(capacity, gains.rho_W, operation.needed_force))
         entries += printed_bounds(gains, law, operation, trivial)
     return entries
 
@@ -262,13 +256,8 @@ def _leakage(name: str, layer: str, step: float, rho: float) -> Property:
     return Property.judged(name, title, step, "-", limit=1.0, bad=2.0, advice=advice)
 
 
-def _capacity(gains: Gains, law: DrivingError, operation: Operation, direction: Array) -> Property:
+def _capacity(capacity: float, rho_W: float, need: float) -> Property:
     """Judge the force that leakage lets W hold."""
-    capacity = steady_capacity(
-        direction, law=law, forgetting=gains.forgetting, eta_W=gains.eta_W, rho_W=gains.rho_W,
-        n_h=operation.n_h,
-    )  # fmt: skip
-    need = operation.needed_force
-    advice = f"rho_W below {gains.rho_W * capacity / need:.3g}" if capacity < need else ""
+    advice = f"rho_W below {rho_W * capacity / need:.3g}" if capacity < need else ""
     title = "largest steady force of the network with this leakage"
     return Property.judged("capacity", title, capacity, "U", limit=need, least=True, advice=advice)

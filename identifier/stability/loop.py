@@ -14,7 +14,7 @@ time and the sampled loop share one eigenvalue computation.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -37,8 +37,7 @@ def direction_matrix(law: Law, A_d: ArrayLike) -> Array:
     return found
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Loop:
+class Loop(NamedTuple):
     """The loop at one frozen regressor.
     A_d : (2, 2) error dynamics [1/s].   forgetting : λ of (9) and (10) [1/s].
     law : coefficients of z and ξ̃ in the driving error.
@@ -74,7 +73,7 @@ class Loop:
         """Return the same loop with eta_W and eta_V multiplied by the factor.
         factor : multiplier of the loop gain [-].
         """
-        return replace(self, G=factor * self.G)
+        return self._replace(G=factor * self.G)
 
 
 def scaled_matrices(loop: Loop, factors: ArrayLike) -> ComplexArray:

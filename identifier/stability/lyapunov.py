@@ -4,8 +4,8 @@ A_d: (2, 2) error dynamics [1/s].   P, Q: symmetric positive definite, A_dᵀ P 
 γ = ∫₀^∞ |exp(A_d t)| dt: the largest |xi_tilde| that a unit force error can hold [s].
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,8 +18,7 @@ class LyapunovError(TireidError, ValueError):
     """P does not solve the Lyapunov equation, or Q or P is not positive definite."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LyapunovPair:
+class LyapunovPair(NamedTuple):
     """P and Q of A_dᵀ P + P A_d = -Q.
     A_d : (2, 2) error dynamics [1/s].   P : (2, 2) solution [s, for Q without unit].
     Q : (2, 2) right-hand side [-].

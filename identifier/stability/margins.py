@@ -11,7 +11,7 @@ forgetting : λ [1/s].   direction : (2, 2) D, None for -A_d⁻ᵀ.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,8 +30,7 @@ _LARGEST_FACTOR = 1e6  # of gains at which a margin is looked for, either way
 _AT_ONCE = 150  # points of a grid whose eigenvalues are found together
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _GainMargin:
+class _GainMargin(NamedTuple):
     """Where the loop turns unstable.
     factor : multiplier of the loop gain [-]; inf if none up to 1e6, 0 if unstable without gain.
     frequency : of the oscillation at the margin [rad/s]; nan if there is no margin to reach.

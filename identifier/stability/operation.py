@@ -8,11 +8,11 @@ friction : μ [-].
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
 from identifier.driving import SPEED_SPREAD, YAW_OVERSHOOT, Driving
@@ -25,7 +25,7 @@ from identifier.stability.sampled_bound import (
     error_gains,
     output_layer,
 )
-from models.bicycle import bicycle
+from models.bicycle import BicycleParameters, bicycle
 from models.vehicle import GRAVITY, Vehicle
 
 
@@ -59,8 +59,7 @@ class Operation:
         return bool(np.abs(1.0 + self.dt * np.linalg.eigvals(A_d)).max() < 1.0)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Proven:
+class Proven(NamedTuple):
     """What is proven of a design; None and inf where nothing is.
     leakage : bounds that the leakage gives.   V : bound on |V_hat| [-].
     leakage_step : largest share of W that one sample leaks, ρ_W dt |ξ̃|; an estimate where no bound
@@ -90,13 +89,13 @@ def proven_bounds(
     leakage = by_leakage(error, learning, A_d, acting, n_h)
     if leakage is None:  # |ξ̃| is estimated: leakage of small steps, in continuous time
         V = math.inf
-        smooth = by_leakage(error, replace(learning, dt=0.0), A_d, acting, n_h)
+        smooth = by_leakage(error, learning._replace(dt=0.0), A_d, acting, n_h)
         X = error.force * acting.residual if smooth is None else smooth.X
     else:
         X = leakage.X
         x_bar = operation.x_bar_max + operation.input_per_error * X
         drive = gains.eta_V * float(np.linalg.norm(direction, 2)) * leakage.W * x_bar
-        kept = replace(learning, leakage=gains.rho_V, drive=drive).kept(X)
+        kept = learning._replace(leakage=gains.rho_V, drive=drive).kept(X)
         idle = drive == 0.0 and gains.rho_V == 0.0
         V = operation.V_start if idle else max(operation.V_start, kept)
     return Proven(
@@ -141,18 +140,14 @@ def worst_loop(
 # F' = 0. (8)c prints x_hat; x is measured, so that reading x costs nothing and has no such limit.
 
 
-def estimated_input_feedback(
-    *, m: float, I_z: float, l_f: float, l_r: float, stiffness_lost: ArrayLike, v_x: float
-) -> Array:
+def estimated_input_feedback(lost: BicycleParameters, v_x: float) -> Array:
     """J_f K = diag(C - F') N / v_x [1/s], (2, 2): what reading x_hat adds to A_d.
-    stiffness_lost : (2,) C - F' of front and rear axle [N/rad]; C itself at full saturation.
+    lost : its stiffness is C - F' of front and rear axle [N/rad]; C itself at full saturation.
     """
-    lost = np.asarray(stiffness_lost, dtype=np.float64)
-    if lost.shape != (2,) or not np.all(np.isfinite(lost)):
-        raise ValueError(f"stiffness_lost must be two numbers, it is {lost.tolist()}")
+    m, I_z, l_f, l_r, *stiffness = lost
     K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
     slip = np.array([[1.0, l_f], [1.0, -l_r]])
-    feedback: Array = np.diag(lost) @ (slip @ K) / v_x
+    feedback: Array = np.diag(stiffness) @ (slip @ K) / v_x
     return feedback
 
 

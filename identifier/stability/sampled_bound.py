@@ -13,7 +13,7 @@ that were learnt within the declared conditions may be resumed.
 """
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,7 @@ from identifier.paper.laws import DrivingError, Gains
 from identifier.stability.lyapunov import power_norms
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Disturbance:
+class Disturbance(NamedTuple):
     """What acts on the error dynamics from outside, on every declared drive.
     residual : sup|f|, the force the linear tire misses as the samples show it, with what sensors
         add to A_ξ ξ + B_ξ u [U].
@@ -37,8 +36,7 @@ class Disturbance:
 _NEWTON_STEPS = 100
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SampledBounds:
+class SampledBounds(NamedTuple):
     """What the state of the running identifier never exceeds.
     xi_tilde : bound on |ξ̃| [U s].   X : the one from which that of W follows, hardly larger [U s].
     W : bound on |W_hat| [U].
@@ -49,8 +47,7 @@ class SampledBounds:
     W: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ErrorGains:
+class ErrorGains(NamedTuple):
     """How large an error what acts on it can hold.
     start : τ, largest growth of an error that is left alone [-].   force : γ of a force [s], that
         of `peak_gain` for A_d = -a I, a dt <= 1.
@@ -69,8 +66,7 @@ def error_gains(A_d: Array, dt: float) -> ErrorGains:
     return ErrorGains(start=start, force=dt * gamma)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Learning:
+class Learning(NamedTuple):
     """How the weights of one layer are driven and leak.
     law : coefficients of z and ξ̃ in the driving error.   forgetting : λ [1/s].
     leakage : ρ [1/(U s²)].   drive : g', what |driving error| moves the weights by.

@@ -14,7 +14,7 @@ import numpy as np
 from models.sensors import is_measured
 from mpc.cars import CarState, DoubleTrackCar
 from mpc.loop.lateral import LateralVelocity
-from mpc.loop.record import Drive, Recorder
+from mpc.loop.record import COMPLETED, Drive, Recorder
 from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
 from mpc.path.path import Path, Projection
 from mpc.realtime.instance import Measurement
@@ -23,7 +23,6 @@ from mpc.realtime.tracker import Tracker
 _SPUN = math.radians(45.0)  # side slip of the center of gravity [rad]
 _SLOWEST = 1.0  # m/s
 
-COMPLETED = "reached the end"
 GUIDES = ("X", "Y", "psi", "v_x")  # without which a car does not know where it is, for long
 
 
@@ -122,14 +121,7 @@ def drive(
         if progress is not None:
             progress(min(here.s / goal, 1.0))
         ending = _ending(state, here, goal, widest, time_limit) or place.complaint(blind)
-    return record.drive(
-        name=name or path.name,
-        vehicle=car.vehicle,
-        path=path,
-        period=car.period,
-        completed=ending == COMPLETED,
-        ending=ending,
-    )
+    return record.drive(name or path.name, path, car, ending)
 
 
 class _Place(NamedTuple):

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from models.recordings import Recording
 from models.vehicle import Vehicle
-from mpc.cars import CarState
+from mpc.cars import CarState, DoubleTrackCar
 from mpc.loop.lateral import LateralEstimate
 from mpc.loop.sensing import Measured
 from mpc.path.path import Path, Projection
 from mpc.realtime.instance import Command, Status
+
+COMPLETED = "reached the end"
 
 
 class Plan(NamedTuple):
@@ -176,16 +178,7 @@ class Recorder:
             )
         )
 
-    def drive(
-        self,
-        *,
-        name: str,
-        vehicle: Vehicle,
-        path: Path,
-        period: float,
-        completed: bool,
-        ending: str,
-    ) -> Drive:
+    def drive(self, name: str, path: Path, car: DoubleTrackCar, ending: str) -> Drive:
         """Return the drive; its control period is given in s."""
         others = dict(zip(_OTHERS, np.array(self._others).T, strict=True))
         measured = dict(zip(Measured._fields, np.array(self._measured).T, strict=True))
@@ -195,9 +188,9 @@ class Recorder:
             del measured["v_y"]
         return Drive(
             name=name,
-            vehicle=vehicle,
+            vehicle=car.vehicle,
             path=path,
-            period=period,
+            period=car.period,
             **{key: np.array([getattr(car, key) for car in self._cars]) for key in _OF_THE_CAR},
             status=others.pop("status").astype(np.int64),
             **others,
@@ -205,7 +198,7 @@ class Recorder:
             estimates=given,
             plans=tuple(self._plans),
             notes=tuple(self._notes),
-            completed=completed,
+            completed=ending == COMPLETED,
             ending=ending,
         )
 
@@ -224,10 +217,6 @@ class Scores(NamedTuple):
     completed: bool
     failures: Mapping[str, int]
     solve_ms: Mapping[str, float]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain numbers and words."""
-        return {**self._asdict(), "failures": dict(self.failures), "solve_ms": dict(self.solve_ms)}
 
 
 def scores(drive: Drive) -> Scores:

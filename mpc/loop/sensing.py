@@ -234,10 +234,10 @@ class SpeedProfile:
         gain : of the driver [1/s].
         """
         error, fades = v_x - float(self.at(s)), np.exp(-gain * t)
-        there = self._place(self._time(s) + t) + error * (1.0 - fades) / gain
+        there = self._place(self.time_at(s) + t) + error * (1.0 - fades) / gain
         return _Preview(there, self.path.curvature(there), self.at(there) + error * fades)
 
-    def _time(self, s: float) -> float:
+    def time_at(self, s: float) -> float:
         """Return the time at which a car at the wanted speed is at s, laps included."""
         if self.path.closed:
             laps, within = divmod(s, self.path.length)
@@ -247,7 +247,7 @@ class SpeedProfile:
         return float(np.interp(s, self.path.s, self._t)) + min(s, 0.0) / float(self.v[0])
 
     def _place(self, t: Array) -> Array:
-        """Return where a car at the wanted speed is, laps included: the inverse of `_time`."""
+        """Return where a car at the wanted speed is, laps included: the inverse of `time_at`."""
         if self.path.closed:
             laps = np.floor(t / self.lap_time)
             within = np.interp(t - laps * self.lap_time, self._t, self.path.s)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from mpc.tires.tire import DOUBT_STEP, Car, Point, PredictionTire, curve_slopes
+from mpc.tires.tire import DOUBT_STEP, PredictionTire, curve_slopes
 
 N_GRIPS = 9  # frictions that are possible
 _LEAST_GRIP = 0.25  # of the friction that a tire was learnt on: ice, after a dry road
@@ -31,7 +31,7 @@ def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> N
             f"caution must be 0 for a car with downforce, whose bands are of static loads, it is "
             f"{caution:g}"
         )
-    can = _offers_friction(tire)
+    can = tire.structure.at_friction(tire.weights, 1.0) is not None
     params["caution"] = caution
     params["grips"] = GRIPS if can else 1.0
     params["surprise"] = SURPRISE
@@ -39,8 +39,3 @@ def set_caution(params: NDArray[Any], tire: PredictionTire, caution: float) -> N
     params["force_error"] = _FORCE_ERROR * np.array(tire.vehicle.axle_loads)
     params["stiffness"] = np.maximum(curve_slopes(tire)[0, 0], 0.1 * params["force_error"][0])
     params["prior"] = np.where(GRIPS < 1.0, SURPRISE, 0.0) if can else 0.0
-
-
-def _offers_friction(tire: PredictionTire) -> bool:
-    numbers = Car(*tire.car)
-    return tire.structure.similar(Point(0.0, 0.0, 0.0, 1.0, numbers, tire.weights), 1.0) is not None

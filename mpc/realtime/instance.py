@@ -11,12 +11,11 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from codegen import load_library
 from codegen.arrays import Array
-from codegen.compiler import keep, kept, wide_vectors
-from codegen.errors import TireidError
+from codegen.compiler import NoCompilerError, keep, kept, wide_vectors
 from mpc.prediction import state_size
 from mpc.problem import Guards, Problem
 from mpc.realtime.c_source import C, c_sizes, c_sources, python_file
@@ -160,10 +159,6 @@ FLAGS = (
 )  # fmt: skip
 
 
-class NoCompilerError(TireidError, RuntimeError):
-    """There is no C compiler to build the tracker with."""
-
-
 class Instance:
     """State, parameters, input and work memory, which the C reads and writes in place."""
 
@@ -214,15 +209,6 @@ class Instance:
         state = self.state
         x, u = state["x"].astype(np.float64), state["u"].astype(np.float64)
         return Command(steering, status, x, u, elapsed, int(state["iterations"]))
-
-    def shift(self) -> None:
-        """Move the plan ahead by a period."""
-        self._library.mpc_shift(*self._step[:2])
-
-    def guess(self, x0: ArrayLike) -> None:
-        """Set the plan to one without a solution.   x0 : state at its beginning (n_x,)."""
-        self.start[:] = x0
-        self._library.mpc_guess(*self._step[:2], *self.solve_arguments[3:])
 
     def reset(self, steering: float) -> Status:
         """Begin anew, with the faults kept.   steering : angle of the wheels [rad]."""

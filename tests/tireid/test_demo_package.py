@@ -32,13 +32,13 @@ def whole(story, quick, tmp_path_factory):
 def test_it_compiles_passes_and_computes_what_python_computes(whole):
     shipped, folder = whole
     double, single = shipped.checks
-    assert (double.precision, single.precision) == ("double", "float")
-    assert double.verdict.verdict == single.verdict.verdict == "passed"
-    assert double.difference < 1e-5 < single.difference < 1.0
-    assert double.refused == single.refused == 0
-    assert shipped.exported.package.about["hash"] in double.verdict.version
+    assert double.startswith("double ") and single.startswith("float ")
+    off = [float(one.partition("within ")[2].split()[0]) for one in (double, single)]
+    assert off[0] < 1e-5 < off[1] < 1.0
     assert (folder / "README.md").is_file()
-    assert "self-test passed" in shipped_text(shipped)
+    for one in (double, single):
+        assert "self-test passed" in one and one.endswith(", 0 samples refused")
+        assert one in shipped_text(shipped)
     assert "passed" in str(package_section(shipped))
 
 

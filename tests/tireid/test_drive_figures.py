@@ -216,7 +216,7 @@ def test_the_film_shows_force_over_slip_up_to_now_of_each_axle():
 
 
 def test_the_true_curve_of_a_film_is_that_of_the_road_that_the_car_is_on():
-    later = replace(CURVES[2], label="oracle at the end", force=0.5 * CURVES[2].force)
+    later = CURVES[2]._replace(label="oracle at the end", force=0.5 * CURVES[2].force)
     hindsight = replace(CURVES[0], label="frozen at the end", force=9.0 * CURVES[0].force)
     for t, share in ((1.0, 1.0), (5.0, 0.5)):
         axes = picture(t, ON_LANE, [*CURVES, later, hindsight], [(60.0, 0.5)])[0]

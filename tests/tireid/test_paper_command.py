@@ -156,7 +156,7 @@ def test_figures_say_the_errors_of_the_tables(study, tmp_path, monkeypatch):
 def test_a_law_that_diverges_is_counted_and_does_not_stop_the_command(study, tmp_path, laid_out):
     slalom = study.errors["slalom"]
     some = {**slalom, "instantaneous": ({},) * 20, "integral": ({}, *slalom["integral"][1:])}
-    wild = replace(study, errors={"slalom": some})
+    wild = study._replace(errors={"slalom": some})
     write_study(tmp_path, wild)
     lost = json_of(tmp_path / "diverged.json")
     assert lost == {"slalom": {"instantaneous": 20, "integral": 1, "instantaneous_scaled": 0}}

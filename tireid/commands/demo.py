@@ -32,7 +32,6 @@ from tireid.driving.results import SCORES, Drives, headline, known_blocks, score
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.exporting import Exported, export, self_test
-from tireid.exporting import Verdict as SelfTest
 from tireid.figures.film import FORMATS
 from tireid.figures.paper import SCHEME
 from tireid.output import output_folder
@@ -156,51 +155,35 @@ NOT_BUILT = (
 )
 
 
-class _Check(NamedTuple):
-    """A build of the package on this machine.
-
-    precision : float or double.   verdict : of its self-test.   difference : largest of a force
-    from the one that Python computes over the slalom [N].   refused, samples : of the slalom.
-    """
-
-    precision: str
-    verdict: SelfTest
-    difference: float
-    refused: int
-    samples: int
-
-
 class Shipped(NamedTuple):
     """What was exported, and its builds here: none without a compiler."""
 
     exported: Exported
-    checks: Sequence[_Check]
+    checks: Sequence[str]
 
 
 def ship(story: Story, folder: Path) -> Shipped:
     """Export what the axle identifier learnt, as `tireid export` does, compile it and test it."""
     learnt, model = story.axle.runs[0], story.axle.model
     exported = export(learnt.method, folder, start=model, vehicle=story.car)
-    name, checks = exported.package.specialized.name, list[_Check]()
+    name, checks = exported.package.specialized.name, list[str]()
     if find_compiler() is not None:
         expected = identify(learnt.recording, story.car, learnt.method, model).axle_force
         for precision, single in (("double", False), ("float", True)):
             verdict = self_test(folder, name, single=single)
             assert verdict is not None
             run = CompiledPackage.from_folder(folder, single=single).run(learnt.recording)
-            difference = float(np.abs(run.axle_force - expected).max())
-            refused = int(np.count_nonzero(run.status))
-            checks.append(_Check(precision, verdict, difference, refused, len(run.status)))
+            difference = np.abs(run.axle_force - expected).max()
+            checks.append(
+                f"{precision:8} self-test {verdict.verdict}; over the slalom within "
+                f"{difference:.2g} N of Python, {np.count_nonzero(run.status)} samples refused"
+            )
     return Shipped(exported, checks)
 
 
 def shipped_text(shipped: Shipped) -> str:
     lines = [f"As a C package ({FOLDER}/, hash {shipped.exported.package.about['hash']}):"]
-    lines += [
-        f"  {check.precision:8} self-test {check.verdict.verdict}; over the slalom within "
-        f"{check.difference:.2g} N of Python, {check.refused} samples refused"
-        for check in shipped.checks
-    ] or [f"  {NOT_BUILT}"]
+    lines += [f"  {check}" for check in shipped.checks or [NOT_BUILT]]
     costs = [one for one in shipped.exported.costs if one.single]
     lines += [f"  {one.processor}, {one.precision}: {one.words}" for one in costs]
     return "\n".join(lines)

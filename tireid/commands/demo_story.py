@@ -4,7 +4,8 @@ It learns while it drives: with the axle identifier, the default in a car, and w
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -54,8 +55,7 @@ DRIVES: Mapping[str, tuple[Maneuver, float]] = {
 }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Story:
+class Story(NamedTuple):
     """The demo's drives, learnt by the axle identifier and by the paper's beside it."""
 
     car: Vehicle

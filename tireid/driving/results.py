@@ -191,7 +191,7 @@ def _scores(run: ClosedLoop) -> dict[str, Any]:
     notes = [{"t_s": t, "note": text} for t, text in run.drive.notes]
     given = estimate_scores(run.drive)
     lateral = {} if given is None else {"lateral_velocity": given._asdict()}
-    return {**run.scores.to_dict(), **lateral, "ending": run.drive.ending, "notes": notes}
+    return {**run.scores._asdict(), **lateral, "ending": run.drive.ending, "notes": notes}
 
 
 _COLUMNS_ESTIMATED = {

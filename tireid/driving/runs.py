@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from codegen import find_compiler
+from codegen.compiler import NoCompilerError
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.model import begun
 from identifier.inertial import InertialIdentifier
@@ -31,7 +32,7 @@ from mpc.loop.sensing import (
 )
 from mpc.path import Path
 from mpc.problem import Problem
-from mpc.realtime import NoCompilerError, Tracker
+from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
 from tireid.driving.known import Known, Witness
 from tireid.driving.setup import PERIOD, WIDEST, Setup, SpeedWish

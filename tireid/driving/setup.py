@@ -4,7 +4,6 @@ Grip is that of the true tire in steady cornering on the friction of the start.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple
 
@@ -38,8 +37,7 @@ class SpeedWish(NamedTuple):
     speed: float | None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Setup:
+class Setup(NamedTuple):
     """A car at the start of a path.
 
     Parameters
@@ -119,8 +117,4 @@ class Setup:
 
         s : arc length [m]; a closed course counts laps.
         """
-        v = self.speeds()
-        pace = 0.5 * (1.0 / v[1:] + 1.0 / v[:-1]) * np.diff(self.path.s)
-        t = np.concatenate([[0.0], np.cumsum(pace)])
-        laps, within = divmod(s, self.path.length) if self.path.closed else (0.0, s)
-        return float(laps * t[-1] + np.interp(within, self.path.s, t))
+        return self.profile().time_at(s)

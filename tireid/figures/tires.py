@@ -1,8 +1,7 @@
 """Axle force against slip angle: the shape of the tire, as measured and as learnt."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -116,8 +115,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TireCurve:
+class TireCurve(NamedTuple):
     """Steady axle forces over slip, one curve an axle.
 
     alpha : slip in the paper's sign [rad], (k,).

@@ -8,13 +8,12 @@ from models.bicycle import BicycleParameters, bicycle, slip_angles
 
 CAR = {"m": 1500.0, "I_z": 2500.0, "l_f": 1.15, "l_r": 1.55}
 STIFFNESS = (127700.0, 106000.0)
-
-
-SATURATED = estimated_input_feedback(**CAR, stiffness_lost=STIFFNESS, v_x=20.0)
+FULL = BicycleParameters(*CAR.values(), *STIFFNESS)
+SATURATED = estimated_input_feedback(FULL, 20.0)
 
 
 def test_the_feedback_is_the_jacobian_of_what_the_linear_tire_misses():
-    p = BicycleParameters(**CAR, C_f=STIFFNESS[0], C_r=STIFFNESS[1])
+    p = FULL
     x, v_x = ca.SX.sym("x", 2), 20.0
     alpha = slip_angles(p.l_f, p.l_r, v_x, x, ca.DM([0.02, 0.0]))
     C = ca.vertcat(p.C_f, p.C_r)
@@ -25,13 +24,13 @@ def test_the_feedback_is_the_jacobian_of_what_the_linear_tire_misses():
     lost = C * ca.tanh(C * alpha / peak) ** 2  # C - F'
     lost_at = np.array(ca.Function("lost", [x], [lost])(at)).ravel()
     K = np.array(ca.DM(bicycle(p, v_x).K))
-    found = estimated_input_feedback(**CAR, stiffness_lost=lost_at, v_x=v_x)
+    found = estimated_input_feedback(BicycleParameters(*CAR.values(), *lost_at), v_x)
     np.testing.assert_allclose(found, J_f @ K, rtol=1e-10)
     assert not np.allclose(found, J_f @ K.T, rtol=1e-2)  # (6) prints the transpose
 
 
 def test_the_coupling_is_symmetric_and_positive_so_that_the_decay_it_takes_is_a_real_eigenvalue():
-    N = estimated_input_feedback(**CAR, stiffness_lost=(1.0, 1.0), v_x=1.0)
+    N = estimated_input_feedback(BicycleParameters(*CAR.values(), 1.0, 1.0), 1.0)
     np.testing.assert_allclose(N, N.T)
     assert np.linalg.eigvalsh(N)[0] > 0.0
     assert np.abs(np.linalg.eigvals(SATURATED).imag).max() == 0.0

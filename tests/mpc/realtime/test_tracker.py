@@ -61,7 +61,7 @@ def test_a_shifted_plan_is_the_plan_of_a_period_later(tracker, problem, rng):
     before = {name: rng.normal(size=state[name].shape) for name in ("x", "u", "feedback")}
     for name, values in before.items():
         state[name] = values
-    tracker.instance.shift()
+    tracker.instance._library.mpc_shift(*tracker.instance._step[:2])
     for name, values in before.items():
         nodes = np.arange(len(values))
         columns = values.reshape(len(values), -1).T
