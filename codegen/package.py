@@ -11,6 +11,7 @@ import json
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -296,3 +297,17 @@ def _tireid_version() -> str:
         return version("tireid")
     except PackageNotFoundError:  # run from a checkout that is not installed
         return "unknown"
+
+
+PACKAGES = ("codegen", "models", "identifier", "mpc")  # what results and generated C follow from
+
+
+@cache
+def source_digest() -> str:
+    """Return a hash of the source text and versions that results and generated C follow from."""
+    digest = hashlib.sha256(f"{ca.CasadiMeta.version()} {np.__version__}".encode())
+    for package in PACKAGES:
+        for path in sorted((Path(__file__).parents[1] / package).rglob("*")):
+            if path.suffix in (".py", ".c", ".h"):
+                digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -14,7 +14,8 @@ from functools import partial
 from typing import Any
 
 from codegen.errors import TireidError
-from identifier.compare.work import Map, source_digest
+from codegen.package import source_digest
+from identifier.compare.work import Map
 from models.extras import needs
 from tireid.progress import say
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
+from identifier.axle.car import step_function, symbols
 from identifier.frozen import FORMAT, require_min_speed, vehicle_from, vehicle_numbers
 from identifier.method import Method, require_fresh
 from identifier.setup import Setup
@@ -23,17 +24,11 @@ from models.vehicle import Vehicle
 @cache
 def _scan() -> Scan:
     """Return F = C α of (3) as a step that carries nothing; at rest 0."""
-    vehicle, sampling = ca.SX.sym("vehicle", 6), ca.SX.sym("sampling", 2)
-    x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")
-    parameters, slowest = BicycleParameters(*ca.vertsplit(vehicle)), sampling[1]
-    force = linear_axle_force(parameters, ca.fmax(v_x, slowest), x, u)
-    step = ca.Function(
-        "frozen_linear",
-        [x, u, v_x, vehicle, sampling],
-        [ca.if_else(v_x >= slowest, force, 0)],
-        ["x", "u", "v_x", "vehicle", "sampling"],
-        ["axle_force"],
-    )
+    ports, s = symbols(x=2, u=2, v_x=1, vehicle=BicycleParameters, sampling=2)
+    slowest = s.sampling[1]
+    force = linear_axle_force(s.vehicle, ca.fmax(s.v_x, slowest), s.x, s.u)
+    moving = ca.if_else(s.v_x >= slowest, force, 0)
+    step = step_function("frozen_linear", ports, {}, {"axle_force": moving})
     return Scan(step, carry=(), over=("x", "u", "v_x"))
 
 

@@ -1,17 +1,11 @@
 """Work that is spread over processes, or over machines whose source text is the same."""
 
-import hashlib
 import multiprocessing
 import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
-from functools import cache
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 Map = Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]
 
@@ -61,18 +55,3 @@ def _end_with_parent() -> None:
     if parent is not None:
         parent.join()
         os._exit(1)
-
-
-ROOT = Path(__file__).resolve().parents[2]
-PACKAGES = ("codegen", "models", "identifier")
-
-
-@cache
-def source_digest() -> str:
-    """Return a hash of the source text and the versions that results follow from."""
-    digest = hashlib.sha256(f"{version('casadi')} {np.__version__}".encode())
-    for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            digest.update(f"\0{path.relative_to(ROOT)}\0".encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()

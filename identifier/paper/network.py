@@ -15,6 +15,7 @@ import numpy as np
 from codegen import Scan
 from codegen.arrays import Array
 from codegen.elementary import tanh
+from identifier.axle.car import step_function, symbols
 from identifier.driving import REFERENCE_WHEELBASE
 from identifier.frozen import (
     FORMAT,
@@ -136,48 +137,33 @@ def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> 
 # The paper's network, frozen: weights at one instant and all that axle forces need.
 
 
-def _build_frozen(network: Network) -> ca.Function:
-    """Return the frozen model as a function of weights, state and steering.
+@cache
+def _frozen(network: Network) -> tuple[ca.Function, dict[str, Any]]:
+    """Return axle_force (2,) [N] as a function of weights, state and steering, and its ports.
 
     Ports: W (2, n_h) and V (n_h, n_in); x = [v_y, r], u = [δ_f, δ_r], v_x, SI; vehicle (6,) = m,
-    I_z, l_f, l_r, C_f, C_r; force_unit [N]. Results: f_hat (2,) in the force unit and axle_force
-    (2,) [N].
+    I_z, l_f, l_r, C_f, C_r; force_unit [N].
     """
     n_h, n_in = network.hidden, len(network.inputs)
-    W, V = ca.SX.sym("W", 2, n_h), ca.SX.sym("V", n_h, n_in)
-    x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")
-    vehicle, unit = ca.SX.sym("vehicle", 6), ca.SX.sym("force_unit")
-    parameters = BicycleParameters(*ca.vertsplit(vehicle))
-    x_bar = network.normalized_input(network_signals(parameters, v_x, x, u))
-    f_hat = W @ hidden_layer(V, x_bar)
-    return ca.Function(
-        "frozen_network",
-        [W, V, x, u, v_x, vehicle, unit],
-        [f_hat, linear_axle_force(parameters, v_x, x, u) + unit * f_hat],
-        ["W", "V", "x", "u", "v_x", "vehicle", "force_unit"],
-        ["f_hat", "axle_force"],
+    ports, s = symbols(
+        W=(2, n_h), V=(n_h, n_in), x=2, u=2, v_x=1, vehicle=BicycleParameters, force_unit=1
     )
-
-
-def _build_replay(network: Network) -> ca.Function:
-    """Return the frozen model as it is replayed: no force below min_speed [m/s], a further port."""
-    frozen = _build_frozen(network)
-    ports = {name: ca.SX.sym(name, *frozen.size_in(name)) for name in frozen.name_in()}
-    min_speed, v_x = ca.SX.sym("min_speed"), ports["v_x"]
-    read = {**ports, "v_x": ca.fmax(v_x, min_speed)}
-    force = frozen(*read.values())[1]
-    return ca.Function(
-        "replayed_network",
-        [*ports.values(), min_speed],
-        [ca.if_else(v_x >= min_speed, force, 0)],
-        [*ports, "min_speed"],
-        ["axle_force"],
-    )
+    x_bar = network.normalized_input(network_signals(s.vehicle, s.v_x, s.x, s.u))
+    force = linear_axle_force(s.vehicle, s.v_x, s.x, s.u)
+    force = force + s.force_unit * (s.W @ hidden_layer(s.V, x_bar))
+    return step_function("frozen_network", ports, {}, {"axle_force": force}), ports
 
 
 @cache
 def _replay_scan(network: Network) -> Scan:
-    return Scan(_build_replay(network), carry=(), over=("x", "u", "v_x"))
+    """Return the frozen model as it is replayed: no force below min_speed [m/s], a further port."""
+    frozen, ports = _frozen(network)
+    min_speed, v_x = ca.SX.sym("min_speed"), ports["v_x"]
+    force = frozen(*(ports | {"v_x": ca.fmax(v_x, min_speed)}).values())
+    ports = ports | {"min_speed": min_speed}
+    moving = ca.if_else(v_x >= min_speed, force, 0)
+    step = step_function("replayed_network", ports, {}, {"axle_force": moving})
+    return Scan(step, carry=(), over=("x", "u", "v_x"))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -230,7 +216,7 @@ class NetworkModel(StaticModel):
         W, V = self.weights
         vehicle, unit = self.vehicle.bicycle, self.force_unit
         u = ca.vertcat(delta, 0)
-        return _build_frozen(self.network)(W, V, x, u, v_x, ca.vertcat(*vehicle), unit)[1]
+        return _frozen(self.network)[0](W, V, x, u, v_x, ca.vertcat(*vehicle), unit)
 
     def to_dict(self) -> dict[str, Any]:
         return {

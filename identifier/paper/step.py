@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 
+from identifier.axle.car import step_function, symbols
 from identifier.paper.laws import (
     INPUT_SOURCES,
     LAWS,
@@ -72,13 +73,21 @@ def build_step(structure: Structure) -> ca.Function:
     """Return the step; vehicle, gains and sampling stay inputs of it."""
     network = structure.network
     n_h, n_in = network.hidden, len(network.inputs)
-    xi_hat, z = ca.SX.sym("xi_hat", 2), ca.SX.sym("z", 2)
-    W, V = ca.SX.sym("W", 2, n_h), ca.SX.sym("V", n_h, n_in)
-    x, u, v_x = ca.SX.sym("x", 2), ca.SX.sym("u", 2), ca.SX.sym("v_x")
-    vehicle, A_d = ca.SX.sym("vehicle", 6), ca.SX.sym("A_d", 2, 2)
-    gains, sampling = ca.SX.sym("gains", len(GAINS)), ca.SX.sym("sampling", 3)
-
-    parameters = BicycleParameters(*ca.vertsplit(vehicle))
+    ports, s = symbols(
+        xi_hat=2,
+        z=2,
+        W=(2, n_h),
+        V=(n_h, n_in),
+        x=2,
+        u=2,
+        v_x=1,
+        vehicle=BicycleParameters,
+        A_d=(2, 2),
+        gains=len(GAINS),
+        sampling=3,
+    )
+    xi_hat, z, W, V, x, u, v_x, _, A_d, gains, sampling = ports.values()
+    parameters = s.vehicle
     eta_W, eta_V, rho_W, rho_V, lam, lead = ca.vertsplit(gains)
     dt, unit, min_speed = ca.vertsplit(sampling)
     speed = ca.fmax(v_x, min_speed)
@@ -113,24 +122,15 @@ def build_step(structure: Structure) -> ca.Function:
     f_hat = ca.if_else(used, W @ sigma, 0)
     linear = ca.if_else(used, linear_axle_force(parameters, speed, x, u), 0)
     ahead = ca.if_else(used, dt, 0)  # else nothing moves on: weights keep their values
-    return ca.Function(
-        f"identifier_{structure.law}",
-        [xi_hat, z, W, V, x, u, v_x, vehicle, A_d, gains, sampling],
-        [
-            # at rest the observer follows the measurement, as far as it can be believed
-            ca.if_else(
-                ca.logic_or(moving, ca.logic_not(plausible_sample)),
-                xi_hat + ahead * xi_hat_dot,
-                xi,
-            ),
-            ca.if_else(moving, z + ahead * filter_rate(lam, z, xi_tilde), 0),
-            W + ahead * rates.W_dot,
-            V + ahead * rates.V_dot,
-            f_hat,
-            linear + unit * f_hat,
-            ca.if_else(used, xi_tilde, 0),
-        ],
-        [*CARRY, *OVER, "vehicle", "A_d", "gains", "sampling"],
-        [*(f"{name}_next" for name in CARRY), "f_hat", "axle_force", "xi_tilde"],
-        {"cse": True},
+    # at rest the observer follows the measurement, as far as it can be believed
+    observes = ca.logic_or(moving, ca.logic_not(plausible_sample))
+    carried = (
+        ca.if_else(observes, xi_hat + ahead * xi_hat_dot, xi),
+        ca.if_else(moving, z + ahead * filter_rate(lam, z, xi_tilde), 0),
+        W + ahead * rates.W_dot,
+        V + ahead * rates.V_dot,
     )
+    outputs = {"f_hat": f_hat, "axle_force": linear + unit * f_hat}
+    outputs["xi_tilde"] = ca.if_else(used, xi_tilde, 0)
+    name = f"identifier_{structure.law}"
+    return step_function(name, ports, dict(zip(CARRY, carried, strict=True)), outputs)

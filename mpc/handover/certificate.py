@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.axle.car import car_numbers
+from identifier.axle.car import car_numbers, symbols
 from identifier.method import Method
 from models.vehicle import GRAVITY, Vehicle
 from mpc.tires import PredictionTire
@@ -79,10 +79,9 @@ def _forces(tire: PredictionTire, v_x: float, largest: float) -> tuple[Array, Ar
 @cache
 def _statics(structure: Any, n: int) -> ca.Function:
     """Return steady axle forces (2, n) at states (3, n) = v_y, r, δ."""
-    one, v_x, car = ca.SX.sym("one", 3), ca.SX.sym("v_x"), ca.SX.sym("car", 4)
-    w = ca.SX.sym("w", structure.n_weights)
-    v_y, r, delta = ca.vertsplit(one)
-    at = Point(v_y, r, delta, v_x, Car(*ca.vertsplit(car)), w)
+    ports, s = symbols(one=3, v_x=1, car=Car, w=structure.n_weights)
+    v_y, r, delta = ca.vertsplit(s.one)
+    at = Point(v_y, r, delta, s.v_x, s.car, s.w)
     force = ca.vertcat(*structure.force(structure.slip(at), at))
-    at_one = ca.Function("statics", [one, v_x, car, w], [force])
+    at_one = ca.Function("statics", list(ports.values()), [force])
     return at_one.map(n, [False, True, True, True], [False])

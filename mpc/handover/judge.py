@@ -17,7 +17,7 @@ import numpy as np
 
 from codegen import Scan
 from codegen.arrays import Array
-from identifier.axle.car import car_numbers
+from identifier.axle.car import car_numbers, step_function, symbols
 from models.vehicle import GRAVITY
 from mpc.tires import PredictionTire
 from mpc.tires.tire import Car, Point
@@ -98,28 +98,24 @@ def axle_forces(tire: PredictionTire, weights: Array, samples: Array, dt: float)
 @cache
 def axle_scan(structure: Any, k: int) -> Scan:
     """Return the compiled loop: slip, its lag held exactly over a sample, force of k tires."""
-    lagged, begun = ca.SX.sym("lagged", 2, k), ca.SX.sym("begun")
-    sample, dt = ca.SX.sym("sample", len(COLUMNS)), ca.SX.sym("dt")
-    car, w = ca.SX.sym("car", 4), ca.SX.sym("w", structure.n_weights, k)
+    ports, s = symbols(
+        lagged=(2, k), begun=1, sample=len(COLUMNS), dt=1, car=Car, w=(structure.n_weights, k)
+    )
     slips, forces = [], []
     for i in range(k):
-        v_x, v_y, r, delta = ca.vertsplit(sample)
-        at = Point(v_y, r, delta, v_x, Car(*ca.vertsplit(car)), w[:, i])
+        v_x, v_y, r, delta = ca.vertsplit(s.sample)
+        at = Point(v_y, r, delta, v_x, s.car, s.w[:, i])
         slip: Any = ca.vertcat(*structure.slip(at))
         if structure.lagged:
-            sigma = ca.vertcat(*structure.lag_length((lagged[0, i], lagged[1, i]), at))
-            share = 1 - ca.exp(-v_x * dt / ca.fmax(sigma, _SHORTEST_LAG))
-            slip = ca.if_else(begun > 0, lagged[:, i] + share * (slip - lagged[:, i]), slip)
+            sigma = ca.vertcat(*structure.lag_length((s.lagged[0, i], s.lagged[1, i]), at))
+            share = 1 - ca.exp(-v_x * s.dt / ca.fmax(sigma, _SHORTEST_LAG))
+            last = s.lagged[:, i]
+            slip = ca.if_else(s.begun > 0, last + share * (slip - last), slip)
         slips.append(slip)
         forces.append(ca.vertcat(*structure.force((slip[0], slip[1]), at)))
-    step = ca.Function(
-        f"axle_forces_{k}",
-        [lagged, begun, sample, dt, car, w],
-        [ca.densify(value) for value in (ca.horzcat(*slips), ca.SX(1), ca.vertcat(*forces))],
-        ["lagged", "begun", "sample", "dt", "car", "w"],
-        ["lagged_next", "begun_next", "axle_force"],
-        {"cse": True},
-    )
+    carried = {"lagged": ca.densify(ca.horzcat(*slips)), "begun": ca.SX(1)}
+    outputs = {"axle_force": ca.densify(ca.vertcat(*forces))}
+    step = step_function(f"axle_forces_{k}", ports, carried, outputs)
     return Scan(step, carry=("lagged", "begun"), over=("sample",))
 
 

@@ -6,16 +6,15 @@ import re
 from dataclasses import fields, is_dataclass
 from enum import IntEnum
 from functools import cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
 from codegen import load_library
 from codegen.arrays import Array
 from codegen.compiler import NoCompilerError, keep, kept, wide_vectors
+from codegen.package import source_digest
 from mpc.prediction import state_size
 from mpc.problem import Guards, Problem
 from mpc.realtime.c_source import C, c_sizes, c_sources, python_file
@@ -115,7 +114,6 @@ def set_params(params: NDArray[Any], problem: Problem, guards: Guards) -> None:
 
 
 NAME = "mpc"
-PACKAGES = ("codegen", "models", "identifier", "mpc")  # whose text makes the text
 
 
 def tracker_source(structure: TireStructure, horizon: int, *, single: bool) -> str:
@@ -124,7 +122,7 @@ def tracker_source(structure: TireStructure, horizon: int, *, single: bool) -> s
         return _generated(structure, horizon, single)
     kind = type(structure)
     parts = [f"{field.name}={getattr(structure, field.name)!r}" for field in fields(structure)]
-    about = [_generator(), f"{kind.__module__}.{kind.__qualname__}", *parts, horizon, single]
+    about = [source_digest(), f"{kind.__module__}.{kind.__qualname__}", *parts, horizon, single]
     digest = hashlib.sha256("\0".join(map(str, about)).encode()).hexdigest()[:20]
     found = kept(f"tracker-{digest}", ".c")
     if found is not None:
@@ -138,18 +136,6 @@ def _generated(structure: TireStructure, horizon: int, single: bool) -> str:
     about = {"title": "The tracker", "version": "", "hash": "", "version_text": NAME}
     files = c_sources(structure, horizon=horizon, name=NAME, about=about)
     return python_file(files, name=NAME, single=single)
-
-
-@cache
-def _generator() -> str:
-    """Return a hash of the code that generates, its templates, and the version of CasADi."""
-    digest = hashlib.sha256(ca.CasadiMeta.version().encode())
-    root = Path(__file__).parents[2]
-    for package in PACKAGES:
-        for path in sorted((root / package).rglob("*")):
-            if path.suffix in (".py", ".c", ".h"):
-                digest.update(path.read_bytes())
-    return digest.hexdigest()
 
 
 # -O3 is twice as fast as -O2 here; the rest as in `codegen.compiler.FLAGS`.

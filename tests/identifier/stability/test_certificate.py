@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_continuous_lyapunov
 
-from identifier.certificate import Property, at_least, at_most
+from identifier.certificate import Certificate, Property, at_least, at_most
 from identifier.paper.gains import gains_for
 from identifier.paper.laws import LAWS, Gains, diagonal
-from identifier.stability import Certificate, Operation, certify
+from identifier.stability.certificate import certify
+from identifier.stability.operation import Operation
 from identifier.stability.sampled_bound import Disturbance
 from tests.identifier.stability.limits import (
     instantaneous_damping,

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from identifier.paper.laws import LAWS, DrivingError, Gains
-from identifier.stability import Operation, certify
+from identifier.stability.certificate import certify
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, direction_matrix
 from identifier.stability.lyapunov import lyapunov
 from identifier.stability.margins import drift_frequency, gain_margin
+from identifier.stability.operation import Operation
 from identifier.stability.sampled_bound import Disturbance
 
 SKEWED = np.array([[-4.0, 6.0], [-0.5, -3.0]])

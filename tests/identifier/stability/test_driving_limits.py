@@ -7,7 +7,7 @@ from identifier.driving import Driving
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import LAWS
 from identifier.paper.network import Network
-from identifier.stability import certify
+from identifier.stability.certificate import certify
 from identifier.stability.operation import (
     SPEED_SPREAD,
     _largest_signals,

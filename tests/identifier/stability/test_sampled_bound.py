@@ -7,7 +7,7 @@ import pytest
 
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import LAWS, DrivingError, Gains
-from identifier.stability import certify
+from identifier.stability.certificate import certify
 from identifier.stability.loop import INTEGRAL
 from identifier.stability.sampled_bound import (
     Disturbance,

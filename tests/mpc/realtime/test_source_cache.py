@@ -31,13 +31,13 @@ def test_whatever_the_text_depends_on_is_in_its_key(own_cache, monkeypatch):
         tracker_source(small, 10, single=True),
     }
     assert len(texts) == 4
-    monkeypatch.setattr(source_cache, "_generator", lambda: "another version")
+    monkeypatch.setattr(source_cache, "source_digest", lambda: "another version")
     tracker_source(small, 10, single=False)
     assert len(list(own_cache.iterdir())) == 5
 
 
 def test_the_key_does_not_depend_on_the_order_in_which_a_folder_lists_its_files(monkeypatch):
-    generator = source_cache._generator.__wrapped__
+    generator = source_cache.source_digest.__wrapped__
     first, listed = generator(), Path.rglob
     monkeypatch.setattr(Path, "rglob", lambda *words: sorted(listed(*words), reverse=True))
     assert generator() == first
