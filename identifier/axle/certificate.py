@@ -11,7 +11,7 @@ of friction takes is proven of λ = 1 alone, and not stated of such a car.
 import math
 from functools import cache
 from itertools import combinations, product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +19,10 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from identifier.axle.covariance import LEAST_VARIANCE
 from identifier.axle.curve import unit_slopes
-from identifier.axle.learning import FLOAT, LEAN, Bounds
+from identifier.axle.learning import FLOAT, LEAN, Bounds, Regression, RoadChange
 from identifier.certificate import Property, at_least, at_most, statement
 from identifier.driving import Driving
 from models.vehicle import Vehicle
-
-if TYPE_CHECKING:
-    from identifier.axle.design import AxleIdentifier
 
 _LARGEST_SLIP = 1.5  # rad
 _CELLS = 2000  # of slip, each a part wider than the one before
@@ -35,6 +32,30 @@ _LONGEST = 60.0  # s, beyond which a drop is not followed
 _FORGETS = (0.5, 0.9)  # share of its own information that a sample may forget: good, bad
 SLOW_Q = 4.0  # the slow mean does not follow a change
 MOST_SLOW = 4.0  # squared errors: above twice the declared they are no noise to get used to
+
+
+class Design(Protocol):
+    """What of an `AxleIdentifier` the proofs follow from; words and units are of its fields."""
+
+    @property
+    def bounds(self) -> Bounds:
+        """Limits of what is learnt."""
+
+    @property
+    def regression(self) -> Regression:
+        """Filter, error model and memory."""
+
+    @property
+    def change(self) -> RoadChange:
+        """When another friction is believed."""
+
+    @property
+    def ladder(self) -> tuple[float, ...]:
+        """Slip scales of the units [rad]."""
+
+    @property
+    def dt(self) -> float:
+        """Sampling interval [s]."""
 
 
 @cache
@@ -152,7 +173,7 @@ class FrictionDrop(NamedTuple):
     slope: float = 20.0
     errors: float = 1.0
 
-    def time(self, design: "AxleIdentifier", friction: float, v_x: float) -> float:
+    def time(self, design: Design, friction: float, v_x: float) -> float:
         """Return for how long at most both axles stay wrong by more than `left` of it [s].
 
         While both are, evidence of the drop grows at least as fast as here, where errors are the
@@ -183,7 +204,7 @@ class FrictionDrop(NamedTuple):
         return math.inf
 
 
-def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> tuple[Property, ...]:
+def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Property, ...]:
     """Return what is proven of a design, whatever is measured unless a title says more.
 
     Of a car with downforce without the time that a drop of friction takes.
@@ -249,7 +270,7 @@ def certified(design: "AxleIdentifier", vehicle: Vehicle, driving: Driving) -> t
     return proven if vehicle.has_downforce else (*proven, _drop(design, driving))
 
 
-def _drop(design: "AxleIdentifier", driving: Driving) -> Property:
+def _drop(design: Design, driving: Driving) -> Property:
     """Return how long the drop of friction of a car takes whose loads are the static ones."""
     follows = FrictionDrop().time(design, driving.friction, driving.v_x)
     by_memory = design.regression.memory * math.log(2.0)
@@ -265,7 +286,7 @@ def _drop(design: "AxleIdentifier", driving: Driving) -> Property:
     )
 
 
-def jump_by_learning(design: "AxleIdentifier") -> float:
+def jump_by_learning(design: Design) -> float:
     """Return by how much learning changes a force in one sample at most [static axle loads].
 
     The step that is let through, and its lean to the center: no partial sum of weights is further
@@ -275,7 +296,7 @@ def jump_by_learning(design: "AxleIdentifier") -> float:
     return design.regression.rate * design.dt + LEAN * n * (b.weight + b.most_grip)
 
 
-def _lean_over_rounding(design: "AxleIdentifier") -> float:
+def _lean_over_rounding(design: Design) -> float:
     """Return how far a limited step leans inwards, over what rounding in float may do to it."""
     n, b = len(design.ladder), design.bounds
     inside = b.of_ladder(design.ladder)

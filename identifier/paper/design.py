@@ -256,13 +256,7 @@ def _scan(structure: Structure) -> Scan:
 
 def _observed(vehicle: Vehicle, force_unit: float, x: Array) -> dict[str, Array]:
     """Return the observer's state at the first measurement."""
-    return {"xi_hat": axle_impulse(x, vehicle) / force_unit}
-
-
-def axle_impulse(x: Array, vehicle: Vehicle) -> Array:
-    """Return ξ = K⁻¹ x of (7), (2,) [N s].   x : [v_y, r] (2,)."""
-    impulse: Array = _K_inv(vehicle.bicycle) @ x
-    return impulse
+    return {"xi_hat": _K_inv(vehicle.bicycle) @ x / force_unit}
 
 
 @lru_cache(maxsize=1024)

@@ -217,7 +217,7 @@ def test_the_film_shows_force_over_slip_up_to_now_of_each_axle():
 
 def test_the_true_curve_of_a_film_is_that_of_the_road_that_the_car_is_on():
     later = CURVES[2]._replace(label="oracle at the end", force=0.5 * CURVES[2].force)
-    hindsight = replace(CURVES[0], label="frozen at the end", force=9.0 * CURVES[0].force)
+    hindsight = CURVES[0]._replace(label="frozen at the end", force=9.0 * CURVES[0].force)
     for t, share in ((1.0, 1.0), (5.0, 0.5)):
         axes = picture(t, ON_LANE, [*CURVES, later, hindsight], [(60.0, 0.5)])[0]
         stiffest = [np.ptp(line.get_ydata()) for line in axes.lines]
@@ -228,7 +228,7 @@ def test_the_true_curve_of_a_film_is_that_of_the_road_that_the_car_is_on():
 
 
 def test_the_panels_of_a_film_show_the_true_curve_as_far_as_the_car_slips():
-    grippy = replace(CURVES[2], force=3.0 * CURVES[2].force)
+    grippy = CURVES[2]._replace(force=3.0 * CURVES[2].force)
     free, tall = (picture(0.0, ON_LANE, some)[0] for some in (CURVES[:1], [CURVES[0], grippy]))
     inside = np.abs(np.rad2deg(grippy.alpha)) <= tall.get_xlim()[1]
     largest = 1e-3 * np.abs(grippy.force[inside]).max()

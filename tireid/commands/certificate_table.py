@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
+from identifier.certificate import Certificate, Property
 from identifier.driving import Driving
 from identifier.methods import LIVE
 from identifier.setup import force_unit_name
-from identifier.stability import Certificate, Property
 from models.vehicle import Vehicle
 from tireid.output import text_table
 

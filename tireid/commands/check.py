@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from codegen.writing import write_file
+from identifier.certificate import Certificate
 from identifier.driving import BANDWIDTH, Driving, natural_driving
 from identifier.frozen import vehicle_numbers
 from identifier.methods import LIVE, certify
 from identifier.paper.design import VARIANTS, PaperIdentifier, design_text
 from identifier.paper.laws import LAWS
 from identifier.run import History, identify
-from identifier.stability import Certificate, Operation
 from identifier.stability.certificate import judged_loop
 from identifier.stability.loop import direction_matrix
-from identifier.stability.operation import proven_bounds
+from identifier.stability.operation import Operation, proven_bounds
 from models.vehicle import Vehicle
 from tireid.commands import DONE, FAILS
 from tireid.commands import options as shared

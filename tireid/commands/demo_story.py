@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from identifier.certificate import Certificate
 from identifier.method import Method
 from identifier.methods import LIVE, REFERENCE, certify, make_method
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import force_rms, online_error
 from identifier.run import identify
-from identifier.stability import Certificate
 from models.maneuvers import DoubleLaneChange, Maneuver, Slalom, StepSteer
 from models.plant import Plant
 from models.recordings import Recording
