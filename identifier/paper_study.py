@@ -64,7 +64,7 @@ def paper_design(
 
 
 ONLINE = "online"  # the column of what was identified online, against truth, over all
-PAST_ONLINE, PAST, AFTER, ALL = MEASURES = (  # of frozen weights; the first is the paper's
+PAST_ONLINE, PAST, AFTER, ALL = (  # of frozen weights; the first is the paper's
     "past_against_online",
     "past_against_truth",
     "after_against_truth",
@@ -74,22 +74,15 @@ PAST_ONLINE, PAST, AFTER, ALL = MEASURES = (  # of frozen weights; the first is 
 
 def frozen_column(measure: str, t_freeze: float) -> str:
     """Return the column of a measure of frozen weights, "past_against_online_32".
-    measure : one of `MEASURES`.   t_freeze : time of the freeze [s].
+    measure : as `PAST`.   t_freeze : time of the freeze [s].
     """
     return f"{measure}_{freeze_key(t_freeze)}"
-
-
-def columns(maneuver: str) -> list[str]:
-    """Return the columns of a maneuver: "online", and every measure at every freeze.
-    maneuver : "step_steer" or "slalom".
-    """
-    return [ONLINE, *(frozen_column(m, t) for t in FREEZES[maneuver] for m in MEASURES)]
 
 
 class _Trial(NamedTuple):
     """One law with one seed on one maneuver.
     replays : freeze time [s] to replay of the same recording; errors count from the onset on.
-    errors : by column as `columns` names them: RMSE of both axles from the onset on [kN]; empty
+    errors : by column, as `frozen_column` has it: RMSE of both axles from the onset on [kN]; empty
         where the law diverged.
     """
 

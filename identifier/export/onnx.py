@@ -24,7 +24,7 @@ from identifier.estimate.model import FittedModel
 from identifier.export.specialize import INPUTS, Signal
 from identifier.motion.model import curve_function
 from identifier.motion.parameters import INDEX, curve_index
-from identifier.paper.network import NetworkModel
+from identifier.paper.network import SIGNALS, NetworkModel
 from identifier.tire_model import TireModel
 from models.extras import needs
 
@@ -136,10 +136,7 @@ F_yr = MatMul(axle_force, rear)
 def _network(model: NetworkModel, *, single: bool) -> bytes:
     """Return a frozen network: v_x, v_y, r, delta_f, delta_r to F_yf, F_yr, (batch, 1)."""
     _, _, l_f, l_r, C_f, C_r = model.vehicle.bicycle
-    network, signals = (
-        model.network,
-        ("v_y", "r", "delta_f", "delta_r", "v_x", "alpha_f", "alpha_r"),
-    )
+    network, signals = model.network, list(SIGNALS)
     assert network.scale is not None
     scaling = np.zeros((len(signals), len(network.inputs)))
     for column, (name, scale) in enumerate(zip(network.inputs, network.scale, strict=True)):

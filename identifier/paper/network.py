@@ -123,15 +123,8 @@ def network_signals(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> 
     v_x : longitudinal speed [m/s], not zero.   x : [v_y, r] (2,).   u : [δ_f, δ_r] (2,).
     """
     alpha = slip_angles(parameters.l_f, parameters.l_r, v_x, x, u)
-    return {
-        "v_y": x[0],
-        "r": x[1],
-        "delta_f": u[0],
-        "delta_r": u[1],
-        "v_x": v_x,
-        "alpha_f": alpha[0],
-        "alpha_r": alpha[1],
-    }
+    given = (x[0], x[1], u[0], u[1], v_x, alpha[0], alpha[1])
+    return dict(zip(SIGNALS, given, strict=True))
 
 
 # The paper's network, frozen: weights at one instant and all that axle forces need.

@@ -18,7 +18,6 @@ from identifier.paper_study import (
     LAWS,
     NETWORK,
     Study,
-    columns,
     drive_maneuvers,
     paper_design,
     run_study,
@@ -28,7 +27,7 @@ from models.vehicle import sedan
 from tests.conftest import PNG
 from tests.pages import faults_of, outline
 from tests.tireid.conftest import json_of, page_in, typed
-from tireid.commands.paper import _PAPER, table_text, write_study
+from tireid.commands.paper import _PAPER, row_labels, table_text, write_study
 from tireid.figures.forces import force_figure
 
 EXPECTED = Path(__file__).parent / "expected_tables.json"
@@ -183,7 +182,7 @@ def test_the_committed_tables_are_those_we_compute(study):
     computed = study.tables()
     assert computed.keys() == expected.keys()
     assert all(
-        row.keys() == set(columns(m)) for m, laws in expected.items() for row in laws.values()
+        row.keys() == row_labels(m).keys() for m, laws in expected.items() for row in laws.values()
     )
     for maneuver, laws in expected.items():
         for law, row in laws.items():
@@ -209,8 +208,8 @@ def test_paper_command_writes_tables_and_figures(tmp_path, capsys, laid_out):
     assert "instantaneous: certificate: fail" in printed
     assert "integral: certificate: warn" in printed
     tables = json_of(tmp_path / "out" / "tables.json")
-    assert list(tables["slalom"]["integral"]) == columns("slalom")
-    assert len(columns("slalom")) == 9
+    assert list(tables["slalom"]["integral"]) == list(row_labels("slalom"))
+    assert len(row_labels("slalom")) == 9
     spread = tables["step_steer"]["instantaneous_scaled"]["past_against_online_35"]
     assert set(spread) == {"median", "q25", "q75"}
     rows = [line.split() for line in printed.splitlines() if "(the paper's measure)" in line]

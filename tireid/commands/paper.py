@@ -80,7 +80,7 @@ def row_labels(maneuver: str) -> dict[str, str]:
     for t in paper_study.FREEZES[maneuver]:
         for measure, words in _MEASURES.items():
             labels[paper_study.frozen_column(measure, t)] = f"frozen at {freeze_key(t)} s: {words}"
-    return {name: labels[name] for name in paper_study.columns(maneuver)}
+    return labels
 
 
 def printed_values(maneuver: str) -> dict[str, dict[str, float]]:
