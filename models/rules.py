@@ -27,6 +27,14 @@ def require_positive(refusal: type[ValueError], /, **values: float) -> None:
             raise refusal(f"{name} must be positive and finite, it is {value}")
 
 
+def require_not_negative(refusal: type[ValueError], /, **values: float) -> None:
+    """Refuse every value that is not a finite number, zero or above."""
+    for name, value in values.items():
+        require_number(refusal, name, value)
+        if not 0.0 <= value < math.inf:
+            raise refusal(f"{name} must not be negative or infinite, it is {value}")
+
+
 def require_positive_fields(record: Any) -> None:
     """Refuse a record in which a number is not finite and above zero."""
     require_positive(ValueError, **{one.name: getattr(record, one.name) for one in fields(record)})

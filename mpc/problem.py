@@ -6,14 +6,14 @@ from one Runge-Kutta step of dt and x_0 given, so that
   |e_y,k| <= e_y + s,  |α_k| <= slip + s (front, rear)       soft, k = 1 … N
 """
 
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
-from models.rules import require_positive
+from models.rules import require_not_negative, require_positive
 
 # What the tracker minimizes: Σ ½ q y² over the stages, Gauss-Newton, and ½ R u² of its input.
 #
@@ -63,12 +63,8 @@ class Cost:
     terminal: float = 5.0
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            value = getattr(self, one.name)
-            if not 0.0 <= value < np.inf:
-                raise ValueError(f"{one.name} must be finite and not negative, it is {value}")
-        if not self.steering_rate > 0.0:
-            raise ValueError(f"steering_rate must be positive, it is {self.steering_rate}")
+        require_not_negative(ValueError, **asdict(self))
+        require_positive(ValueError, steering_rate=self.steering_rate)
 
     def numbers(self) -> Array:
         """Return q (7,) of ½ Σ q y² at a stage, y in SI."""
@@ -179,8 +175,6 @@ class Guards:
     fall_back_acceleration: float = 2.0
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            value, may_be_zero = getattr(self, one.name), one.name == "hold_time"
-            if not (0.0 < value < np.inf or (may_be_zero and value == 0.0)):
-                rule = "not negative" if may_be_zero else "positive"
-                raise ValueError(f"{one.name} must be {rule} and finite, it is {value}")
+        values = asdict(self)
+        require_not_negative(ValueError, hold_time=values.pop("hold_time"))
+        require_positive(ValueError, **values)

@@ -59,7 +59,7 @@ class Shipped(CompiledPackage):
     def step(self, v_x, v_y, r, delta_f, delta_r=0.0, a_y=math.nan):
         sample = [v_x, v_y, r, delta_f, delta_r, a_y]
         run = self.run_samples(np.array([sample[: len(self.inputs)]]))
-        return Status(int(run.status[0])), run.axle_force[0]
+        return run.status[0], run.axle_force[0]
 
     @property
     def weights(self):

@@ -20,7 +20,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from codegen.errors import TireidError
-from models.rules import require_within
+from models.rules import require_not_negative, require_positive, require_within
 
 _LEAST = 1e-15  # of a gain that is not 0, in its unit, whatever U is
 _LARGEST = 1e12  # of a gain, in its unit, whatever U is
@@ -189,14 +189,12 @@ class Gains:
         poles = np.linalg.eigvals(A_d)
         if not poles.real.max() < 0.0:
             raise NotHurwitzError(f"A_d must be Hurwitz, its eigenvalues are {poles}")
-        if not 0.0 < self.forgetting < np.inf:
-            raise ValueError(f"forgetting must be positive, it is {self.forgetting}")
-        for name in ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "lead"):
-            value = getattr(self, name)
-            if not 0.0 <= value < np.inf:
-                raise ValueError(f"{name} must not be negative, it is {value}")
-            if value != 0.0:
-                require_within(ValueError, _LEAST, _LARGEST, **{name: value})
+        require_positive(ValueError, forgetting=self.forgetting)
+        names = ("forgetting", "eta_W", "eta_V", "rho_W", "rho_V", "lead")
+        gains = {name: getattr(self, name) for name in names}
+        require_not_negative(ValueError, **gains)
+        given = {name: value for name, value in gains.items() if value}
+        require_within(ValueError, _LEAST, _LARGEST, **given)
 
     @property
     def matrix(self) -> Array:

@@ -10,14 +10,13 @@ Assumed away: pitch, steer by the suspension, aligning moments of the tires, spi
 (longitudinal slip follows from the wanted force at once), rolling and air resistance.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import casadi as ca
 
 from models.friction import MAX_PLACES, place_change
-from models.rules import require_positive
+from models.rules import require_not_negative, require_positive
 from models.tires import MagicFormula, Tire
 from models.vehicle import Vehicle, load_ratio
 
@@ -165,8 +164,7 @@ class Driver:
 
     def __post_init__(self) -> None:
         require_positive(ValueError, gain=self.gain, acceleration_limit=self.acceleration_limit)
-        if not (self.integral_gain >= 0.0 and math.isfinite(self.integral_gain)):
-            raise ValueError(f"integral_gain must not be negative, it is {self.integral_gain}")
+        require_not_negative(ValueError, integral_gain=self.integral_gain)
 
     def demand(self, error: Any, integral: Any) -> tuple[Any, Any]:
         """Return the demanded acceleration [m/s^2] and the derivative of the integral [m/s].

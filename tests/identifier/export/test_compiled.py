@@ -93,16 +93,13 @@ def test_the_default_goes_on_with_the_last_sample_that_it_believes(packages):
     assert run.faults == 27
 
 
-def test_a_y_comes_last_and_is_not_read_where_it_is_no_input(packages, slalom):
+def test_a_y_comes_last_and_may_be_missing(packages, slalom):
     seeing, blind = (Shipped.of(packages["inertial"]) for _ in range(2))
     rows = samples_of(slalom, seeing.inputs)[:300]
     forces, without = (
         np.array([one.step(*row[:n])[1] for row in rows]) for one, n in ((seeing, 6), (blind, 5))
     )
     assert np.abs(without - forces).max() > 10.0
-    deaf = [Shipped.of(packages["axle"]).step(20.0, 0.1, 0.1, 0.01, 0.0, a) for a in (0, 9)]
-    assert deaf[0][0] == deaf[1][0] == Status.OK
-    np.testing.assert_array_equal(deaf[0][1], deaf[1][1])
 
 
 @pytest.fixture(scope="module")
