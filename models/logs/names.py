@@ -23,7 +23,7 @@ from codegen.arrays import Array
 from models.logs.axes import Triad, along_axes, triads
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import BETA, COLUMNS, POSE, QUANTITIES, WHEELS, Signal, quantity_of
-from models.logs.spelling import unit_in_name, without_ending
+from models.logs.spelling import unit_in_name, without_units
 from models.logs.stamps import typical_rate
 from models.logs.units import (
     ACCELERATION,
@@ -33,6 +33,7 @@ from models.logs.units import (
     LENGTH,
     RATE,
     SPEED,
+    are_same,
     is_given,
     quantities,
     to_si,
@@ -52,6 +53,7 @@ _APART = 0.04  # of confidence: nearer ones are equal
 _LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
 _LOOKED_AT = 20_000  # samples at most, in telling contents apart
 _SPIKES = 1e-3  # share of samples that say nothing of the unit
+_NEAR = 1.5  # times that a_y may differ from v_x r: v_y changes, roads bank
 _SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 _HAND = "steering wheel"  # an angle that wants a ratio
@@ -267,6 +269,7 @@ def _is_hint(signal: str, one: Heading) -> bool:
     starts = _HINTS.get(signal, ())
     fits = is_given(one.unit) and QUANTITIES[signal] in quantities(one.unit)
     named = any(word.startswith(starts) and "wind" not in word for word in words)
+    named |= signal == "r" and bool(quantities(one.name))  # it has no other name than "deg/s"
     return fits and named and not words & _RULES[signal].never
 
 
@@ -283,7 +286,7 @@ def propose(
     posed = _pose(headings)
     requested = {name for found in candidates.values() for guess in found for name in guess.channel}
     given = {one.name: _with_given_unit(one).unit for one in headings}
-    names = {name: _words_of(without_ending(name, unit)) for name, unit in given.items()}
+    names = {name: _words_of(without_units(name, unit)[0]) for name, unit in given.items()}
     bad = _REFERENCE | _CORNERS
     boxes = triads({name: one for name, one in names.items() if not bad & set(one)}, given)
     requested |= {name for box in boxes for name in box.names.values()}
@@ -320,7 +323,7 @@ def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
     """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure."""
     groups: dict[str, dict[str, Heading]] = {}
     for one in map(_with_given_unit, headings):
-        words = "_".join(_words_of(without_ending(one.name, one.unit)))
+        words = "_".join(_words_of(without_units(one.name, one.unit)[0]))
         plausible = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
         for form, wanted, mark in ((_PLACE, LENGTH, ""), (_ANGLE, ANGLE, "h"), (_TURN, ANGLE, "q")):
             found = form.fullmatch(words)
@@ -424,7 +427,7 @@ def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -
     """Return whether two guesses are one channel, as SPEED_KPH and SPEED_MPH: name and numbers."""
     if len(one.channel) + len(other.channel) > 2 or _is_given(one) != _is_given(other):
         return False
-    names = (_words_of(without_ending(guess.channel[0], guess.unit)) for guess in (one, other))
+    names = (_words_of(without_units(guess.channel[0], guess.unit)[0]) for guess in (one, other))
     if len(set(names)) > 1:
         return False
     first, second = (seen[guess.channel[0]] for guess in (one, other))
@@ -464,17 +467,20 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
     found = []
     listed = [_with_given_unit(one) for one in headings]
     for one in listed:
-        names = {without_ending(one.name, one.unit)}
-        names |= {one.name} if one.name.lower().endswith("_g") else set()  # "lat_g" is in g, and g
+        bare, other = without_units(one.name, one.unit)
+        names = {bare} | ({one.name} if are_same(other or one.unit, "g") else set())  # as "lat_g"
         by_name = max(_name_confidence(signal, name) for name in names)
+        if signal == "v_x" and quantities(one.name) == (SPEED,) and one.name.lower() != "fps":
+            by_name = max(by_name, _VAGUE)  # its unit is its name
         by_hand = max(_name_confidence(_HAND, name) for name in names) * (signal == "delta_f")
         best = max(by_name, by_hand)
         if best > 0.0:
-            found.append(
-                _with_unit(signal, one, Guess(
-                    channel=(one.name,), confidence=best, hand=by_hand > by_name
-                ))
-            )  # fmt: skip
+            guess = Guess(channel=(one.name,), confidence=best, hand=by_hand > by_name)
+            guess = _with_unit(signal, one, guess)
+            if other and max(_name_confidence(key, bare) for key in (signal, _HAND)):
+                why = f"its name says {other}, its unit is {one.unit.strip()}: which is it?"
+                guess = replace(guess, confidence=min(guess.confidence, HINT), why=why)
+            found.append(guess)
         elif _is_hint(signal, one):
             unit, why = one.unit.strip(), "by a word of its name and its unit"
             found.append(Guess(channel=(one.name,), confidence=HINT, unit=unit, why=why))
@@ -646,7 +652,11 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
         return abs(math.log(in_si["a_y"] / (in_si["v_x"] * in_si["r"])))
 
     choices = [(one.unit,) if _is_given(one) else _ASSUMED[key] for key, one in there.items()]
-    unit = min(itertools.product(*choices), key=far)[list(there).index(name)]
+    units = min(itertools.product(*choices), key=far)
+    unit = units[list(there).index(name)]
+    sure = unit == "g" and "g" in _words_of(guess.channel[0]) and far(units) < math.log(_NEAR)
+    if sure and sum(map(len, choices)) == len(choices) + 1:  # "G lat", and all else is given
+        return replace(guess, confidence=guess.confidence + _NO_UNIT_LOSS, unit=unit, why="")
     return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess
 
 

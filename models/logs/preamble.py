@@ -40,10 +40,14 @@ _PADDING = " \t,;|\"'"  # that a spreadsheet leaves of an empty line
 _ONES = "1" + " ".join(_DELIMITERS)  # of a line in which every cell is 1, if any is
 MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
 
-_DOT = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
-_COMMA = re.compile(r"[-+]?(?:\d+|\d*,\d+)(?:[eE][-+]?\d+)?")
+_DOT = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][-+]?\d+)?")  # D: of Fortran
+_COMMA = re.compile(r"[-+]?(?:\d+|\d*,\d+)(?:[eEdD][-+]?\d+)?")
+_MINUS = re.compile("[\u2212\u2013\u00ad\uff0d](?=[.,]?\\d)")  # that a text processor makes of "-"
+_WIDE = re.compile("(?<=\\d)[\u00a0\u2009\u202f\u2007](?=\\d{3}(?!\\d))")  # between thousands
+_BLANK = re.compile("[\u00a0\u2009\u202f\u2007]")
 _POINTS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+(?:,\d*)?")  # 1.234.567,8
 _COMMAS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+(?:\.\d*)?")  # 1,234,567.8
+_FORTRAN = re.compile(r"[-+]?[\d.,]+[dD][-+]?\d+")
 _MAYBE_INSTANT = re.compile(r"(?=.*\d).*[-:/.]\w.*")
 # A rate or an interval of samples that a preamble tells: "Sample Rate","100.000","Hz".
 _GIVEN_RATE = re.compile(
@@ -185,6 +189,7 @@ def _decoded(path: Path, head: bytes, encoding: str) -> str:
         raise RecordingError(
             f"{path}: is not a text file in {encoding.upper()} (byte {error.start})"
         ) from None
+    text = typed(text)
     control = _CONTROLS.search(text.rstrip("\x1a"))  # which ends texts of DOS
     if control:
         raise RecordingError(
@@ -192,6 +197,16 @@ def _decoded(path: Path, head: bytes, encoding: str) -> str:
             f"the character {ord(control[0]):#04x}), and no reader of binary files knows it"
         )
     return text
+
+
+def typed(text: str) -> str:
+    """Return a text with the signs of a keyboard: minus, blanks, thousands without any."""
+    return text if text.isascii() else _BLANK.sub(" ", _WIDE.sub("", _MINUS.sub("-", text)))
+
+
+def of_fortran(cell: str) -> str:
+    """Return a number with the exponent that Python reads: "1.25D+01" as "1.25E+01"."""
+    return cell.replace("D", "E").replace("d", "e") if _FORTRAN.fullmatch(cell) else cell
 
 
 def cells_of(line: str, delimiter: str) -> tuple[str, ...]:

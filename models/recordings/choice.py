@@ -175,16 +175,17 @@ def _in_struct(names: Sequence[str]) -> dict[str, Signal]:
     """Return the signals whose standard names are fields of structs; of two that of the fuller."""
     found: dict[str, list[str]] = {}
     for one in names:
-        struct, dot, field = one.rpartition(".")
+        _, dot, field = one.rpartition(".")
         name = signal_name(field)
         if dot and name and name not in (BETA, *POSE):
-            found.setdefault(name, []).append(struct)
-    count = Counter(struct for structs in found.values() for struct in structs)
+            found.setdefault(name, []).append(one)
+    count = Counter(one.rpartition(".")[0] for some in found.values() for one in some)
     result = {}
-    for name, structs in found.items():
-        first, *rest = sorted(structs, key=lambda struct: -count[struct])
-        if not rest or count[first] > count[rest[0]]:
-            result[name] = Signal(channel=(f"{first}.{column_of(name)}",))
+    for name, channels in found.items():
+        size = {one: count[one.rpartition(".")[0]] for one in channels}
+        first, *rest = sorted(channels, key=lambda one: -size[one])
+        if not rest or size[first] > size[rest[0]]:
+            result[name] = Signal(channel=(first,))
     return result
 
 

@@ -8,7 +8,7 @@ import pytest
 from models.logs.log import Channel, Listed
 from models.logs.names import _HAND, _RULES, SURE, Guess, _name_confidence, _words_of, propose
 from models.logs.signals import NEEDED
-from models.logs.spelling import unit_in_name, without_ending
+from models.logs.spelling import unit_in_name, without_units
 
 CALLED = {
     "v_x": ["vx", "VelForward", "Vel_Longitudinal", "Car.vx", "/odom/twist.twist.linear.x", "v_lon",
@@ -233,13 +233,19 @@ def test_a_guess_that_cannot_be_read_is_none():
         ("GeschwRad", "GeschwRad", ""),  # of a wheel
         ("LenkRad", "LenkRad", ""),
         ("lenk_rad", "lenk_rad", ""),
-        ("MPS", "MPS", ""),
+        ("MPS", "MPS", "MPS"),
+        ("Speed (km/h) *OBD", "Speed", "km/h"),
+        ("Yaw [deg/s] 1)", "Yaw", "deg/s"),
+        ("Yaw Rate [deg/s] @100Hz", "Yaw Rate", "deg/s"),
+        ("Acc Lat [g] filtered", "Acc Lat filtered", "g"),
+        ("Speed [km/h] (GPS)", "Speed (GPS)", "km/h"),
+        ("Sensor (A) links", "Sensor (A) links", ""),
         ("dampsDeg2", "dampsDeg2", ""),
     ],
 )
 def test_units_stand_at_the_end_of_names_in_any_spelling(name, bare, unit):
     assert unit_in_name(name) == unit
-    assert without_ending(name, unit) == bare
+    assert without_units(name, unit) == (bare, "")
 
 
 def test_a_unit_of_the_name_is_that_of_the_signal_where_the_format_tells_none():
@@ -369,9 +375,10 @@ def test_a_word_of_a_name_and_its_unit_are_named_and_not_taken():
 
 
 def test_a_unit_in_a_name_may_be_spelled_in_another_way_beside_it():
-    assert without_ending("steering_deg", "°") == "steering"
-    assert without_ending("speed_kmh", "kph") == "speed"
-    assert without_ending("speed_kmh", "mph") == "speed_kmh"
+    assert without_units("steering_deg", "°") == ("steering", "")
+    assert without_units("speed_kmh", "kph") == ("speed", "")
+    assert without_units("speed_kmh", "mph") == ("speed", "km/h")
+    assert without_units("VL_Rad", "km/h") == ("VL_Rad", "")
 
 
 def test_the_carriers_of_carmaker_are_road_wheels():
