@@ -275,13 +275,17 @@ def _numbers_in(line: _Line, way: _Way) -> int:
     return sum(_is_number(cell, way.decimal, way.thousands) for cell in cells)
 
 
-def _is_data(line: _Line, way: _Way) -> bool:
-    """Return whether a line is of numbers, at least half of its cells that are filled."""
+def _is_data(line: _Line, way: _Way, full: int) -> bool:
+    """Return whether a line is of numbers, at least half of its cells that are filled.
+    full : numbers that lines have; so many do where most cells are words.
+    """
     if _numbers(way.delimiter, way.decimal).fullmatch(line.text) and line.text.strip(_ONES):
         return True  # as most lines are: nothing but numbers, not all of them 1, which is a unit
     cells = line.cells
     right = _numbers_in(line, way)
-    return 2 * right >= max(sum(map(bool, cells[:_MANY])), 1) and not is_units_row(cells)
+    enough = 2 * right >= max(sum(map(bool, cells[:_MANY])), 1)
+    wordy = len(cells) == way.width and right >= max(full, 2)
+    return (enough or wordy) and not is_units_row(cells)
 
 
 # From the data upwards to header and units.
@@ -372,7 +376,7 @@ def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line]
     zone: list[int] = []
     for place in range(len(above) - 1, -1, -1):
         line = lines[above[place]]
-        if _is_data(line, way) and not line.text.lstrip().startswith(COMMENT):
+        if _is_data(line, way, full) and not line.text.lstrip().startswith(COMMENT):
             first = above[place]
             continue
         if first is None:
@@ -380,7 +384,7 @@ def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line]
         higher = [lines[k] for k in above[max(0, place - 40) : place]]
         alike = sum(
             len(one.cells) == way.width
-            and _is_data(one, way)
+            and _is_data(one, way, full)
             and 2 * _numbers_in(one, way) >= full  # not "Duration,30,,," of a padded preamble
             for one in higher
         )
