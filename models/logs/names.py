@@ -623,7 +623,7 @@ def _beside_turning(
     for name, like in (("v_y", "v_x"), ("a_x", "a_y")):
         channel = best[like].channel if like in best else ()
         first = next((one for one in mended[like] if one.channel == channel), None)
-        if first is not None and first.unit and not _is_given(best[like]):
+        if first is not None and first.unit and best[like].confidence < SURE:
             mended[name] = [
                 guess if _is_given(guess) else replace(_said(guess, f"as {like}"), unit=first.unit)
                 for guess in candidates[name]
@@ -655,7 +655,7 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
     units = min(itertools.product(*choices), key=far)
     unit = units[list(there).index(name)]
     sure = unit == "g" and "g" in _words_of(guess.channel[0]) and far(units) < math.log(_NEAR)
-    if sure and sum(map(len, choices)) == len(choices) + 1:  # "G lat", and all else is given
+    if sure and all(one.confidence >= SURE for key, one in there.items() if key != name):
         return replace(guess, confidence=guess.confidence + _NO_UNIT_LOSS, unit=unit, why="")
     return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess
 

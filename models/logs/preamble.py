@@ -63,6 +63,11 @@ _GIVEN_STEP = re.compile(
 )
 # RaceCapture describes a channel in one cell: "Speed"|"mph"|0.0|150.0|10, its range and rate.
 _DESCRIBED = re.compile(r'"?(?P<name>[^"|]+)"?\|"?(?P<unit>[^"|]*)"?(?:\|[-+.\deE]*){1,3}')
+# A channel that is described by lines, not by its column: "Channel : Speed", "Ch 1 = Speed [km/h]".
+_KEYS = "channel|ch|signal|column|col|kanal|spalte|name|field|parameter"
+_NAME_LINE = re.compile(rf"\W*(?:{_KEYS})(?: ?name| ?\d+)?\s*[:=]\s*(.*\S)\s*", re.I)
+_UNIT_LINE = re.compile(r"\W*(?:unit|units|einheit)(?: ?\d+)?\s*[:=]\s*(.*\S)\s*", re.I)
+_TITLE = re.compile(r"(?:channels|signals|columns|names|fields|units|header)\s*[:=]\s*", re.I)
 _CONTROLS = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _QUOTED = re.compile(r'["\r\n\x00]')  # what a reader of CSV does more with than to split
 _LONGEST_CELL = csv.field_size_limit()  # characters
@@ -292,7 +297,7 @@ def _is_data(line: _Line, way: _Way, full: int) -> bool:
 
 
 def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
-    zone, first = _header_zone(path, lines, way)
+    zone, first = _listed(lines, way) or _header_zone(path, lines, way)
     names_line, units_line = _named(zone, way)
     names = list(_uncommented(names_line, way))
     units = list(_uncommented(units_line, way)) if units_line is not None else []
@@ -336,7 +341,7 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     words += [f"names in line {names_line.number}"]
     words += [f"units in line {units_line.number}"] if units_line is not None else []
     words += [] if units_line is not None or not any(units) else ["units in the names"]
-    rate = _given_rate([line.text for line in lines[: lines.index(names_line)]])
+    rate = _given_rate([line.text for line in lines if line.number < names_line.number])
     numeric = _numeric(data, names, way)
     return Layout(
         encoding=encoding,
@@ -365,6 +370,35 @@ def _given_rate(preamble: Sequence[str]) -> float:
         if _RATES[0] <= rate <= _RATES[1]:
             return rate
     return 0.0
+
+
+def _listed(lines: list[_Line], way: _Way) -> tuple[list[_Line], int] | None:
+    """Return names and units that stand above the data one below the other, as lines, and the index
+    of the first data; None where they do not: "Channel : Speed", below it "Unit : km/h".
+
+    Of one name less than columns the first column is the time.
+    """
+    names: list[str] = []
+    units: list[str] = []
+    last = 0
+    for k, line in enumerate(lines):
+        if found := _NAME_LINE.fullmatch(line.text):
+            names, units, last = [*names, found[1]], [*units, ""], k
+        elif names and (found := _UNIT_LINE.fullmatch(line.text)):
+            units[-1], last = found[1], k
+    lacking = way.width - len(names)
+    if len(names) < 2 or lacking not in (0, 1):
+        return None
+    names, units = ["Time"] * lacking + names, [""] * lacking + units
+    rows = range(last + 1, len(lines))
+    first = next(
+        (k for k in rows if _is_data(lines[k], way, 0) and len(lines[k].cells) == way.width), None
+    )
+    if first is None:
+        return None
+    made = (way.delimiter.join(f'"{one}"' for one in some) for some in (units, names))
+    zone = [_Line(lines[last].number, text, way.delimiter) for text in made]
+    return (zone if any(units) else zone[1:]), first
 
 
 def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
@@ -403,11 +437,10 @@ def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line]
 
 
 def _uncommented(line: _Line, way: _Way) -> tuple[str, ...]:
-    text = line.text.lstrip()
-    for mark in COMMENT:
-        if text.startswith(mark):
-            return cells_of(text.lstrip("#%/").strip(), way.delimiter)
-    return line.cells
+    bare = line.text.strip()
+    bare = bare.lstrip("#%/").strip() if bare.startswith(COMMENT) else bare
+    bare = _TITLE.sub("", bare, count=1) if _TITLE.match(bare) else bare
+    return line.cells if bare == line.text.strip() else cells_of(bare, way.delimiter)
 
 
 def _named(zone: list[_Line], way: _Way) -> tuple[_Line, _Line | None]:
