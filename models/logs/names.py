@@ -319,9 +319,9 @@ _TURN = re.compile(_TABLES["pose"]["turn"])
 _NO_POSE = set(_TABLES["pose"]["never"].split())
 
 
-def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
-    """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure."""
-    groups: dict[str, dict[str, Heading]] = {}
+def poses(headings: Sequence[Heading]) -> dict[str, dict[str, list[Heading]]]:
+    """Return channels of poses by the sensor that they name: x, y, h of the heading, qx to qw."""
+    groups: dict[str, dict[str, list[Heading]]] = {}
     for one in map(_with_given_unit, headings):
         words = "_".join(_words_of(without_units(one.name, one.unit)[0]))
         plausible = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
@@ -329,12 +329,18 @@ def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
             found = form.fullmatch(words)
             of = set((found["of"] or "").split("_")) if found else set()
             if found and wanted in plausible and not of & _NO_POSE:
-                key = mark if mark == "h" else mark + found["axis"]
-                groups.setdefault(found["of"] or "", {}).setdefault(key, one)
+                axis = "" if mark == "h" else found["axis"]
+                key = mark + {"e": "x", "n": "y"}.get(axis[:1], axis)
+                groups.setdefault(found["of"] or "", {}).setdefault(key, []).append(one)
                 break
+    return groups
+
+
+def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
+    """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure."""
     whole = {
-        name: some
-        for name, some in groups.items()
+        name: {key: listed[0] for key, listed in some.items()}
+        for name, some in poses(headings).items()
         if {"x", "y"} <= set(some) and ("h" in some or {"qz", "qw"} <= set(some))
     }
     measured = [name for name in whole if "odom" not in name] or list(whole)

@@ -11,7 +11,7 @@ import codecs
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import islice
@@ -118,8 +118,13 @@ class _Way(NamedTuple):
     share: float
 
 
-def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
-    """Return the layout of a text file.   whole : whether they are all of it."""
+def find_layout(
+    path: Path, head: bytes, whole: bool, unnamed: Mapping[int, tuple[str, ...]]
+) -> Layout:
+    """Return the layout of a text file.
+    whole : whether they are all of it.
+    unnamed : names of columns without a header, by their number.
+    """
     encoding = _encoding(path, head)
     text = _decoded(path, head, encoding)
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
@@ -142,7 +147,7 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
         return _no_data(path, lines, encoding)
     few(path, way.width, "columns", "columns")
     table = [_Line(k, line, way.delimiter) for k, line in enumerate(lines, start=1)]
-    return _table(path, table, way, encoding)
+    return _table(path, table, way, encoding, unnamed.get(way.width))
 
 
 _MAKERS = {
@@ -296,8 +301,17 @@ def _is_data(line: _Line, way: _Way, full: int) -> bool:
 # From the data upwards to header and units.
 
 
-def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
-    zone, first = _listed(lines, way) or _header_zone(path, lines, way)
+def _table(
+    path: Path, lines: list[_Line], way: _Way, encoding: str, unnamed: tuple[str, ...] | None
+) -> Layout:
+    zone, first = _listed(lines, way) or _header_zone(lines, way)
+    if unnamed and all(len(_uncommented(line, way)) != way.width for line in zone):
+        zone = [_Line(1, way.delimiter.join(unnamed), way.delimiter)]
+    if not zone:
+        raise RecordingError(
+            f"{path}: there is no header, line {lines[first].number} is data already; the first "
+            f"row must name the columns"
+        )
     names_line, units_line = _named(zone, way)
     names = list(_uncommented(names_line, way))
     units = list(_uncommented(units_line, way)) if units_line is not None else []
@@ -341,7 +355,7 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     words += [f"names in line {names_line.number}"]
     words += [f"units in line {units_line.number}"] if units_line is not None else []
     words += [] if units_line is not None or not any(units) else ["units in the names"]
-    rate = _given_rate([line.text for line in lines if line.number < names_line.number])
+    rate = _given_rate([line.text for line in lines[: names_line.number - 1]])
     numeric = _numeric(data, names, way)
     return Layout(
         encoding=encoding,
@@ -401,7 +415,7 @@ def _listed(lines: list[_Line], way: _Way) -> tuple[list[_Line], int] | None:
     return (zone if any(units) else zone[1:]), first
 
 
-def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
+def _header_zone(lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
     """Return the lines above the data, the nearest first, and the index of the first data."""
     above = [k for k, line in enumerate(lines) if line.text.strip(_PADDING)]
     counts = sorted(_numbers_in(lines[k], way) for k in above[-_TAIL:])
@@ -428,11 +442,6 @@ def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line]
         break
     if first is None:
         first = above[-1]
-    if not zone:
-        raise RecordingError(
-            f"{path}: there is no header, line {lines[first].number} is data already; the first "
-            f"row must name the columns"
-        )
     return [lines[k] for k in zone], first
 
 

@@ -46,15 +46,17 @@ _BLANK = re.compile(rb"[ \t]+")
 _MARGIN = re.compile(rb"^ | $", re.MULTILINE)
 
 
-def open_text(path: Path) -> TableLog:
-    """Return the log in a text file of any dialect, its layout understood."""
+def open_text(path: Path, unnamed: Mapping[int, tuple[str, ...]] | None = None) -> TableLog:
+    """Return the log in a text file of any dialect, its layout understood.
+    unnamed : names of columns without a header, by their number.
+    """
     head, whole = b"", True
     for part in pieces(path, RecordingError, limit="megabytes"):
         head += part
         if len(head) > HEAD:
             head, whole = head[:HEAD], False
             break
-    layout = find_layout(path, head, whole)
+    layout = find_layout(path, head, whole, unnamed or {})
     few(path, len(layout.columns.names), "columns", "columns")
     table = TextTable(path=path, layout=layout)
     return TableLog(table=table)
