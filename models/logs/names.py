@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from models.logs.axes import Triad, along_axes, triads
+from models.logs.axes import Triad, along_axes, ground, triads
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import BETA, COLUMNS, POSE, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import unit_in_name, without_units
@@ -283,17 +283,19 @@ def propose(
     """
     headings = log.headings() if headings is None else headings
     candidates = {name: _candidates(name, headings) for name in QUANTITIES if name not in POSE}
-    posed = _pose(headings)
     requested = {name for found in candidates.values() for guess in found for name in guess.channel}
     given = {one.name: _with_given_unit(one).unit for one in headings}
     names = {name: _words_of(without_units(name, unit)[0]) for name, unit in given.items()}
     bad = _REFERENCE | _CORNERS
     boxes = triads({name: one for name, one in names.items() if not bad & set(one)}, given)
     requested |= {name for box in boxes for name in box.names.values()}
+    planes = [some for some in poses(headings).values() if {"x", "z"} <= set(some)]
+    requested |= {one[0].name for some in planes for one in some.values()}
     seen = _seen(log, [one.name for one in headings if one.name in requested], run)
     candidates = {
         name: [_looked(name, guess, seen) for guess in found] for name, found in candidates.items()
     }
+    posed = _pose(headings, seen, _likeliest(candidates["delta_f"]))
     candidates = _along_axes(_with_signs(candidates, headings, seen), boxes, given, seen)
     candidates = _beside_turning(candidates, seen)
     guesses: dict[str, Guess] = {}
@@ -336,29 +338,45 @@ def poses(headings: Sequence[Heading]) -> dict[str, dict[str, list[Heading]]]:
     return groups
 
 
-def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
-    """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure."""
-    whole = {
-        name: {key: listed[0] for key, listed in some.items()}
-        for name, some in poses(headings).items()
-        if {"x", "y"} <= set(some) and ("h" in some or {"qz", "qw"} <= set(some))
-    }
+def _pose(
+    headings: Sequence[Heading], seen: Mapping[str, Channel], steering: str
+) -> dict[str, Guess]:
+    """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure.
+
+    Of a world with y up z is y, turned as the steering does.
+    """
+    whole, signs = dict[str, dict[str, Heading]](), dict[str, float]()
+    for name, listed in poses(headings).items():
+        some = {key: one[0] for key, one in listed.items()}
+        about = some.get("h") or (some.get("qy") if "qw" not in some else None)
+        place = {key: some[key].name for key in "xyz" if key in some}
+        if {"x", "z"} <= set(place) and (about or "qw" in some):
+            level, sign = ground(seen, place, about.name if about else "", steering)
+            if level == "z":
+                some |= {"y": some["z"]} | ({"h": about} if about else {})
+                some |= {"qy": some["qz"], "qz": some["qy"]} if {"qy", "qz"} <= set(some) else {}
+                signs[name] = sign
+        if {"x", "y"} <= set(some) and ("h" in some or {"qz", "qw"} <= set(some)):
+            whole[name] = some
     measured = [name for name in whole if "odom" not in name] or list(whole)
     if not measured:
         return {}
-    some = whole[measured[0]]
-    sure = _KNOWN if len(measured) == 1 else HINT
-    why = "" if len(measured) == 1 else "there are several poses"
+    some, sign = whole[measured[0]], signs.get(measured[0], 1.0)
+    why = "there are several poses" if len(measured) > 1 else ""
+    why = why or ("seen from above or, *-1, from below?" if not sign else "")
+    sure = HINT if why else _KNOWN
     lost = _NO_UNIT_LOSS if measured[0] and not is_given(some["x"].unit) else 0.0
     turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
     turned = [some["h"].name] if "h" in some else turned[-2:] if len(turned) < 4 else turned
     angle = some["h"].unit if "h" in some else ""
     return {
-        name: Guess(channel=tuple(listed), confidence=sure - lost, unit=unit.strip(), why=why)
-        for name, listed, unit in (
-            ("x", [some["x"].name], some["x"].unit),
-            ("y", [some["y"].name], some["y"].unit),
-            ("heading", turned, angle),
+        name: Guess(
+            channel=tuple(listed), confidence=sure - lost, unit=unit.strip(), factor=factor, why=why
+        )
+        for name, listed, unit, factor in (
+            ("x", [some["x"].name], some["x"].unit, 1.0),
+            ("y", [some["y"].name], some["y"].unit, sign or 1.0),
+            ("heading", turned, angle, 1.0),
         )
     }
 
