@@ -29,6 +29,7 @@ _NEAR = 0.25  # share of gravity by which a mean of it may be off
 _TILT = 0.4  # share of it along another axis from which a box lies oblique
 
 _LETTERS = "xyz"
+_MOVES = 0.2  # share of the largest speed below which travel has no direction
 _GRAVITY = FACTORS[ACCELERATION]["g"]
 _STEMS = {  # what stands before a letter in one word, or beside it, by quantity
     SPEED: "v vel velocity speed",
@@ -38,7 +39,7 @@ _STEMS = {  # what stands before a letter in one word, or beside it, by quantity
 
 
 class Triad(NamedTuple):
-    """Channels of three axes or of a plane: names by letter, of which quantity, words they share."""
+    """Channels of three axes or of a plane: names by letter, of which quantity, shared words."""
 
     names: dict[str, str]
     quantity: str
@@ -141,6 +142,11 @@ def _alike(one: Array, other: Array) -> float:
     return float(np.corrcoef(one[good], other[good])[0, 1])
 
 
+def _sign(correlation: float) -> float:
+    """Return the sign of a correlation, 0 where there is hardly any."""
+    return math.copysign(1.0, correlation) if abs(correlation) > _LIKELY else 0.0
+
+
 def ground(
     seen: Mapping[str, Channel], place: Mapping[str, str], heading: str, steering: str
 ) -> tuple[str, float]:
@@ -158,24 +164,17 @@ def ground(
     grid = _Grid(turned, [*place.values(), *filter(None, (heading, steering))])
     if grid.t.size < 50:
         return "y", 0.0
-    v = {
-        one: np.gradient(grid[place["x"]] + 1j * grid[place[one]], _STEP)
-        for one in place
-        if one != "x"
-    }
-    off = {}
-    for one, rates in v.items():
-        moving = np.abs(rates) > 0.2 * np.abs(rates).max()
-        course = np.unwrap(np.angle(rates[moving]))
-        off[one] = (
-            min(float(np.std(course - sense * grid[heading][moving])) for sense in (1, -1))
-            if heading
-            else 0.0
-        )
+    v, off = dict[str, Array](), dict[str, float]()
+    for one in {"y", "z"} & set(place):
+        v[one] = np.gradient(grid[place["x"]] + 1j * grid[place[one]], _STEP)
+        moving = np.abs(v[one]) > _MOVES * np.abs(v[one]).max()
+        course = np.unwrap(np.angle(v[one][moving]))
+        psi = grid[heading][moving] if heading else course
+        off[one] = min(float(np.std(course - psi)), float(np.std(course + psi)))
     level = "z" if "y" not in off or off["z"] * _CLEAR < off["y"] else "y"
     speed, course = np.abs(v[level]), np.unwrap(np.angle(v[level]))
     steers = _alike(np.gradient(course, _STEP), speed * grid[steering]) if steering else 0.0
-    return level, math.copysign(1.0, steers) if abs(steers) > _LIKELY else 0.0
+    return level, _sign(steers)
 
 
 def along_axes(
@@ -228,8 +227,8 @@ def along_axes(
     alone = [one.names["y"] for one in usable if set(one.names) == {"y"}]
     if alone and across and not yaw_rate and not any(one.signal == "r" for one in axes):
         steers = _alike(v * grid[steering], grid[alone[0]]) if steering else 0.0
-        if abs(steers) > _LIKELY:
-            axes.append(_Axis(alone[0], "r", math.copysign(1.0, steers), "about y, which is up"))
+        if sign := _sign(steers):
+            axes.append(_Axis(alone[0], "r", sign, "about y, which is up"))
     known = {"r": grid[yaw_rate]} if yaw_rate else {}
     known |= {one.signal: one.factor * grid[one.name] for one in axes}
     known |= {"a_y": grid[lateral]} if lateral else {}
@@ -313,9 +312,8 @@ def _of_a_box(
     sign = (up[1] or 1.0) if about else 1.0
     asked = steering and (about or "y" not in values)
     steers = _alike((v * grid[steering])[moving], r[moving]) if asked else 0.0
-    if abs(steers) > _LIKELY:
-        sign = math.copysign(1.0, steers)
-    elif "y" not in values:  # the plane may be seen from above or from below
+    sign = _sign(steers) or sign
+    if not _sign(steers) and "y" not in values:  # the plane may be seen from above or from below
         return []
     axes = []
     if about and gyro is not None:

@@ -11,15 +11,10 @@ from models.logs.log import Listed, LogFile, RecordingError, few, some
 from models.logs.spelling import unit_in_name, without_unit
 from models.logs.stamps import find_clock, in_seconds, require_times, typical_rate
 from models.logs.table import Kind, Table, TableLog, kind_of
-from models.logs.units import are_same, is_given
+from models.logs.units import TABLES, are_same, is_given
 
 # A table with a row for each value: what the columns of names, values and units are called.
-_NAMES = (
-    "name", "signal", "signalname", "channel", "channelname", "variable", "parameter", "topic",
-    "key", "field", "sensor", "measurement", "bezeichnung", "kanal",
-)  # fmt: skip
-_VALUES = ("value", "val", "data", "values", "reading", "wert", "messwert", "valeur", "valor")
-_UNITS = ("unit", "units", "uom", "unitofmeasure", "einheit", "unite", "unita", "unidad")
+_NAMES, _VALUES, _UNITS = (row.split() for row in TABLES["long"].values())
 
 
 def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> GroupedLog[Any]:

@@ -53,6 +53,7 @@ _APART = 0.04  # of confidence: nearer ones are equal
 _LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
 _LOOKED_AT = 20_000  # samples at most, in telling contents apart
 _SPIKES = 1e-3  # share of samples that say nothing of the unit
+_FASTEST = 430.0  # [km/h]
 _NEAR = 1.5  # times that a_y may differ from v_x r: v_y changes, roads bank
 _SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
@@ -111,8 +112,7 @@ _SIDE_AND_AXLE = re.compile(r"(?<![A-Za-z0-9])[LR][12](?![A-Za-z0-9])")
 _SPIN = re.compile(r"(?<![A-Za-z])AV[xyz](?![A-Za-z])")  # and "AVy_L1" of the spin of a wheel
 _CORNER_OF_AXLE = {"L1": " fl ", "R1": " fr ", "L2": " rl ", "R2": " rr "}
 _GENERIC = ("data", "value")  # a field that says nothing, as of std_msgs: its topic is its name
-_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ψ": "psi", "β": "beta",
-                         "δ": "delta", "ω": "omega"})  # fmt: skip
+_UMLAUTS = str.maketrans(_TABLES["letters"])
 
 
 _WHEELS = _TABLES["wheels"]
@@ -615,6 +615,8 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
     if quantity == ACCELERATION:
         return guess  # `_beside_turning` sets it beside v_x and r
     unit = unit_of_range(HAND_WHEEL if guess.hand else quantity, usual)
+    if unit == "km/h" and usual > _FASTEST:
+        guess = replace(_said(guess, "in tenths, as no car is so fast"), factor=0.1)
     if unit and quantity == ANGLE and signal != BETA and not guess.hand:
         hand = usual * to_si(unit, quantity, signal) > _LARGEST_ROAD
         guess = replace(guess, hand=hand)

@@ -23,7 +23,7 @@ from models.logs.log import RecordingError, few
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
 from models.logs.stamps import nanoseconds
 from models.logs.table import Columns
-from models.logs.units import PER_SECOND, quantities, time_unit
+from models.logs.units import PER_SECOND, TABLES, quantities, time_unit
 
 _ROWS = 400  # of data that tell what columns are
 _TAIL = 40  # last lines of them that tell how cells are written
@@ -38,7 +38,7 @@ _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLAN
 COMMENT = ("#", "%", "//")
 _PADDING = " \t,;|\"'"  # that a spreadsheet leaves of an empty line
 _ONES = "1" + " ".join(_DELIMITERS)  # of a line in which every cell is 1, if any is
-MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
+MISSING = ("", *TABLES["header"]["missing"].split())
 
 _DOT = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][-+]?\d+)?")  # D: of Fortran
 _COMMA = re.compile(r"[-+]?(?:\d+|\d*,\d+)(?:[eEdD][-+]?\d+)?")
@@ -48,6 +48,7 @@ _BLANK = re.compile("[\u00a0\u2009\u202f\u2007]")
 _POINTS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+(?:,\d*)?")  # 1.234.567,8
 _COMMAS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+(?:\.\d*)?")  # 1,234,567.8
 _FORTRAN = re.compile(r"[-+]?[\d.,]+[dD][-+]?\d+")
+_NO_DIGITS = TABLES["header"]["numbers"].split()
 _MAYBE_INSTANT = re.compile(r"(?=.*\d).*[-:/.]\w.*")
 # A rate or an interval of samples that a preamble tells: "Sample Rate","100.000","Hz".
 _GIVEN_RATE = re.compile(
@@ -150,11 +151,7 @@ def find_layout(
     return _table(path, table, way, encoding, unnamed.get(way.width))
 
 
-_MAKERS = {
-    "motec csv": "MoTeC i2", "aim csv": "AiM Race Studio", "carmaker": "IPG CarMaker",
-    "#infofile": "IPG CarMaker", "2d datarecording": "2D", "winarace": "2D",
-    "racelogic": "Racelogic",
-}  # fmt: skip
+_MAKERS = TABLES["header"]["makers"]
 _PI_TOOLBOX, _BLOCK = "PiToolboxVersionedASCIIDataSet", "{ChannelBlock}"
 
 
@@ -243,7 +240,7 @@ def _is_number(cell: str, decimal: str, thousands: str = "") -> bool:
         return True
     if thousands:
         return bool((_COMMAS if thousands == "," else _POINTS).fullmatch(cell))
-    return cell.lower() in ("nan", "inf", "-inf", "+inf", "infinity", "-infinity", "-nan")
+    return cell.lower() in _NO_DIGITS
 
 
 def _is_instant(cell: str) -> bool:
@@ -508,7 +505,7 @@ def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
 
 # Racelogic VBOX: [header], [channel units], [column names], [data], each a section.
 
-_OF_THE_BOX = ("sats", "time", "lat", "long", "velocity", "heading", "height")
+_OF_THE_BOX = TABLES["header"]["box"].split()
 
 
 def _sections(lines: list[str]) -> dict[str, int] | None:

@@ -33,7 +33,6 @@ PER_SECOND = {  # exact
     for unit, factor in FACTORS[TIME].items()
 }
 _SPELLED = {word: unit for unit, some in TABLES["spellings"].items() for word in some.split()}
-_TENTHS = re.compile(r"(0?[.,]\d+|1e-\d)\*?(\D.*)")  # "0.1 km/h": of what a bus counts
 _WORD = re.compile(
     "(?<![a-z'])(?:" + "|".join(sorted(_SPELLED, key=len, reverse=True)) + ")(?![a-z'])"
 )
@@ -46,7 +45,6 @@ _FARTHEST = {
     HAND_WHEEL: (3.0 * math.pi, "deg"),
     RATE: (2.0 * math.pi, "deg/s"),
 }
-_FASTEST = 430.0  # [km/h]: what is faster counts tenths of them, as buses do
 _SMALLEST_ACCELERATION = 2.5  # [m/s²]: a drive that does not reach it teaches no tire: it is in g
 
 
@@ -61,18 +59,11 @@ def _plain(unit: str) -> str:
     return text.replace("/s1", "/s").replace(" ", "")
 
 
-def _factors(unit: str) -> dict[str, float]:
-    """Return what a unit may be of, and its factor to SI."""
-    plain, tenth = _plain(unit), 1.0
-    if found := _TENTHS.fullmatch(plain):
-        tenth, plain = float(found[1].replace(",", ".")), found[2]
-    return {name: tenth * some[plain] for name, some in FACTORS.items() if plain in some}
-
-
 def quantities(unit: str) -> tuple[str, ...]:
     """Return what a unit may be of; empty where it is of nothing a car's motion has."""
-    found = tuple(_factors(unit))
-    if set(found) == {FORCE, SPEED}:  # the letters' size tells, where it is as it should be
+    plain = _plain(unit)
+    found = tuple(name for name, factors in FACTORS.items() if plain in factors)
+    if len(found) > 1 and plain == "kn":  # the letters' size tells, where it is as it should be
         return (FORCE,) if "kN" in unit else (SPEED,) if "KN" not in unit else found
     return found
 
@@ -80,8 +71,9 @@ def quantities(unit: str) -> tuple[str, ...]:
 def is_known(unit: str) -> bool:
     """Return whether a spelling is a unit of anything that cars log, or stands for none."""
     plain = _plain(unit)
-    others = _OTHERS.values()
-    return plain in _NO_UNIT or bool(_factors(unit)) or any(plain in known for known in others)
+    return plain in _NO_UNIT or any(
+        plain in known for known in (*FACTORS.values(), *_OTHERS.values())
+    )
 
 
 def time_unit(unit: str) -> str:
@@ -92,9 +84,11 @@ def time_unit(unit: str) -> str:
 
 def are_same(one: str, other: str) -> bool:
     """Return whether two spellings are one unit, as "deg" and "°"."""
-    first, second = _factors(one), _factors(other)
-    same = any(first[name] == second[name] for name in first if name in second)
-    return same or _plain(one) == _plain(other)
+    first, second = _plain(one), _plain(other)
+    return first == second or any(
+        first in known and second in known and known[first] == known[second]
+        for known in FACTORS.values()
+    )
 
 
 def is_given(unit: str) -> bool:
@@ -108,8 +102,6 @@ def unit_of_range(quantity: str, largest: float) -> str:
     """
     if quantity == ACCELERATION:
         return "g" if largest < _SMALLEST_ACCELERATION else ""
-    if quantity == SPEED and largest > _FASTEST:
-        return "0.1 km/h"
     limit, unit = _FARTHEST.get(quantity, (math.inf, ""))
     return unit if largest > limit else ""
 
@@ -121,8 +113,8 @@ def to_si(unit: str, quantity: str, what: str) -> float:
     plain = _plain(unit)
     if plain in _NO_UNIT:
         return 1.0
-    if (factor := _factors(unit).get(quantity)) is not None:
-        return factor
+    if plain in FACTORS[quantity]:
+        return FACTORS[quantity][plain]
     known = ", ".join(TABLES["typical"][quantity].split())
     other = quantities(unit) or tuple(name for name, all_ in _OTHERS.items() if plain in all_)
     if other:
