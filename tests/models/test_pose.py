@@ -179,6 +179,21 @@ def test_columns_of_a_pose_are_a_source_of_v_y_and_tell_that_the_box_is_late(tmp
     assert {"x", "y", "heading"} <= set(proposal.signals())
 
 
+@pytest.mark.parametrize("height", [True, False])
+@pytest.mark.parametrize(
+    ("axes", "turn"), [(((0, -1), (1, 0)), -1), (((0, -1), (-1, 0)), 1), (((1, 0), (0, -1)), 1)]
+)  # x to the right and z forward, as Unity has it; z backward, as OpenGL; x forward
+def test_a_pose_in_the_plane_of_x_and_z_is_read(tmp_path, axes, turn, height):
+    x, z = np.array(axes) @ np.array([COLUMNS["x [m]"], COLUMNS["y [m]"]])
+    up = {"y [m]": noisy(0 * T, 0.003, 4)} if height else {}
+    rest = {key: one for key, one in COLUMNS.items() if key != "y [m]"}
+    columns = {**rest, **up, "x [m]": x, "z [m]": z, "yaw [rad]": turn * COLUMNS["yaw [rad]"]}
+    judge(read_recording(table(tmp_path / "log.csv", columns)))
+    del columns["drive.steering_angle [rad]"]  # without which it may be seen from below
+    log = open_log(table(tmp_path / "log.csv", columns))
+    assert "*-1" in propose(log, log.headings()).guesses["y"].why
+
+
 def test_a_measured_v_y_comes_before_a_pose(tmp_path):
     found = read_recording(table(tmp_path / "log.csv", {**COLUMNS, "vy [m/s]": V_Y}))
     np.testing.assert_allclose(found.v_y, V_Y, atol=1e-5)

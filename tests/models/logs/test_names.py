@@ -381,6 +381,34 @@ def test_a_unit_in_a_name_may_be_spelled_in_another_way_beside_it():
     assert without_units("VL_Rad", "km/h") == ("VL_Rad", "")
 
 
+@pytest.mark.parametrize(
+    ("signal", "name", "unit", "said"),
+    [
+        ("v_x", "speed_kph [m/s]", "m/s", "km/h"), ("r", "yaw_rate_rad", "deg/s", "rad"),
+        ("delta_f", "delta_f_deg", "rad", "deg"), ("a_y", "ay_g", "m/s^2", "g"),
+        ("v_x", "Speed [mph]", "km/h", "mph"),
+    ],
+)  # fmt: skip
+def test_a_name_that_contradicts_its_unit_is_asked(signal, name, unit, said):
+    found = proposed((name, unit, 0.1 * WAVE))
+    assert not found.is_sure(signal)
+    assert f"its name says {said}, its unit is {unit}" in found.guesses[signal].why
+
+
+def test_a_unit_may_be_the_name():
+    speed, turn = ("MPH", unit_in_name("MPH"), 45.0 + WAVE), ("deg/s", "deg/s", 20.0 * WAVE)
+    found = proposed(speed, turn, ("fps", "", 60.0 + WAVE))
+    assert found.is_sure("v_x") and found.signals()["v_x"].unit == "MPH"
+    assert found.guesses["r"].channel == ("deg/s",) and not found.is_sure("r")
+
+
+def test_a_g_in_a_name_is_its_unit_where_turning_says_so():
+    car = (("Speed", "km/h", 72.0 + WAVE), ("Gyro Z", "rad/s", 0.4 * WAVE))
+    assert proposed(*car, ("G lat", "", 0.8 * WAVE)).signals()["a_y"].unit == "g"
+    assert not proposed(*car, ("G lat", "", 8.0 * WAVE)).is_sure("a_y")
+    assert not proposed(car[0], ("G lat", "", 0.8 * WAVE)).is_sure("a_y")
+
+
 def test_the_carriers_of_carmaker_are_road_wheels():
     places = ("CFL", "CFR", "CRL", "CRR")
     found = proposed(
