@@ -168,6 +168,8 @@ def ground(
     for one in {"y", "z"} & set(place):
         v[one] = np.gradient(grid[place["x"]] + 1j * grid[place[one]], _STEP)
         moving = np.abs(v[one]) > _MOVES * np.abs(v[one]).max()
+        if not moving.any():
+            return "y", 0.0
         course = np.unwrap(np.angle(v[one][moving]))
         psi = grid[heading][moving] if heading else course
         off[one] = min(float(np.std(course - psi)), float(np.std(course + psi)))

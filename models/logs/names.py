@@ -53,6 +53,7 @@ _APART = 0.04  # of confidence: nearer ones are equal
 _LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
 _LOOKED_AT = 20_000  # samples at most, in telling contents apart
 _SPIKES = 1e-3  # share of samples that say nothing of the unit
+_LONGEST = 17.5  # [m]: wheelbase, with understeer at speed, that v_x δ / r can be, as in checks
 _FASTEST = 430.0  # [km/h]
 _NEAR = 1.5  # times that a_y may differ from v_x r: v_y changes, roads bank
 _SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
@@ -639,6 +640,11 @@ def _beside_turning(
         if (likely := [one for one in candidates[name] if one.confidence > STILL])
     }
     mended = dict(candidates)
+    if {"v_x", "r"} <= set(best):
+        mended["delta_f"] = [
+            _levered(one, best, seen) if one.confidence > STILL else one
+            for one in candidates["delta_f"]
+        ]
     for name in _ASSUMED:
         mended[name] = [
             guess
@@ -655,6 +661,19 @@ def _beside_turning(
                 for guess in candidates[name]
             ]
     return mended
+
+
+def _levered(guess: Guess, best: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
+    """Return a guess of the steering, of the hand wheel where it turns too far for the car's bend.
+
+    v_x δ / r is the wheelbase, and more of a car that understeers.
+    """
+    v, r, delta = (
+        _root_mean_square(seen[one.channel[0]].values) * to_si(one.unit, QUANTITIES[name], name)
+        for name, one in (("v_x", best["v_x"]), ("r", best["r"]), ("delta_f", guess))
+    )
+    far = v * delta > _LONGEST * r > 0.0 and not guess.hand
+    return replace(_said(guess, "too far for how the car turns"), hand=True) if far else guess
 
 
 def _is_given(guess: Guess) -> bool:

@@ -186,6 +186,15 @@ def test_an_angle_that_goes_farther_than_road_wheels_is_that_of_the_hand_wheel()
     assert named.guesses["delta_f"].hand and not named.is_sure("delta_f")
 
 
+@pytest.mark.parametrize("name", ["delta", "delta_f", "Front Steering Angle"])
+def test_an_angle_that_turns_too_far_for_the_bend_is_that_of_the_hand_wheel(name):
+    """v_x δ / r of road wheels is the wheelbase and the understeer of 20 m/s: 4 m."""
+    car = (("Speed", "m/s", 20.0 + WAVE), ("Yaw Rate", "rad/s", 0.3 * WAVE))
+    assert proposed(*car, (name, "deg", 3.5 * WAVE)).is_sure("delta_f")
+    far = proposed(*car, (name, "deg", 50.0 * WAVE))
+    assert far.guesses["delta_f"].hand and not far.is_sure("delta_f")
+
+
 def test_two_wheels_of_an_axle_are_taken_together():
     found = proposed(
         ("Car.SteerAngleFL", "rad", 0.1 * WAVE), ("Car.SteerAngleFR", "rad", 0.1 * WAVE),
