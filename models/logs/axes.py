@@ -9,7 +9,6 @@ them (x forward, z up) or numbers do not tell, nothing is said.
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +28,6 @@ _NEAR = 0.25  # share of gravity by which a mean of it may be off
 _TILT = 0.4  # share of it along another axis from which a box lies oblique
 
 _LETTERS = "xyz"
-_MOVES = 0.2  # share of the largest speed below which travel has no direction
 _GRAVITY = FACTORS[ACCELERATION]["g"]
 _STEMS = {  # what stands before a letter in one word, or beside it, by quantity
     SPEED: "v vel velocity speed",
@@ -150,33 +148,31 @@ def _sign(correlation: float) -> float:
 def ground(
     seen: Mapping[str, Channel], place: Mapping[str, str], heading: str, steering: str
 ) -> tuple[str, float]:
-    """Return which axis is level beside x, and the sign with which it turns as the steering does.
+    """Return which axis is level beside x, and of z the sign with which it turns as the steering.
 
     It is that along which the travel goes as the heading. 0.0 : the drive tells no sign.
     place : channels of a position by letter.   heading, steering : "" where there is none.
     """
-    turned = dict(seen)
-    if heading:
-        psi = seen[heading].values
-        period = 360.0 if np.nanmax(np.abs(psi)) > 2.0 * math.pi + 0.1 else 2.0 * math.pi
-        psi = np.unwrap(psi, period=period) * (2.0 * math.pi / period)
-        turned[heading] = replace(seen[heading], values=psi)
-    grid = _Grid(turned, [*place.values(), *filter(None, (heading, steering))])
-    if grid.t.size < 50:
-        return "y", 0.0
-    v, off = dict[str, Array](), dict[str, float]()
+    t = seen[place["x"]].t
+    if t.size < 50 or ("y" in place and not heading):
+        return "y", 1.0
+    lag = max(1, int(_WINDOW / float(np.median(np.diff(t)))))
+
+    def at(name: str) -> Array:
+        return np.interp(t, seen[name].t, seen[name].values)
+
+    psi = at(heading)[lag // 2 : lag // 2 - lag] if heading else np.zeros(t.size - lag)
+    psi = np.radians(psi) if np.abs(psi).max() > 2.0 * math.pi + 0.1 else psi
+    way, off = dict[str, Array](), dict[str, float]()
     for one in {"y", "z"} & set(place):
-        v[one] = np.gradient(grid[place["x"]] + 1j * grid[place[one]], _STEP)
-        moving = np.abs(v[one]) > _MOVES * np.abs(v[one]).max()
-        if not moving.any():
-            return "y", 0.0
-        course = np.unwrap(np.angle(v[one][moving]))
-        psi = grid[heading][moving] if heading else course
-        off[one] = min(float(np.std(course - psi)), float(np.std(course + psi)))
-    level = "z" if "y" not in off or off["z"] * _CLEAR < off["y"] else "y"
-    speed, course = np.abs(v[level]), np.unwrap(np.angle(v[level]))
-    steers = _alike(np.gradient(course, _STEP), speed * grid[steering]) if steering else 0.0
-    return level, _sign(steers)
+        z = at(place["x"]) + 1j * at(place[one])
+        way[one] = z[lag:] - z[:-lag]
+        along = max(abs(np.sum(way[one] * np.exp(sense * psi))) for sense in (1j, -1j))
+        off[one] = 1.0 - float(along / max(np.sum(np.abs(way[one])), 1e-9))
+    if "y" in off and not off["z"] * _CLEAR < off["y"]:
+        return "y", 1.0
+    turning = way["z"][lag:] * way["z"][:-lag].conj()
+    return "z", _sign(_alike(np.angle(turning), at(steering)[lag:-lag])) if steering else 0.0
 
 
 def along_axes(
@@ -226,11 +222,6 @@ def along_axes(
             misled |= channels if given is not None else set()
             misled |= {axis.name for axis in given or ()}
             axes += given or []
-    alone = [one.names["y"] for one in usable if set(one.names) == {"y"}]
-    if alone and across and not yaw_rate and not any(one.signal == "r" for one in axes):
-        steers = _alike(v * grid[steering], grid[alone[0]]) if steering else 0.0
-        if sign := _sign(steers):
-            axes.append(_Axis(alone[0], "r", sign, "about y, which is up"))
     known = {"r": grid[yaw_rate]} if yaw_rate else {}
     known |= {one.signal: one.factor * grid[one.name] for one in axes}
     known |= {"a_y": grid[lateral]} if lateral else {}

@@ -55,7 +55,6 @@ _LOOKED_AT = 20_000  # samples at most, in telling contents apart
 _SPIKES = 1e-3  # share of samples that say nothing of the unit
 _LONGEST = 17.5  # [m]: wheelbase, with understeer at speed, that v_x δ / r can be, as in checks
 _FASTEST = 430.0  # [km/h]
-_NEAR = 1.5  # times that a_y may differ from v_x r: v_y changes, roads bank
 _SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 _HAND = "steering wheel"  # an angle that wants a ratio
@@ -290,13 +289,12 @@ def propose(
     bad = _REFERENCE | _CORNERS
     boxes = triads({name: one for name, one in names.items() if not bad & set(one)}, given)
     requested |= {name for box in boxes for name in box.names.values()}
-    planes = [some for some in poses(headings).values() if {"x", "z"} <= set(some)]
-    requested |= {one[0].name for some in planes for one in some.values()}
+    posed = [some.values() for some in poses(headings).values() if "z" in some]
+    requested |= {one[0].name for some in posed for one in some}
     seen = _seen(log, [one.name for one in headings if one.name in requested], run)
     candidates = {
         name: [_looked(name, guess, seen) for guess in found] for name, found in candidates.items()
     }
-    posed = _pose(headings, seen, _likeliest(candidates["delta_f"]))
     candidates = _along_axes(_with_signs(candidates, headings, seen), boxes, given, seen)
     candidates = _beside_turning(candidates, seen)
     guesses: dict[str, Guess] = {}
@@ -313,12 +311,14 @@ def propose(
         others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
         if others:
             rivals[name] = (equal[0], *others)
-    return Proposal(guesses={**guesses, **posed}, rivals=rivals)
+    pose = _pose(headings, seen, _likeliest(candidates["delta_f"]))
+    return Proposal(guesses={**guesses, **pose}, rivals=rivals)
 
 
 _PLACE = re.compile(_TABLES["pose"]["place"])
 _ANGLE = re.compile(_TABLES["pose"]["angle"])
 _TURN = re.compile(_TABLES["pose"]["turn"])
+_TURNED = {"h", "qy", "qw"}
 _NO_POSE = set(_TABLES["pose"]["never"].split())
 
 
@@ -346,25 +346,28 @@ def _pose(
 
     Of a world with y up z is y, turned as the steering does.
     """
-    whole, signs = dict[str, dict[str, Heading]](), dict[str, float]()
-    for name, listed in poses(headings).items():
-        some = {key: one[0] for key, one in listed.items()}
-        about = some.get("h") or (some.get("qy") if "qw" not in some else None)
-        place = {key: some[key].name for key in "xyz" if key in some}
-        if {"x", "z"} <= set(place) and (about or "qw" in some):
-            level, sign = ground(seen, place, about.name if about else "", steering)
-            if level == "z":
-                some |= {"y": some["z"]} | ({"h": about} if about else {})
-                some |= {"qy": some["qz"], "qz": some["qy"]} if {"qy", "qz"} <= set(some) else {}
-                signs[name] = sign
-        if {"x", "y"} <= set(some) and ("h" in some or {"qz", "qw"} <= set(some)):
-            whole[name] = some
+    whole = {
+        name: {key: listed[0] for key, listed in some.items()}
+        for name, some in poses(headings).items()
+        if "x" in some and ("y" in some or "z" in some) and _TURNED & set(some)
+    }
     measured = [name for name in whole if "odom" not in name] or list(whole)
     if not measured:
         return {}
-    some, sign = whole[measured[0]], signs.get(measured[0], 1.0)
+    some, sign = whole[measured[0]], 1.0
+    place = {key: some[key].name for key in "xyz" if key in some}
+    about = some.get("h") or (None if "qw" in some else some["qy"])
+    heading = about.name if about else ""
+    if "z" in some and {*place.values(), heading} - {""} <= set(seen):
+        level, sign = ground(seen, place, heading, steering)
+        if level == "z":
+            swapped = {"qz": "qy", "qy": "qz", "y": "z"}
+            some |= {key: some[of] for key, of in swapped.items() if of in some}
+            some |= {"h": about} if about else {}
+    if not ("y" in some and ("h" in some or {"qz", "qw"} <= set(some))):
+        return {}
     why = "there are several poses" if len(measured) > 1 else ""
-    why = why or ("seen from above or, *-1, from below?" if not sign else "")
+    why = why or ("" if sign else "seen from above or, *-1, from below?")
     sure = HINT if why else _KNOWN
     lost = _NO_UNIT_LOSS if measured[0] and not is_given(some["x"].unit) else 0.0
     turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
@@ -668,12 +671,14 @@ def _levered(guess: Guess, best: Mapping[str, Guess], seen: Mapping[str, Channel
 
     v_x δ / r is the wheelbase, and more of a car that understeers.
     """
+    there = {"v_x": best["v_x"], "r": best["r"], "delta_f": guess}
     v, r, delta = (
         _root_mean_square(seen[one.channel[0]].values) * to_si(one.unit, QUANTITIES[name], name)
-        for name, one in (("v_x", best["v_x"]), ("r", best["r"]), ("delta_f", guess))
+        for name, one in there.items()
     )
-    far = v * delta > _LONGEST * r > 0.0 and not guess.hand
-    return replace(_said(guess, "too far for how the car turns"), hand=True) if far else guess
+    if guess.hand or not v * delta > _LONGEST * r > 0.0:
+        return guess
+    return replace(_said(guess, "too far for how the car turns"), hand=True)
 
 
 def _is_given(guess: Guess) -> bool:
@@ -697,10 +702,9 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
         return abs(math.log(in_si["a_y"] / (in_si["v_x"] * in_si["r"])))
 
     choices = [(one.unit,) if _is_given(one) else _ASSUMED[key] for key, one in there.items()]
-    units = min(itertools.product(*choices), key=far)
-    unit = units[list(there).index(name)]
-    sure = unit == "g" and "g" in _words_of(guess.channel[0]) and far(units) < math.log(_NEAR)
-    if sure and all(one.confidence >= SURE for key, one in there.items() if key != name):
+    unit = min(itertools.product(*choices), key=far)[list(there).index(name)]
+    named = unit == "g" and "g" in _words_of(guess.channel[0])
+    if named and all(one.confidence >= SURE for key, one in there.items() if key != name):
         return replace(guess, confidence=guess.confidence + _NO_UNIT_LOSS, unit=unit, why="")
     return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess
 

@@ -389,27 +389,23 @@ def _listed(lines: list[_Line], way: _Way) -> tuple[list[_Line], int] | None:
 
     Of one name less than columns the first column is the time.
     """
-    names: list[str] = []
-    units: list[str] = []
+    told: list[tuple[str, str]] = []
     last = 0
-    for k, line in enumerate(lines):
+    for line in lines:
         if found := _NAME_LINE.fullmatch(line.text):
-            names, units, last = [*names, found[1]], [*units, ""], k
-        elif names and (found := _UNIT_LINE.fullmatch(line.text)):
-            units[-1], last = found[1], k
-    lacking = way.width - len(names)
-    if len(names) < 2 or lacking not in (0, 1):
+            told, last = [*told, (found[1], "")], line.number
+        elif told and (found := _UNIT_LINE.fullmatch(line.text)):
+            told[-1], last = (told[-1][0], found[1]), line.number
+    if len(told) < 2 or way.width - len(told) not in (0, 1):
         return None
-    names, units = ["Time"] * lacking + names, [""] * lacking + units
-    rows = range(last + 1, len(lines))
-    first = next(
-        (k for k in rows if _is_data(lines[k], way, 0) and len(lines[k].cells) == way.width), None
+    told = [("Time", "")] * (way.width - len(told)) + told
+    rows = (k for k in range(last, len(lines)) if len(lines[k].cells) == way.width)
+    first = next((k for k in rows if _is_data(lines[k], way, 0)), None)
+    names, units = (
+        way.delimiter.join(map('"{}"'.format, some)) for some in zip(*told, strict=True)
     )
-    if first is None:
-        return None
-    made = (way.delimiter.join(f'"{one}"' for one in some) for some in (units, names))
-    zone = [_Line(lines[last].number, text, way.delimiter) for text in made]
-    return (zone if any(units) else zone[1:]), first
+    zone = [_Line(last, text, way.delimiter) for text in (units, names)]
+    return None if first is None else (zone[not any(one[1] for one in told) :], first)
 
 
 def _header_zone(lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
