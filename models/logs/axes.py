@@ -37,7 +37,7 @@ _STEMS = {  # what stands before a letter in one word, or beside it, by quantity
 
 
 class Triad(NamedTuple):
-    """Three channels: names by letter, of which quantity, and the words that they share."""
+    """Channels of three axes or of a plane: names by letter, of which quantity, shared words."""
 
     names: dict[str, str]
     quantity: str
@@ -64,7 +64,7 @@ class _Found(NamedTuple):
 
 
 def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list[Triad]:
-    """Return the channels that are called alike but for x, y and z.
+    """Return the channels that are called alike but for x, y and z, or x and z of a ground plane.
     words : of each channel's name.   units : of each channel, "" where none is given.
     """
     found: dict[tuple[str, ...], dict[str, str]] = {}
@@ -81,10 +81,12 @@ def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list
         if quantity:
             found.setdefault(rest, {}).setdefault(letter, name)
             quantity_of[rest] = quantity
+    plane = any(set(names) == {"x", "z"} for names in found.values())  # of a world with y up
     return [
         Triad(names, quantity_of[rest], rest)
         for rest, names in found.items()
         if len(names) == len(_LETTERS)
+        or (plane and set(names) == ({"y"} if quantity_of[rest] == RATE else {"x", "z"}))
     ]
 
 
@@ -138,6 +140,41 @@ def _alike(one: Array, other: Array) -> float:
     return float(np.corrcoef(one[good], other[good])[0, 1])
 
 
+def _sign(correlation: float) -> float:
+    """Return the sign of a correlation, 0 where there is hardly any."""
+    return math.copysign(1.0, correlation) if abs(correlation) > _LIKELY else 0.0
+
+
+def ground(
+    seen: Mapping[str, Channel], place: Mapping[str, str], heading: str, steering: str
+) -> tuple[str, float]:
+    """Return which axis is level beside x, and of z the sign with which it turns as the steering.
+
+    It is that along which the travel goes as the heading. 0.0 : the drive tells no sign.
+    place : channels of a position by letter.   heading, steering : "" where there is none.
+    """
+    t = seen[place["x"]].t
+    if t.size < 50 or ("y" in place and not heading):
+        return "y", 1.0
+    lag = max(1, int(_WINDOW / float(np.median(np.diff(t)))))
+
+    def at(name: str) -> Array:
+        return np.interp(t, seen[name].t, seen[name].values)
+
+    psi = at(heading)[lag // 2 : lag // 2 - lag] if heading else np.zeros(t.size - lag)
+    psi = np.radians(psi) if np.abs(psi).max() > 2.0 * math.pi + 0.1 else psi
+    way, off = dict[str, Array](), dict[str, float]()
+    for one in {"y", "z"} & set(place):
+        z = at(place["x"]) + 1j * at(place[one])
+        way[one] = z[lag:] - z[:-lag]
+        along = max(abs(np.sum(way[one] * np.exp(sense * psi))) for sense in (1j, -1j))
+        off[one] = 1.0 - float(along / max(np.sum(np.abs(way[one])), 1e-9))
+    if "y" in off and not off["z"] * _CLEAR < off["y"]:
+        return "y", 1.0
+    turning = way["z"][lag:] * way["z"][:-lag].conj()
+    return "z", _sign(_alike(np.angle(turning), at(steering)[lag:-lag])) if steering else 0.0
+
+
 def along_axes(
     found: Sequence[Triad],
     seen: Mapping[str, Channel],
@@ -173,7 +210,8 @@ def along_axes(
     for one in usable:
         if one.quantity == ACCELERATION:
             rates = [other for other in usable if other.quantity == RATE]
-            up = _up({letter: float(np.nanmean(grid[name])) for letter, name in one.names.items()})
+            means = {letter: float(np.nanmean(grid[name])) for letter, name in one.names.items()}
+            up = _up(means) if "y" in means else ("y", 0.0)
             same_box = [other for other in rates if set(other.words) & set(one.words) - {"?"}]
             gyro = next(iter(same_box + rates), None)
             channels = {*one.names.values(), *(gyro.names.values() if gyro else ())}
@@ -182,9 +220,11 @@ def along_axes(
                 continue
             given = _of_a_box(grid, one, gyro, up, v, yaw_rate, steering)
             misled |= channels if given is not None else set()
+            misled |= {axis.name for axis in given or ()}
             axes += given or []
-    known = {one.signal: one.factor * grid[one.name] for one in axes}
-    known |= {k: grid[one] for k, one in (("r", yaw_rate), ("a_y", lateral)) if one}
+    known = {"r": grid[yaw_rate]} if yaw_rate else {}
+    known |= {one.signal: one.factor * grid[one.name] for one in axes}
+    known |= {"a_y": grid[lateral]} if lateral else {}
     if across and {"r", "a_y"} <= set(known):
         axes += _sideways(grid, across, v, known["r"], known["a_y"])
     return _Found(frozenset(misled), tuple(axes), frozenset(oblique))
@@ -257,22 +297,26 @@ def _of_a_box(
     }
     about, along = max(pairs, key=lambda pair: abs(pairs[pair]), default=("", ""))
     if abs(pairs.get((about, along), 0.0)) < _SURE:
-        return None if up[0] in ("", "z") else []
+        return None if up[0] in ("", "z") or "y" not in values else []
     as_lettered = along == "y" and "z" in (about or "z", up[0] or "z")
     if as_lettered and (not up[1] or (up[1] > 0.0 and pairs[about, along] > 0.0)):
         return None
     r = turns[about]
     sign = (up[1] or 1.0) if about else 1.0
-    steers = _alike((v * grid[steering])[moving], r[moving]) if about and steering else 0.0
-    if abs(steers) > _LIKELY:
-        sign = math.copysign(1.0, steers)
+    asked = steering and (about or "y" not in values)
+    steers = _alike((v * grid[steering])[moving], r[moving]) if asked else 0.0
+    sign = _sign(steers) or sign
+    if not _sign(steers) and "y" not in values:  # the plane may be seen from above or from below
+        return []
     axes = []
     if about and gyro is not None:
         axes.append(_Axis(gyro.names[about], "r", sign, f"about {about}, which is up"))
+    elif sign < 0.0:
+        axes.append(_Axis(yaw_rate, "r", sign, "as the steering turns"))
     side = sign * math.copysign(1.0, pairs[about, along])
     axes.append(_Axis(box.names[along], "a_y", side, f"along {along} it goes as vx r"))
     vertical = about or up[0]
-    left = next(one for one in _LETTERS if one not in (along, vertical))
+    left = next(one for one in values if one not in (along, vertical))
     change = _alike(np.gradient(v, _STEP)[moving], values[left][moving])
     if vertical and abs(change) > _LIKELY:
         why = f"along {left} it goes as the change of the speed"

@@ -5,6 +5,7 @@ that the libraries it needs stay optional. How its first bytes look is given in 
 """
 
 import zlib
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
@@ -38,12 +39,14 @@ def open_log(
     clock: str = "",
     clock_unit: str = "",
     rate: float = 0.0,
+    unnamed: Mapping[int, tuple[str, ...]] | None = None,
 ) -> LogFile:
     """Open a log of any format; nothing but its beginning is read.
     path : of a file; of a folder, where a format keeps a log in one.
     mend : whether stamps that do not rise are mended, and not refused.
     clock, clock_unit : channel that is the time, where it is not what the format takes for it.
     rate : of the samples [Hz], where no channel is a time; 0 where none is given.
+    unnamed : names of columns of a text without a header, by their number.
     """
     path = Path(path)
     if not path.exists():
@@ -73,7 +76,7 @@ def open_log(
         format = "can" if given else format
         if rate and format not in _RATED:
             raise RecordingError(f"{path}: its samples have times of their own, leave out the rate")
-        given += (rate,) * (format == "matlab")
+        given += (rate,) * (format == "matlab") + (unnamed,) * (format == "text")
         opened: Any = _function(_OPENERS[format])(path, *given)
         if isinstance(opened, TableLog) and opened.may_be_long:
             opened = _function(_LONG)(opened.table) or opened

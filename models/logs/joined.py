@@ -8,12 +8,13 @@ import numpy as np
 
 from models.logs.grouped import GroupedLog, Samples, noted
 from models.logs.log import Listed, LogFile, RecordingError, few, some
+from models.logs.spelling import unit_in_name, without_unit
 from models.logs.stamps import find_clock, in_seconds, require_times, typical_rate
 from models.logs.table import Kind, Table, TableLog, kind_of
+from models.logs.units import TABLES, are_same, is_given
 
-# A table with a row for each value: what the columns of names and of values are called.
-_NAMES = ("name", "signal", "signalname", "channel", "variable", "topic", "key", "field", "sensor")
-_VALUES = ("value", "val", "data", "values", "reading")
+# A table with a row for each value: what the columns of names, values and units are called.
+_NAMES, _VALUES, _UNITS = (row.split() for row in TABLES["long"].values())
 
 
 def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> GroupedLog[Any]:
@@ -65,9 +66,11 @@ def _of_files(requested: Sequence[tuple[Listed, Any]]) -> list[Samples]:
 def long_log(table: Table) -> GroupedLog[Any] | None:
     """Return the log in a table with a row for each value: time, name, value; None of any other."""
     names, units, numeric, *_ = table.columns
-    bare = ["".join(filter(str.isalpha, one.lower())) for one in names]
-    name = next((bare.index(one) for one in _NAMES if one in bare), None)
-    value = next((bare.index(one) for one in _VALUES if one in bare), None)
+    bare = ["".join(filter(str.isalpha, without_unit(one).lower())) for one in names]
+    name, value, unit = (
+        next((bare.index(one) for one in called if one in bare), None)
+        for called in (_NAMES, _VALUES, _UNITS)
+    )
     if name is None or value is None or numeric[name] or not numeric[value]:
         return None
     words = [one for one in table.first_rows(name) if one]
@@ -78,10 +81,8 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
     )
     if clock is None or clock.column in (name, value) or len(set(words)) == len(words):
         return None
-    given = table.first_rows(bare.index("unit")) if "unit" in bare else []
-    unit_of = dict(zip(table.first_rows(name), given, strict=False))
     kinds = {clock.column: kind_of(clock), name: Kind.WORD, value: Kind.NUMBER}
-    cells = table.cells(kinds)
+    cells = table.cells(kinds | ({} if unit is None else {unit: Kind.WORD}))
     few(table.path, len(cells.words[name].names), "columns", "names")
     stamps, codes = cells.columns[clock.column], cells.words[name].codes
     require_times(str(table.path), clock, stamps, cells.rows, table.place)
@@ -92,7 +93,18 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
     for k, word in enumerate(cells.words[name].names):
         rows = order[edges[k] : edges[k + 1]]
         rate = typical_rate(t[rows])
-        listed = Listed(name=word, unit=unit_of.get(word, ""), samples=rows.size, rate=rate)
+        told = (
+            []
+            if unit is None
+            else [cells.words[unit].names[k] for k in np.unique(cells.words[unit].codes[rows])]
+        )
+        given = [one for one in told if is_given(one)] or [unit_in_name(word)]
+        if not all(are_same(given[0], one) for one in given):
+            raise RecordingError(
+                f"{table.path}: {word} must have one unit, it has {', '.join(given)}; "
+                "export it in one"
+            )
+        listed = Listed(name=word, unit=given[0], samples=rows.size, rate=rate)
         found.append(("", listed, rows))
     said = (f"a row for each value: {names[name]} names it; time is {clock.words}",)
     values = cells.columns[value]

@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from models.logs.axes import Triad, along_axes, triads
+from models.logs.axes import Triad, along_axes, ground, triads
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import BETA, COLUMNS, POSE, QUANTITIES, WHEELS, Signal, quantity_of
-from models.logs.spelling import unit_in_name, without_ending
+from models.logs.spelling import unit_in_name, without_units
 from models.logs.stamps import typical_rate
 from models.logs.units import (
     ACCELERATION,
@@ -33,6 +33,7 @@ from models.logs.units import (
     LENGTH,
     RATE,
     SPEED,
+    are_same,
     is_given,
     quantities,
     to_si,
@@ -52,6 +53,8 @@ _APART = 0.04  # of confidence: nearer ones are equal
 _LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
 _LOOKED_AT = 20_000  # samples at most, in telling contents apart
 _SPIKES = 1e-3  # share of samples that say nothing of the unit
+_LONGEST = 17.5  # [m]: wheelbase, with understeer at speed, that v_x δ / r can be, as in checks
+_FASTEST = 430.0  # [km/h]
 _SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
 _HAND = "steering wheel"  # an angle that wants a ratio
@@ -109,8 +112,7 @@ _SIDE_AND_AXLE = re.compile(r"(?<![A-Za-z0-9])[LR][12](?![A-Za-z0-9])")
 _SPIN = re.compile(r"(?<![A-Za-z])AV[xyz](?![A-Za-z])")  # and "AVy_L1" of the spin of a wheel
 _CORNER_OF_AXLE = {"L1": " fl ", "R1": " fr ", "L2": " rl ", "R2": " rr "}
 _GENERIC = ("data", "value")  # a field that says nothing, as of std_msgs: its topic is its name
-_UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "ψ": "psi", "β": "beta",
-                         "δ": "delta", "ω": "omega"})  # fmt: skip
+_UMLAUTS = str.maketrans(_TABLES["letters"])
 
 
 _WHEELS = _TABLES["wheels"]
@@ -267,6 +269,7 @@ def _is_hint(signal: str, one: Heading) -> bool:
     starts = _HINTS.get(signal, ())
     fits = is_given(one.unit) and QUANTITIES[signal] in quantities(one.unit)
     named = any(word.startswith(starts) and "wind" not in word for word in words)
+    named |= signal == "r" and bool(quantities(one.name))  # it has no other name than "deg/s"
     return fits and named and not words & _RULES[signal].never
 
 
@@ -280,13 +283,14 @@ def propose(
     """
     headings = log.headings() if headings is None else headings
     candidates = {name: _candidates(name, headings) for name in QUANTITIES if name not in POSE}
-    posed = _pose(headings)
     requested = {name for found in candidates.values() for guess in found for name in guess.channel}
     given = {one.name: _with_given_unit(one).unit for one in headings}
-    names = {name: _words_of(without_ending(name, unit)) for name, unit in given.items()}
+    names = {name: _words_of(without_units(name, unit)[0]) for name, unit in given.items()}
     bad = _REFERENCE | _CORNERS
     boxes = triads({name: one for name, one in names.items() if not bad & set(one)}, given)
     requested |= {name for box in boxes for name in box.names.values()}
+    posed = [some.values() for some in poses(headings).values() if "z" in some]
+    requested |= {one[0].name for some in posed for one in some}
     seen = _seen(log, [one.name for one in headings if one.name in requested], run)
     candidates = {
         name: [_looked(name, guess, seen) for guess in found] for name, found in candidates.items()
@@ -307,49 +311,76 @@ def propose(
         others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
         if others:
             rivals[name] = (equal[0], *others)
-    return Proposal(guesses={**guesses, **posed}, rivals=rivals)
+    pose = _pose(headings, seen, _likeliest(candidates["delta_f"]))
+    return Proposal(guesses={**guesses, **pose}, rivals=rivals)
 
 
 _PLACE = re.compile(_TABLES["pose"]["place"])
 _ANGLE = re.compile(_TABLES["pose"]["angle"])
 _TURN = re.compile(_TABLES["pose"]["turn"])
+_TURNED = {"h", "qy", "qw"}
 _NO_POSE = set(_TABLES["pose"]["never"].split())
 
 
-def _pose(headings: Sequence[Heading]) -> dict[str, Guess]:
-    """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure."""
-    groups: dict[str, dict[str, Heading]] = {}
+def poses(headings: Sequence[Heading]) -> dict[str, dict[str, list[Heading]]]:
+    """Return channels of poses by the sensor that they name: x, y, h of the heading, qx to qw."""
+    groups: dict[str, dict[str, list[Heading]]] = {}
     for one in map(_with_given_unit, headings):
-        words = "_".join(_words_of(without_ending(one.name, one.unit)))
+        words = "_".join(_words_of(without_units(one.name, one.unit)[0]))
         plausible = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
         for form, wanted, mark in ((_PLACE, LENGTH, ""), (_ANGLE, ANGLE, "h"), (_TURN, ANGLE, "q")):
             found = form.fullmatch(words)
             of = set((found["of"] or "").split("_")) if found else set()
             if found and wanted in plausible and not of & _NO_POSE:
-                key = mark if mark == "h" else mark + found["axis"]
-                groups.setdefault(found["of"] or "", {}).setdefault(key, one)
+                axis = "" if mark == "h" else found["axis"]
+                key = mark + {"e": "x", "n": "y"}.get(axis[:1], axis)
+                groups.setdefault(found["of"] or "", {}).setdefault(key, []).append(one)
                 break
+    return groups
+
+
+def _pose(
+    headings: Sequence[Heading], seen: Mapping[str, Channel], steering: str
+) -> dict[str, Guess]:
+    """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure.
+
+    Of a world with y up z is y, turned as the steering does.
+    """
     whole = {
-        name: some
-        for name, some in groups.items()
-        if {"x", "y"} <= set(some) and ("h" in some or {"qz", "qw"} <= set(some))
+        name: {key: listed[0] for key, listed in some.items()}
+        for name, some in poses(headings).items()
+        if "x" in some and ("y" in some or "z" in some) and _TURNED & set(some)
     }
     measured = [name for name in whole if "odom" not in name] or list(whole)
     if not measured:
         return {}
-    some = whole[measured[0]]
-    sure = _KNOWN if len(measured) == 1 else HINT
-    why = "" if len(measured) == 1 else "there are several poses"
+    some, sign = whole[measured[0]], 1.0
+    place = {key: some[key].name for key in "xyz" if key in some}
+    about = some.get("h") or (None if "qw" in some else some["qy"])
+    heading = about.name if about else ""
+    if "z" in some and {*place.values(), heading} - {""} <= set(seen):
+        level, sign = ground(seen, place, heading, steering)
+        if level == "z":
+            swapped = {"qz": "qy", "qy": "qz", "y": "z"}
+            some |= {key: some[of] for key, of in swapped.items() if of in some}
+            some |= {"h": about} if about else {}
+    if not ("y" in some and ("h" in some or {"qz", "qw"} <= set(some))):
+        return {}
+    why = "there are several poses" if len(measured) > 1 else ""
+    why = why or ("" if sign else "seen from above or, *-1, from below?")
+    sure = HINT if why else _KNOWN
     lost = _NO_UNIT_LOSS if measured[0] and not is_given(some["x"].unit) else 0.0
     turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
     turned = [some["h"].name] if "h" in some else turned[-2:] if len(turned) < 4 else turned
     angle = some["h"].unit if "h" in some else ""
     return {
-        name: Guess(channel=tuple(listed), confidence=sure - lost, unit=unit.strip(), why=why)
-        for name, listed, unit in (
-            ("x", [some["x"].name], some["x"].unit),
-            ("y", [some["y"].name], some["y"].unit),
-            ("heading", turned, angle),
+        name: Guess(
+            channel=tuple(listed), confidence=sure - lost, unit=unit.strip(), factor=factor, why=why
+        )
+        for name, listed, unit, factor in (
+            ("x", [some["x"].name], some["x"].unit, 1.0),
+            ("y", [some["y"].name], some["y"].unit, sign or 1.0),
+            ("heading", turned, angle, 1.0),
         )
     }
 
@@ -424,7 +455,7 @@ def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -
     """Return whether two guesses are one channel, as SPEED_KPH and SPEED_MPH: name and numbers."""
     if len(one.channel) + len(other.channel) > 2 or _is_given(one) != _is_given(other):
         return False
-    names = (_words_of(without_ending(guess.channel[0], guess.unit)) for guess in (one, other))
+    names = (_words_of(without_units(guess.channel[0], guess.unit)[0]) for guess in (one, other))
     if len(set(names)) > 1:
         return False
     first, second = (seen[guess.channel[0]] for guess in (one, other))
@@ -464,17 +495,20 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
     found = []
     listed = [_with_given_unit(one) for one in headings]
     for one in listed:
-        names = {without_ending(one.name, one.unit)}
-        names |= {one.name} if one.name.lower().endswith("_g") else set()  # "lat_g" is in g, and g
+        bare, other = without_units(one.name, one.unit)
+        names = {bare} | ({one.name} if are_same(other or one.unit, "g") else set())  # as "lat_g"
         by_name = max(_name_confidence(signal, name) for name in names)
+        if signal == "v_x" and quantities(one.name) == (SPEED,) and one.name.lower() != "fps":
+            by_name = max(by_name, _VAGUE)  # its unit is its name
         by_hand = max(_name_confidence(_HAND, name) for name in names) * (signal == "delta_f")
         best = max(by_name, by_hand)
         if best > 0.0:
-            found.append(
-                _with_unit(signal, one, Guess(
-                    channel=(one.name,), confidence=best, hand=by_hand > by_name
-                ))
-            )  # fmt: skip
+            guess = Guess(channel=(one.name,), confidence=best, hand=by_hand > by_name)
+            guess = _with_unit(signal, one, guess)
+            if other and max(_name_confidence(key, bare) for key in (signal, _HAND)):
+                why = f"its name says {other}, its unit is {one.unit.strip()}: which is it?"
+                guess = replace(guess, confidence=min(guess.confidence, HINT), why=why)
+            found.append(guess)
         elif _is_hint(signal, one):
             unit, why = one.unit.strip(), "by a word of its name and its unit"
             found.append(Guess(channel=(one.name,), confidence=HINT, unit=unit, why=why))
@@ -585,6 +619,8 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
     if quantity == ACCELERATION:
         return guess  # `_beside_turning` sets it beside v_x and r
     unit = unit_of_range(HAND_WHEEL if guess.hand else quantity, usual)
+    if unit == "km/h" and usual > _FASTEST:
+        guess = replace(_said(guess, "in tenths, as no car is so fast"), factor=0.1)
     if unit and quantity == ANGLE and signal != BETA and not guess.hand:
         hand = usual * to_si(unit, quantity, signal) > _LARGEST_ROAD
         guess = replace(guess, hand=hand)
@@ -607,6 +643,11 @@ def _beside_turning(
         if (likely := [one for one in candidates[name] if one.confidence > STILL])
     }
     mended = dict(candidates)
+    if {"v_x", "r"} <= set(best):
+        mended["delta_f"] = [
+            _levered(one, best, seen) if one.confidence > STILL else one
+            for one in candidates["delta_f"]
+        ]
     for name in _ASSUMED:
         mended[name] = [
             guess
@@ -617,12 +658,27 @@ def _beside_turning(
     for name, like in (("v_y", "v_x"), ("a_x", "a_y")):
         channel = best[like].channel if like in best else ()
         first = next((one for one in mended[like] if one.channel == channel), None)
-        if first is not None and first.unit and not _is_given(best[like]):
+        if first is not None and first.unit and best[like].confidence < SURE:
             mended[name] = [
                 guess if _is_given(guess) else replace(_said(guess, f"as {like}"), unit=first.unit)
                 for guess in candidates[name]
             ]
     return mended
+
+
+def _levered(guess: Guess, best: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
+    """Return a guess of the steering, of the hand wheel where it turns too far for the car's bend.
+
+    v_x δ / r is the wheelbase, and more of a car that understeers.
+    """
+    there = {"v_x": best["v_x"], "r": best["r"], "delta_f": guess}
+    v, r, delta = (
+        _root_mean_square(seen[one.channel[0]].values) * to_si(one.unit, QUANTITIES[name], name)
+        for name, one in there.items()
+    )
+    if guess.hand or not v * delta > _LONGEST * r > 0.0:
+        return guess
+    return replace(_said(guess, "too far for how the car turns"), hand=True)
 
 
 def _is_given(guess: Guess) -> bool:
@@ -647,6 +703,9 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channe
 
     choices = [(one.unit,) if _is_given(one) else _ASSUMED[key] for key, one in there.items()]
     unit = min(itertools.product(*choices), key=far)[list(there).index(name)]
+    named = unit == "g" and "g" in _words_of(guess.channel[0])
+    if named and all(one.confidence >= SURE for key, one in there.items() if key != name):
+        return replace(guess, confidence=guess.confidence + _NO_UNIT_LOSS, unit=unit, why="")
     return replace(_said(guess, f"so in {unit}, by vx r = ay"), unit=unit) if unit else guess
 
 

@@ -11,7 +11,7 @@ import codecs
 import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import islice
@@ -23,7 +23,7 @@ from models.logs.log import RecordingError, few
 from models.logs.spelling import is_unit, is_units_row, unit_in_name
 from models.logs.stamps import nanoseconds
 from models.logs.table import Columns
-from models.logs.units import PER_SECOND, quantities, time_unit
+from models.logs.units import PER_SECOND, TABLES, quantities, time_unit
 
 _ROWS = 400  # of data that tell what columns are
 _TAIL = 40  # last lines of them that tell how cells are written
@@ -38,12 +38,17 @@ _DELIMITERS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars", BLAN
 COMMENT = ("#", "%", "//")
 _PADDING = " \t,;|\"'"  # that a spreadsheet leaves of an empty line
 _ONES = "1" + " ".join(_DELIMITERS)  # of a line in which every cell is 1, if any is
-MISSING = ("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--", "---", "1.#qnan", "-1.#ind")
+MISSING = ("", *TABLES["header"]["missing"].split())
 
-_DOT = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?")
-_COMMA = re.compile(r"[-+]?(?:\d+|\d*,\d+)(?:[eE][-+]?\d+)?")
+_DOT = re.compile(r"[-+]?(?:\d+(?:\.\d*)?|\.\d+)(?:[eEdD][-+]?\d+)?")  # D: of Fortran
+_COMMA = re.compile(r"[-+]?(?:\d+|\d*,\d+)(?:[eEdD][-+]?\d+)?")
+_MINUS = re.compile("[\u2212\u2013\u00ad\uff0d](?=[.,]?\\d)")  # that a text processor makes of "-"
+_WIDE = re.compile("(?<=\\d)[\u00a0\u2009\u202f\u2007](?=\\d{3}(?!\\d))")  # between thousands
+_BLANK = re.compile("[\u00a0\u2009\u202f\u2007]")
 _POINTS = re.compile(r"[-+]?\d{1,3}(?:\.\d{3})+(?:,\d*)?")  # 1.234.567,8
 _COMMAS = re.compile(r"[-+]?\d{1,3}(?:,\d{3})+(?:\.\d*)?")  # 1,234,567.8
+_FORTRAN = re.compile(r"[-+]?[\d.,]+[dD][-+]?\d+")
+_NO_DIGITS = TABLES["header"]["numbers"].split()
 _MAYBE_INSTANT = re.compile(r"(?=.*\d).*[-:/.]\w.*")
 # A rate or an interval of samples that a preamble tells: "Sample Rate","100.000","Hz".
 _GIVEN_RATE = re.compile(
@@ -59,6 +64,11 @@ _GIVEN_STEP = re.compile(
 )
 # RaceCapture describes a channel in one cell: "Speed"|"mph"|0.0|150.0|10, its range and rate.
 _DESCRIBED = re.compile(r'"?(?P<name>[^"|]+)"?\|"?(?P<unit>[^"|]*)"?(?:\|[-+.\deE]*){1,3}')
+# A channel that is described by lines, not by its column: "Channel : Speed", "Ch 1 = Speed [km/h]".
+_KEYS = "channel|ch|signal|column|col|kanal|spalte|name|field|parameter"
+_NAME_LINE = re.compile(rf"\W*(?:{_KEYS})(?: ?name| ?\d+)?\s*[:=]\s*(.*\S)\s*", re.I)
+_UNIT_LINE = re.compile(r"\W*(?:unit|units|einheit)(?: ?\d+)?\s*[:=]\s*(.*\S)\s*", re.I)
+_TITLE = re.compile(r"(?:channels|signals|columns|names|fields|units|header)\s*[:=]\s*", re.I)
 _CONTROLS = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _QUOTED = re.compile(r'["\r\n\x00]')  # what a reader of CSV does more with than to split
 _LONGEST_CELL = csv.field_size_limit()  # characters
@@ -109,8 +119,13 @@ class _Way(NamedTuple):
     share: float
 
 
-def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
-    """Return the layout of a text file.   whole : whether they are all of it."""
+def find_layout(
+    path: Path, head: bytes, whole: bool, unnamed: Mapping[int, tuple[str, ...]]
+) -> Layout:
+    """Return the layout of a text file.
+    whole : whether they are all of it.
+    unnamed : names of columns without a header, by their number.
+    """
     encoding = _encoding(path, head)
     text = _decoded(path, head, encoding)
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
@@ -133,14 +148,10 @@ def find_layout(path: Path, head: bytes, whole: bool) -> Layout:
         return _no_data(path, lines, encoding)
     few(path, way.width, "columns", "columns")
     table = [_Line(k, line, way.delimiter) for k, line in enumerate(lines, start=1)]
-    return _table(path, table, way, encoding)
+    return _table(path, table, way, encoding, unnamed.get(way.width))
 
 
-_MAKERS = {
-    "motec csv": "MoTeC i2", "aim csv": "AiM Race Studio", "carmaker": "IPG CarMaker",
-    "#infofile": "IPG CarMaker", "2d datarecording": "2D", "winarace": "2D",
-    "racelogic": "Racelogic",
-}  # fmt: skip
+_MAKERS = TABLES["header"]["makers"]
 _PI_TOOLBOX, _BLOCK = "PiToolboxVersionedASCIIDataSet", "{ChannelBlock}"
 
 
@@ -185,6 +196,7 @@ def _decoded(path: Path, head: bytes, encoding: str) -> str:
         raise RecordingError(
             f"{path}: is not a text file in {encoding.upper()} (byte {error.start})"
         ) from None
+    text = typed(text)
     control = _CONTROLS.search(text.rstrip("\x1a"))  # which ends texts of DOS
     if control:
         raise RecordingError(
@@ -192,6 +204,16 @@ def _decoded(path: Path, head: bytes, encoding: str) -> str:
             f"the character {ord(control[0]):#04x}), and no reader of binary files knows it"
         )
     return text
+
+
+def typed(text: str) -> str:
+    """Return a text with the signs of a keyboard: minus, blanks, thousands without any."""
+    return text if text.isascii() else _BLANK.sub(" ", _WIDE.sub("", _MINUS.sub("-", text)))
+
+
+def of_fortran(cell: str) -> str:
+    """Return a number with the exponent that Python reads: "1.25D+01" as "1.25E+01"."""
+    return cell.replace("D", "E").replace("d", "e") if _FORTRAN.fullmatch(cell) else cell
 
 
 def cells_of(line: str, delimiter: str) -> tuple[str, ...]:
@@ -218,7 +240,7 @@ def _is_number(cell: str, decimal: str, thousands: str = "") -> bool:
         return True
     if thousands:
         return bool((_COMMAS if thousands == "," else _POINTS).fullmatch(cell))
-    return cell.lower() in ("nan", "inf", "-inf", "+inf", "infinity", "-infinity", "-nan")
+    return cell.lower() in _NO_DIGITS
 
 
 def _is_instant(cell: str) -> bool:
@@ -260,20 +282,33 @@ def _numbers_in(line: _Line, way: _Way) -> int:
     return sum(_is_number(cell, way.decimal, way.thousands) for cell in cells)
 
 
-def _is_data(line: _Line, way: _Way) -> bool:
-    """Return whether a line is of numbers, at least half of its cells that are filled."""
+def _is_data(line: _Line, way: _Way, full: int) -> bool:
+    """Return whether a line is of numbers, at least half of its cells that are filled.
+    full : numbers that lines have; so many do where most cells are words.
+    """
     if _numbers(way.delimiter, way.decimal).fullmatch(line.text) and line.text.strip(_ONES):
         return True  # as most lines are: nothing but numbers, not all of them 1, which is a unit
     cells = line.cells
     right = _numbers_in(line, way)
-    return 2 * right >= max(sum(map(bool, cells[:_MANY])), 1) and not is_units_row(cells)
+    enough = 2 * right >= max(sum(map(bool, cells[:_MANY])), 1)
+    wordy = len(cells) == way.width and right >= max(full, 2)
+    return (enough or wordy) and not is_units_row(cells)
 
 
 # From the data upwards to header and units.
 
 
-def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
-    zone, first = _header_zone(path, lines, way)
+def _table(
+    path: Path, lines: list[_Line], way: _Way, encoding: str, unnamed: tuple[str, ...] | None
+) -> Layout:
+    zone, first = _listed(lines, way) or _header_zone(lines, way)
+    if unnamed and all(len(_uncommented(line, way)) != way.width for line in zone):
+        zone = [_Line(1, way.delimiter.join(unnamed), way.delimiter)]
+    if not zone:
+        raise RecordingError(
+            f"{path}: there is no header, line {lines[first].number} is data already; the first "
+            f"row must name the columns"
+        )
     names_line, units_line = _named(zone, way)
     names = list(_uncommented(names_line, way))
     units = list(_uncommented(units_line, way)) if units_line is not None else []
@@ -317,7 +352,7 @@ def _table(path: Path, lines: list[_Line], way: _Way, encoding: str) -> Layout:
     words += [f"names in line {names_line.number}"]
     words += [f"units in line {units_line.number}"] if units_line is not None else []
     words += [] if units_line is not None or not any(units) else ["units in the names"]
-    rate = _given_rate([line.text for line in lines[: lines.index(names_line)]])
+    rate = _given_rate([line.text for line in lines[: names_line.number - 1]])
     numeric = _numeric(data, names, way)
     return Layout(
         encoding=encoding,
@@ -348,7 +383,32 @@ def _given_rate(preamble: Sequence[str]) -> float:
     return 0.0
 
 
-def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
+def _listed(lines: list[_Line], way: _Way) -> tuple[list[_Line], int] | None:
+    """Return names and units that stand above the data one below the other, as lines, and the index
+    of the first data; None where they do not: "Channel : Speed", below it "Unit : km/h".
+
+    Of one name less than columns the first column is the time.
+    """
+    told: list[tuple[str, str]] = []
+    last = 0
+    for line in lines:
+        if found := _NAME_LINE.fullmatch(line.text):
+            told, last = [*told, (found[1], "")], line.number
+        elif told and (found := _UNIT_LINE.fullmatch(line.text)):
+            told[-1], last = (told[-1][0], found[1]), line.number
+    if len(told) < 2 or way.width - len(told) not in (0, 1):
+        return None
+    told = [("Time", "")] * (way.width - len(told)) + told
+    rows = (k for k in range(last, len(lines)) if len(lines[k].cells) == way.width)
+    first = next((k for k in rows if _is_data(lines[k], way, 0)), None)
+    names, units = (
+        way.delimiter.join(map('"{}"'.format, some)) for some in zip(*told, strict=True)
+    )
+    zone = [_Line(last, text, way.delimiter) for text in (units, names)]
+    return None if first is None else (zone[not any(one[1] for one in told) :], first)
+
+
+def _header_zone(lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
     """Return the lines above the data, the nearest first, and the index of the first data."""
     above = [k for k, line in enumerate(lines) if line.text.strip(_PADDING)]
     counts = sorted(_numbers_in(lines[k], way) for k in above[-_TAIL:])
@@ -357,7 +417,7 @@ def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line]
     zone: list[int] = []
     for place in range(len(above) - 1, -1, -1):
         line = lines[above[place]]
-        if _is_data(line, way) and not line.text.lstrip().startswith(COMMENT):
+        if _is_data(line, way, full) and not line.text.lstrip().startswith(COMMENT):
             first = above[place]
             continue
         if first is None:
@@ -365,7 +425,7 @@ def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line]
         higher = [lines[k] for k in above[max(0, place - 40) : place]]
         alike = sum(
             len(one.cells) == way.width
-            and _is_data(one, way)
+            and _is_data(one, way, full)
             and 2 * _numbers_in(one, way) >= full  # not "Duration,30,,," of a padded preamble
             for one in higher
         )
@@ -375,20 +435,14 @@ def _header_zone(path: Path, lines: list[_Line], way: _Way) -> tuple[list[_Line]
         break
     if first is None:
         first = above[-1]
-    if not zone:
-        raise RecordingError(
-            f"{path}: there is no header, line {lines[first].number} is data already; the first "
-            f"row must name the columns"
-        )
     return [lines[k] for k in zone], first
 
 
 def _uncommented(line: _Line, way: _Way) -> tuple[str, ...]:
-    text = line.text.lstrip()
-    for mark in COMMENT:
-        if text.startswith(mark):
-            return cells_of(text.lstrip("#%/").strip(), way.delimiter)
-    return line.cells
+    bare = line.text.strip()
+    bare = bare.lstrip("#%/").strip() if bare.startswith(COMMENT) else bare
+    bare = _TITLE.sub("", bare, count=1) if _TITLE.match(bare) else bare
+    return line.cells if bare == line.text.strip() else cells_of(bare, way.delimiter)
 
 
 def _named(zone: list[_Line], way: _Way) -> tuple[_Line, _Line | None]:
@@ -447,7 +501,7 @@ def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
 
 # Racelogic VBOX: [header], [channel units], [column names], [data], each a section.
 
-_OF_THE_BOX = ("sats", "time", "lat", "long", "velocity", "heading", "height")
+_OF_THE_BOX = TABLES["header"]["box"].split()
 
 
 def _sections(lines: list[str]) -> dict[str, int] | None:

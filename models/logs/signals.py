@@ -70,7 +70,8 @@ class Signal:
     unit : as users write units; empty takes that of the file, SI where it tells none.
     factor : the numbers are multiplied by it [-]; -1 turns a sign.
     offset : what the channel shows at zero, in SI; it is taken off.
-    ratio : angle of the hand wheel over that of the road wheels [-], of steering.
+    ratio : angle of the hand wheel over that of the road wheels [-], of steering; below zero it
+        turns the sign.
     table : pairs of angles of hand wheel and road wheels [rad], rising, in place of a ratio.
     sign : channel that has the sign of one that holds amounts: below zero, or 1 of 0 and 1, is
         negative; empty where there is none.
@@ -93,10 +94,10 @@ class Signal:
             raise RecordingError(f"factor must be finite and not zero, it is {self.factor}")
         if not math.isfinite(self.offset):
             raise RecordingError(f"offset must be finite, it is {self.offset}")
-        if not 1.0 / _LARGEST_RATIO <= self.ratio <= _LARGEST_RATIO:
+        if not 1.0 / _LARGEST_RATIO <= abs(self.ratio) <= _LARGEST_RATIO:
             raise RecordingError(
                 f"ratio must be hand wheel over road wheel, within {1.0 / _LARGEST_RATIO:g} and "
-                f"{_LARGEST_RATIO:g}, it is {self.ratio}"
+                f"{_LARGEST_RATIO:g} (below zero it turns the sign), it is {self.ratio}"
             )
         if self.table and self.ratio != 1.0:
             raise RecordingError("ratio and table say the same: give one of them")

@@ -22,7 +22,17 @@ from numpy.typing import NDArray
 from codegen.escape import displayed
 from models.logs import arrow
 from models.logs.log import RecordingError, few
-from models.logs.preamble import BLANKS, COMMENT, HEAD, MISSING, Layout, cells_of, find_layout
+from models.logs.preamble import (
+    BLANKS,
+    COMMENT,
+    HEAD,
+    MISSING,
+    Layout,
+    cells_of,
+    find_layout,
+    of_fortran,
+    typed,
+)
 from models.logs.stamps import nanoseconds
 from models.logs.table import Cells, Columns, Gathered, Kind, TableLog, Words
 from models.schema import pieces
@@ -36,15 +46,17 @@ _BLANK = re.compile(rb"[ \t]+")
 _MARGIN = re.compile(rb"^ | $", re.MULTILINE)
 
 
-def open_text(path: Path) -> TableLog:
-    """Return the log in a text file of any dialect, its layout understood."""
+def open_text(path: Path, unnamed: Mapping[int, tuple[str, ...]] | None = None) -> TableLog:
+    """Return the log in a text file of any dialect, its layout understood.
+    unnamed : names of columns without a header, by their number.
+    """
     head, whole = b"", True
     for part in pieces(path, RecordingError, limit="megabytes"):
         head += part
         if len(head) > HEAD:
             head, whole = head[:HEAD], False
             break
-    layout = find_layout(path, head, whole)
+    layout = find_layout(path, head, whole, unnamed or {})
     few(path, len(layout.columns.names), "columns", "columns")
     table = TextTable(path=path, layout=layout)
     return TableLog(table=table)
@@ -76,6 +88,7 @@ class TextTable:
         """
         layout = self.layout
         cells = [row[column].replace(layout.thousands or "\0", "") for row in layout.rows]
+        cells = list(map(of_fortran, cells))
         if layout.decimal == ",":
             cells = [cell.replace(",", ".") for cell in cells]
         return ["" if cell.lower() in MISSING else cell for cell in cells]
@@ -175,9 +188,10 @@ def _plain(path: Path, layout: Layout, line: int, block: bytes) -> bytes:
         )
     if not block.isascii():
         try:
-            block.decode("utf-8")
+            text = block.decode("utf-8")
         except UnicodeDecodeError:
-            block = block.decode("cp1252", "replace").encode("utf-8")
+            text = block.decode("cp1252", "replace")
+        block = typed(text).encode("utf-8")
     if layout.delimiter == BLANKS:
         block = _MARGIN.sub(b"", _BLANK.sub(b" ", block))
     return block
@@ -301,7 +315,7 @@ class _Python:
 
 def _float(cell: str, decimal: str, thousands: str) -> float | None:
     """Return a cell as a number, NaN where it is missing, None where it is neither."""
-    text = cell.strip()
+    text = of_fortran(cell.strip())
     if text.lower() in MISSING:
         return math.nan
     if "_" in text:  # which Python takes for a mark between digits

@@ -16,6 +16,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.logs.stamps import NAMES
+from models.logs.units import TABLES
 
 _LEAST_RATE = 1.0  # [Hz]
 _MOST_RATE = 1e5  # [Hz]
@@ -25,14 +26,7 @@ _MOST_COLUMNS = 1000  # of a matrix that is a table of signals
 _CLOCK = re.compile(r"([a-z_ ]+?)(?:_?(s|sec|ms|us|ns))?")
 _OTHER_CLOCKS = ("tout", "timestep")
 HEAD = 200  # times by which a clock is known
-_DATA = ("data", "values", "value", "samples", "raw")
-_NAME = ("name", "label", "signalname", "blockname")
-_UNIT = ("unit", "units")
-_COLUMNS = ("names", "labels", "channels", "columns", "header", "headers", "varnames", "signals")
-_RATES = (
-    "fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "rate", "freq",
-)  # fmt: skip
-_STEPS = ("dt", "ts", "sampletime", "sampleperiod", "samplinginterval", "samplingtime", "deltat")
+_DATA, _NAME, _UNIT, _COLUMNS, _RATES, _STEPS = (row.split() for row in TABLES["struct"].values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -99,7 +99,7 @@ def recording_of(
         chosen: Mapping[str, Signal],
     ) -> tuple[dict[str, Signal], dict[str, list[Raw]], tuple[str, ...], _Segments]:
         channels = _channels(log, label, chosen, log_map, run)
-        named, raws, said = with_pose(label, chosen, channels)
+        named, raws, said = with_pose(label, chosen, channels, "heading" in log_map.signals)
         return named, raws, said, _segments(label, named, raws, log_map, dt)
 
     try:

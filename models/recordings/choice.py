@@ -173,18 +173,18 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
 
 def _in_struct(names: Sequence[str]) -> dict[str, Signal]:
     """Return the signals whose standard names are fields of structs; of two that of the fuller."""
-    found: dict[str, list[str]] = {}
+    found: dict[str, list[tuple[str, str]]] = {}
     for one in names:
         struct, dot, field = one.rpartition(".")
         name = signal_name(field)
         if dot and name and name not in (BETA, *POSE):
-            found.setdefault(name, []).append(struct)
-    count = Counter(struct for structs in found.values() for struct in structs)
+            found.setdefault(name, []).append((struct, one))
+    count = Counter(struct for fields in found.values() for struct, _ in fields)
     result = {}
-    for name, structs in found.items():
-        first, *rest = sorted(structs, key=lambda struct: -count[struct])
-        if not rest or count[first] > count[rest[0]]:
-            result[name] = Signal(channel=(f"{first}.{column_of(name)}",))
+    for name, fields in found.items():
+        first, *rest = sorted(fields, key=lambda one: -count[one[0]])
+        if not rest or count[first[0]] > count[rest[0][0]]:
+            result[name] = Signal(channel=(first[1],))
     return result
 
 

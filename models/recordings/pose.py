@@ -17,16 +17,17 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from models.logs.clock import Raw, gaps, typical_step
 from models.logs.log import RecordingError
-from models.logs.signals import POSE, Signal
+from models.logs.signals import POSE, QUANTITIES, Signal
 from models.recordings.map import LONGEST_GAP
 
 _NO_SLIP = 2e-3  # v_y over v_x of a pose that is integrated along its heading
 _SLOW = 0.025  # [s] between poses from which a gyro tells the yaw rate
 _FEWEST_SAMPLES = 30  # samples of a piece that is differentiated
 _STANDS = 0.05  # [m/s], a pose that never goes faster does not move
-_MOVES = 0.2  # share of the largest speed below which the direction of travel is not asked
 _ALONG = 0.35  # [rad] that the direction of travel may lie off the heading, or a quarter of a turn
-_ALONG_ALL = 0.9  # length of the mean direction of travel against the heading, 1 where all agree
+_ACROSS = 0.4  # rms of the velocity across the car over all of it, with slip of a drift
+_CLEARLY = 1.5  # times that another sense must leave across to be out, each with its side slip
+_STRAIGHT = 2e-3  # of the speed, more: what is across where nothing turns
 _LATEST = 0.3  # [s] that a gyro may be late against a pose
 _LATE = 0.01  # [s] that it is late, more of which is taken out of it
 _ALIKE = 0.9  # correlation of the two yaw rates from which that is known
@@ -36,19 +37,23 @@ _STRENGTHS = np.geomspace(1e-3, 1e9, 49)  # λ [-]
 
 
 def with_pose(
-    label: str, signals: Mapping[str, Signal], parts: Mapping[str, list[Raw]]
+    label: str, signals: Mapping[str, Signal], parts: Mapping[str, list[Raw]], declared: bool
 ) -> tuple[dict[str, Signal], dict[str, list[Raw]], tuple[str, ...]]:
     """Return signals and their channels with v_x, v_y and r of the pose in its place, and notes.
 
     A gyro tells how late it, and what else a box has, is against the pose; that is taken out.
     parts : by signal its channels in SI.
+    declared : whether somebody said how the heading counts.
     """
     if not set(POSE) <= set(signals):
         return dict(signals), dict(parts), ()
     pose = {name: parts[name][0] for name in POSE}
     if len(parts["heading"]) > 1:
         pose["heading"] = _of_quaternion(label, parts["heading"])
-    motion = _motion_of(label, pose)
+    for name, raw in pose.items():
+        values = signals[name].value([raw.values], QUANTITIES[name])
+        pose[name] = raw._replace(values=values)
+    motion = _motion_of(label, pose, signals, declared)
     sideways = float(np.sqrt(np.mean(motion.v_y.values**2)))
     if sideways < _NO_SLIP * float(np.sqrt(np.mean(motion.v_x.values**2))):
         raise RecordingError(
@@ -109,7 +114,9 @@ class _Motion(NamedTuple):
     said: str
 
 
-def _motion_of(label: str, parts: Mapping[str, Raw]) -> _Motion:
+def _motion_of(
+    label: str, parts: Mapping[str, Raw], signals: Mapping[str, Signal], declared: bool
+) -> _Motion:
     """Return how a car moves by its pose.
     parts : by name of `POSE` on one clock or several, SI.
     """
@@ -130,7 +137,7 @@ def _motion_of(label: str, parts: Mapping[str, Raw]) -> _Motion:
             f"{label}: the pose must have at least {_FEWEST_SAMPLES} samples without a gap, "
             f"it has {t.size}"
         )
-    angles, turned = _heading(label, pieces)
+    angles, unit, turned = _heading(label, pieces, signals, declared)
     angle = np.concatenate(angles)
     dx, dy = np.concatenate([piece.rates for piece in pieces]).T
     each = zip(angles, pieces, strict=True)
@@ -145,10 +152,10 @@ def _motion_of(label: str, parts: Mapping[str, Raw]) -> _Motion:
             np.concatenate(rates),
         )
     )
-    noise = [float(np.median([piece.noise[k] for piece in pieces])) for k in (0, 1)]
+    place, heading = np.median([piece.noise for piece in pieces], axis=0)
     said = (
-        f"{turned}; its position scatters by {noise[0]:.2g} m, its heading by "
-        f"{math.degrees(noise[1]):.2g} deg"
+        f"{turned}; its position scatters by {place:.2g} m, its heading by "
+        f"{math.degrees(unit * heading):.2g} deg"
     )
     return _Motion(v_x, v_y, r, said)
 
@@ -202,33 +209,48 @@ def _smoothed(z: Array) -> tuple[Array, float]:
     return values, noise
 
 
-def _heading(label: str, pieces: Sequence[_Piece]) -> tuple[list[Array], str]:
-    """Return the headings, counted from x to y in rad, and what was done to them in words."""
-    speeds = [np.hypot(*piece.rates.T) for piece in pieces]
-    most = max(float(speed.max()) for speed in speeds)
+def _heading(
+    label: str, pieces: Sequence[_Piece], signals: Mapping[str, Signal], declared: bool
+) -> tuple[list[Array], float, str]:
+    """Return the headings, counted from x to y in rad, the unit that they had [rad], and in words
+    what was done to them: the sense and unit that leave the least velocity across the car.
+    declared : whether somebody said how it counts, which holds where the drive does not tell.
+    """
+    v = np.concatenate([piece.rates @ np.array([1.0, 1j]) for piece in pieces])
+    heading = np.concatenate([piece.heading for piece in pieces])
+    most = float(np.abs(v).max())
     if not most > _STANDS:
         raise RecordingError(f"{label}: the pose must move, its largest speed is {most:.3g} m/s")
-    fast = _MOVES * most
-    moving = [(piece, speed > fast) for piece, speed in zip(pieces, speeds, strict=True)]
-    travel = np.concatenate([np.arctan2(p.rates[m, 1], p.rates[m, 0]) for p, m in moving])
-    heading = np.concatenate([p.heading[m] for p, m in moving])
     ways = [(sign, unit) for unit in (1.0, math.pi / 180.0) for sign in (1.0, -1.0)]
-    means = [np.mean(np.exp(1j * (travel - sign * unit * heading))) for sign, unit in ways]
-    best = int(np.argmax(np.abs(means) > max(np.abs(means)) - 0.02))
-    (sign, unit), mean = ways[best], means[best]
-    if not abs(mean) >= _ALONG_ALL:
+    turned = [v * np.exp(-1j * sign * unit * heading) for sign, unit in ways]
+    axes = [np.mean(one**2) / np.mean(np.abs(v) ** 2) for one in turned]  # squared: or backwards
+    across = np.sqrt(np.maximum(0.5 - 0.5 * np.abs(axes), 0.0))
+    best = int(np.argmin(across))
+    if across[best] > _ACROSS:
         raise RecordingError(
             f"{label}: the heading must go along with the direction of travel of x and y, it does "
             "not: another channel, or other axes?"
         )
-    away = float(np.angle(mean))
+    alike = across < _CLEARLY * across[best] + _STRAIGHT
+    if alike.sum() > 1:
+        if not (declared and alike[0]):
+            x, y, angle = (" + ".join(signals[name].channel) for name in POSE)
+            unit = signals["heading"].unit or ("rad" if alike[:2].any() else "deg")
+            raise RecordingError(
+                f"{label}: the drive does not tell whether the heading counts to the left or "
+                f'clockwise: declare it by --columns "x={x}" "y={y}" "heading={angle} [{unit}]", '
+                "with *-1 behind the unit if clockwise"
+            )
+        best = 0
+    (sign, unit), away = ways[best], float(np.angle(axes[best])) / 2.0
+    away += math.pi if np.mean(turned[best] * np.exp(-1j * away)).real < 0.0 else 0.0
     whole = _TURN * round(away / _TURN)
     shift = whole if abs(away - whole) < _ALONG else away
     said = ["its heading is clockwise"] if sign < 0 else []
     said += ["its heading is in degrees"] if unit != 1.0 else []
     said += [f"its heading lies {math.degrees(shift):.0f} deg off the travel"] if shift else []
     words = f" ({', '.join(said)})" if said else ""
-    return [sign * unit * piece.heading + shift for piece in pieces], words
+    return [sign * unit * piece.heading + shift for piece in pieces], unit, words
 
 
 def _lateness(gyro: Raw, pose: Raw) -> float | None:

@@ -188,16 +188,25 @@ class Path:
         return cls.from_line(line, name=name, closed=closed)
 
     @classmethod
-    def from_csv(cls, file: FilePath | str, *, closed: bool | None = None) -> Self:
-        """Read way-points from a table with columns X_m, Y_m or x, y [m]; others are ignored.
+    def from_csv(
+        cls,
+        file: FilePath | str,
+        *,
+        closed: bool | None = None,
+        minimum_radius: float | None = None,
+    ) -> Self:
+        """Read way-points from columns x and y of a table, as race lines and center lines have.
 
-        The name of the path is that of the file without folder and ending.
+        Other columns, as of widths, heading and speed, are ignored. The name of the path is that of
+        the file without folder and ending.
 
         Parameters
         ----------
-        file : CSV with a header, or another format of logs.
+        file : CSV, or another format of logs; without a header 2 to 4 columns begin with x and y, 7
+            are those of a race line of TUM.
         closed : as for way-points; None: closed where the last point is no farther from the first
             than 1.5 median gaps between neighbors.
+        minimum_radius : tightest turn allowed [m]; None: 3 m, or two median gaps if that is less.
 
         Raises
         ------
@@ -205,11 +214,14 @@ class Path:
             Naming the file and the column, line or rule that is broken.
         """
         waypoints = read_waypoints(FilePath(file))
+        radius = waypoints.tightest() if minimum_radius is None else minimum_radius
         path = cls.from_waypoints(
             waypoints.X,
             waypoints.Y,
             closed=waypoints.seems_closed() if closed is None else closed,
             name=str(file),
+            spacing=min(0.25, 0.25 * radius),
+            minimum_radius=radius,
         )
         return replace(path, name=FilePath(file).stem)
 

@@ -14,12 +14,23 @@ from scipy.interpolate import CubicSpline
 from codegen.arrays import Array
 from models.logs.door import open_log
 from models.logs.log import RecordingError
+from models.logs.names import poses
+from models.logs.units import LENGTH, to_si
 from models.schema import require_few
 from mpc.path.line import Line, PathError, uniform_grid
 
 _FITS = 4  # of a line, each over the arc length of the one before
 _FARTHEST = 1e8  # of a way-point from the origin [m]: every map of the earth fits
 _SAME = 1e-6  # of the median gap: way-points as near as this are one
+# Names of the columns of a file that has none, by their number: with a speed, with widths to the
+# right and left as F1TENTH writes them, and the race line of TUM.
+_UNNAMED = {
+    2: ("x", "y"),
+    3: ("x", "y", "v"),
+    4: ("x", "y", "right", "left"),
+    7: ("s", "x", "y", "psi", "kappa", "v", "a"),
+}
+_ENDS = 0.2  # of the median gap: the last way-point of a closed line as near as this is the first
 _PIECES = 8  # of every interval between knots, for its length
 
 _LOBES, _SHARES = np.polynomial.legendre.leggauss(8)  # nodes on -1 to 1, and weights
@@ -38,6 +49,11 @@ class _Waypoints(NamedTuple):
         gaps = np.hypot(np.diff(self.X), np.diff(self.Y))
         last = np.hypot(self.X[-1] - self.X[0], self.Y[-1] - self.Y[0])
         return bool(last <= 1.5 * np.median(gaps))
+
+    def tightest(self) -> float:
+        """Return which turn is one of a car and no kink [m]: 3 m, less where points are dense."""
+        gaps = np.hypot(np.diff(self.X), np.diff(self.Y))
+        return min(3.0, 2.0 * float(np.median(gaps))) if gaps.size else 3.0
 
 
 def line_through(
@@ -137,7 +153,7 @@ def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
             f"{points[far[0]].tolist()}"
         )
     gaps = _norm(np.diff(points, axis=0))
-    if closed and gaps.size and _norm(points[0] - points[-1]) <= _SAME * np.median(gaps):
+    if closed and gaps.size and _norm(points[0] - points[-1]) <= _ENDS * np.median(gaps):
         points = points[:-1]
     fewest = 4 if closed else 2
     if len(points) < fewest:
@@ -168,13 +184,21 @@ def _fit(points: Array, closed: bool) -> Any:
 
 
 def read_waypoints(file: Path) -> _Waypoints:
-    """Read X and Y [m] from the columns X_m, Y_m or x, y of a table; other columns are ignored.
+    """Read the position of a table, named as in logs; other columns are ignored.
     file : in any format of logs; a row is a way-point, and the time is not looked at.
     """
     try:
-        log = open_log(file, rate=1.0)
-        names = [one.name for one in log.listed()]
-        columns = log.read([_column(file, axis, names) for axis in ("x", "y")])
+        log = open_log(file, rate=1.0, unnamed=_UNNAMED)
+        headings = log.headings()
+        named = [some for some in poses(headings).values() if {"x", "y"} <= set(some)]
+        found = [one for some in named for axis in ("x", "y") for one in some[axis]]
+        if len(found) != 2:
+            raise PathError(
+                f"{file}: one pair of columns must be x and y, in a unit of length (x_m, y [mm], "
+                f"east_m), found {', '.join(one.name for one in headings)[:120]!r}"
+            )
+        columns = log.read([one.name for one in found])
+        factors = [to_si(one.unit, LENGTH, f"{file}: {one.name}") for one in found]
     except RecordingError as error:
         raise PathError(str(error)) from None
     for one in columns:
@@ -182,15 +206,4 @@ def read_waypoints(file: Path) -> _Waypoints:
         if (bad := np.flatnonzero(~np.isfinite(one.values))).size:
             place = f"{one.place} {one.rows[bad[0]]}"
             raise PathError(f"{file}: {one.name} must be a finite number, {place} has none")
-    return _Waypoints(*(one.values for one in columns))
-
-
-def _column(file: Path, axis: str, names: list[str]) -> str:
-    """Return the one column of an axis."""
-    found = [name for name in names if name.lower() in (f"{axis}_m", axis, f"{axis} [m]")]
-    if len(found) != 1:
-        listing = ", ".join(names)[:120]
-        raise PathError(
-            f"{file}: one column must be {axis.upper()}_m or {axis}, in meters, found {listing!r}"
-        )
-    return found[0]
+    return _Waypoints(*(k * one.values for k, one in zip(factors, columns, strict=True)))

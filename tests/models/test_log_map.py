@@ -100,7 +100,7 @@ def test_what_is_written_reads_back_bit_for_bit(
         ("[signals.v_y]\nchannel = 'a'\noffset = nan\n", "offset must be finite, it is nan"),
         ("[signals.v_y]\nchannel = 'a'\nratio = 2\n", "signals.v_y can have no ratio or table"),
         ("[signals.v_y]\nchannel = 'a'\nunit = 'deg'\n", "'deg' is one of an angle"),
-        ("[signals.delta_f]\nchannel = 'a'\nratio = -14\n", "ratio must be hand wheel over road"),
+        ("[signals.delta_f]\nchannel = 'a'\nratio = -1e4\n", "ratio must be hand wheel over road"),
         ("[signals.delta_f]\nchannel = 'a'\nratio = 2\ntable = [[0, 0], [1, 1]]\n", "give one of"),
         ("[signals.delta_f]\nchannel = 'a'\ntable = [[0, 0], [1, -1]]\n", "that rise"),
         *(

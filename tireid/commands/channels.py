@@ -61,6 +61,14 @@ def run(options: argparse.Namespace) -> int:
     sure = {**choice.standard_signals(log, names), **by_map}
     signals = choice.likely_signals(sure, proposal)
     signals = choice.with_wheels(signals, proposal)
+    hand, given = proposal.guesses.get("delta_f"), signals.get("delta_f")
+    if (
+        hand
+        and hand.hand
+        and given
+        and given == replace(given, channel=hand.channel, ratio=1.0, table=())
+    ):
+        del signals["delta_f"]  # declared without the ratio that it wants
     missing = choice.missing_signals(signals)
     tell("\n".join(_head(log, chosen)))
     seen = _seen(log, listed, signals, chosen)

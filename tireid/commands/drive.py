@@ -30,6 +30,7 @@ from tireid.progress import say, tell
 from tireid.verdicts import warn_of
 
 _NOT_COMPLETED = 1
+_TIGHTEST = 1.1  # radius of a turn over the wheelbase: wheels at 42 deg, as no car goes farther
 _EPILOG = (
     "Without --weights, frozen tires are identified first: the same car drives on "
     f"an open field for {DURATION:g} s, steered at random and ever harder until it "
@@ -214,9 +215,14 @@ def conditions_of(options: argparse.Namespace) -> driving.Conditions:
     name = options.path
     if name not in BUILT_IN and not FilePath(name).suffix:
         raise ValueError(f"--path: there is no path {name!r}; {', '.join(BUILT_IN)}, or FILE.csv")
-    path = BUILT_IN[name]() if name in BUILT_IN else Path.from_csv(FilePath(name))
-    shared.require_one(options, "weights", "method", "paper", "design")
     vehicle, wish = shared.read_vehicle(options), _parse_speed(options.speed)
+    radius = _TIGHTEST * vehicle.wheelbase
+    path = (
+        BUILT_IN[name]()
+        if name in BUILT_IN
+        else Path.from_csv(FilePath(name), minimum_radius=radius)
+    )
+    shared.require_one(options, "weights", "method", "paper", "design")
     drops = tuple(sorted(_parse_drop(text) for text in options.mu_drop))
     for s, _ in drops:
         if not path.closed and s >= path.length:

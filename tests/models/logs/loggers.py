@@ -184,6 +184,23 @@ def rounded(t, tick):
     return f"{math.floor(round(t / tick, 6)) * tick:.3f}"
 
 
+def fortran():
+    rows = [",".join(f"{one:.5E}" for one in row) for row in zip(*drive(), strict=True)]
+    return "\n".join([plain().split("\n")[0], *rows]).replace("E", "D").replace("TimD", "TimE")
+
+
+def renamed(header):
+    return header + "\n" + plain().split("\n", 1)[1]
+
+
+def described(form):
+    """Names and units in lines of their own above the rows."""
+    pairs = [one.rstrip("]").split(" [") for one in plain().split("\n")[0].split(",")]
+    lines = [form.format(k, *pair) for k, pair in enumerate(pairs, start=1)]
+    return renamed("\n".join(["Logger : one", "Range : 3600,0", *lines, "", "Log : 7"]))
+
+
+TWICE = "time_s [s],speed_kmh (km/h),vy_mps [m/s] 1),yaw_rate_deg (deg/s) *OBD,Steering_deg [deg]*"
 SPEEDS = {"Speed_kmh": "km/h", "Speed:km/h": "km/h", "Speed (km/h)": "km/h", "Speed": ""}
 
 DIALECTS: dict[str, bytes] = {
@@ -224,5 +241,13 @@ DIALECTS: dict[str, bytes] = {
     "minutes and seconds": stamped(lambda t: f"{int(t + 59.5) // 60:02d}:{(t + 59.5) % 60:06.3f}")
     .encode(),
     "rounded to 0.1 s": stamped(lambda t: rounded(t, 0.1)).encode(),
+    "a typographic minus": plain(";", ",").replace("-", "\u2212").encode(),
+    "an en dash": plain("\t").replace("-", "\u2013").encode("cp1252"),
+    "wide blanks": stamped(lambda t: f"{1000 * t:_.0f}".replace("_", "\u202f"), "Time\u00a0[ms]")
+    .encode("utf-16"),
+    "Fortran": fortran().encode(),
+    "units twice, remarks": renamed(TWICE).encode(),
+    "names and units in lines": described("Channel : {1}\nUnit : {2}\nID : 7").encode("utf-8-sig"),
+    "names in numbered comments": described("# Column {0} = {1} [{2}]").encode(),
     "comments": plain().replace("\n", "\n# a comment, with, commas\n", 1).encode(),
 }  # fmt: skip

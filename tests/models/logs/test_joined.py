@@ -84,12 +84,23 @@ def test_a_row_of_a_long_table_without_a_time_is_named(tmp_path):
         log.read([one.name for one in log.listed()])
 
 
-def test_units_of_a_long_table_stand_beside_its_names(tmp_path):
+@pytest.mark.parametrize(
+    "form",
+    ["t channel value unit", "Zeit Signal Wert Einheit Bemerkung", "id t key reading UOM note"],
+)
+def test_units_of_a_long_table_stand_beside_its_names(tmp_path, form):
     path = tmp_path / "log.csv"
     told = {"Gyro Z": "deg/s", "Speed": "km/h"}
-    rows = [(T[k], one, SIGNALS["r"][k], told[one]) for k in range(300) for one in told]
-    table(path, ("t", "channel", "value", "unit"), *map(list, zip(*rows, strict=True)))
+    rows = [(T[k], one, SIGNALS["r"][k], told[one], "ok") for k in range(300) for one in told]
+    rows = [(k, *row) for k, row in enumerate(rows)] if "id" in form else rows
+    cut = len(form.split())
+    table(path, form.split(), *[list(one) for one in zip(*rows, strict=True)][:cut])
     assert {one.name: one.unit for one in open_log(path).listed()} == told
+    lines = path.read_text().splitlines()
+    lines[-1] = lines[-1].replace("km/h", "m/s")
+    path.write_text("\n".join(lines))
+    with pytest.raises(RecordingError, match="Speed must have one unit, it has km/h, m/s"):
+        open_log(path)
 
 
 def test_a_table_with_words_and_a_value_that_is_no_long_one_stays_a_table(tmp_path):
@@ -121,6 +132,9 @@ def test_an_amount_has_the_sign_of_another_channel(tmp_path):
     log = open_log(path)
     guess = propose(log, log.headings()).guesses["delta_f"]
     assert guess.sign == "LWI_VZ_Lenkradwinkel" and guess.hand
+    turned = LogMap(signals=given_signals([f"delta_f={word.replace('/15', '/-15')}"]))
+    delta_f = read_recording(path, log_map=turned, check=False).delta_f
+    np.testing.assert_allclose(delta_f, -SIGNALS["delta_f"], atol=1e-5)
     lost = LogMap(signals=given_signals(["delta_f=LWI_Lenkradwinkel sign(VZ) [deg] /15"]))
     with pytest.raises(RecordingError, match="no column 'VZ' to read as delta_f"):
         read_recording(path, log_map=lost)
@@ -130,7 +144,8 @@ def test_an_amount_has_the_sign_of_another_channel(tmp_path):
 def test_a_struct_of_matlab_whose_fields_are_ours_is_read(tmp_path, depth):
     scipy = pytest.importorskip("scipy.io")
     path = tmp_path / "log.mat"
-    inner = {"t": T, **SIGNALS}
+    ours = {"vx": "v_x", "vy": "v_y"} if depth == 1 else {}
+    inner = {"t": T, **{ours.get(name, name): one for name, one in SIGNALS.items()}}
     slow = {"t": T[::10], "vx": T[::10]}
     tree = {"S": inner} if depth == 1 else {"data": {"car": inner, "gps": slow}}
     scipy.savemat(path, tree)

@@ -8,7 +8,7 @@ import pytest
 from models.logs.log import Channel, Listed
 from models.logs.names import _HAND, _RULES, SURE, Guess, _name_confidence, _words_of, propose
 from models.logs.signals import NEEDED
-from models.logs.spelling import unit_in_name, without_ending
+from models.logs.spelling import unit_in_name, without_units
 
 CALLED = {
     "v_x": ["vx", "VelForward", "Vel_Longitudinal", "Car.vx", "/odom/twist.twist.linear.x", "v_lon",
@@ -186,6 +186,15 @@ def test_an_angle_that_goes_farther_than_road_wheels_is_that_of_the_hand_wheel()
     assert named.guesses["delta_f"].hand and not named.is_sure("delta_f")
 
 
+@pytest.mark.parametrize("name", ["delta", "delta_f", "Front Steering Angle"])
+def test_an_angle_that_turns_too_far_for_the_bend_is_that_of_the_hand_wheel(name):
+    """v_x δ / r of road wheels is the wheelbase and the understeer of 20 m/s: 4 m."""
+    car = (("Speed", "m/s", 20.0 + WAVE), ("Yaw Rate", "rad/s", 0.3 * WAVE))
+    assert proposed(*car, (name, "deg", 3.5 * WAVE)).is_sure("delta_f")
+    far = proposed(*car, (name, "deg", 50.0 * WAVE))
+    assert far.guesses["delta_f"].hand and not far.is_sure("delta_f")
+
+
 def test_two_wheels_of_an_axle_are_taken_together():
     found = proposed(
         ("Car.SteerAngleFL", "rad", 0.1 * WAVE), ("Car.SteerAngleFR", "rad", 0.1 * WAVE),
@@ -233,13 +242,19 @@ def test_a_guess_that_cannot_be_read_is_none():
         ("GeschwRad", "GeschwRad", ""),  # of a wheel
         ("LenkRad", "LenkRad", ""),
         ("lenk_rad", "lenk_rad", ""),
-        ("MPS", "MPS", ""),
+        ("MPS", "MPS", "MPS"),
+        ("Speed (km/h) *OBD", "Speed", "km/h"),
+        ("Yaw [deg/s] 1)", "Yaw", "deg/s"),
+        ("Yaw Rate [deg/s] @100Hz", "Yaw Rate", "deg/s"),
+        ("Acc Lat [g] filtered", "Acc Lat filtered", "g"),
+        ("Speed [km/h] (GPS)", "Speed (GPS)", "km/h"),
+        ("Sensor (A) links", "Sensor (A) links", ""),
         ("dampsDeg2", "dampsDeg2", ""),
     ],
 )
 def test_units_stand_at_the_end_of_names_in_any_spelling(name, bare, unit):
     assert unit_in_name(name) == unit
-    assert without_ending(name, unit) == bare
+    assert without_units(name, unit) == (bare, "")
 
 
 def test_a_unit_of_the_name_is_that_of_the_signal_where_the_format_tells_none():
@@ -369,9 +384,38 @@ def test_a_word_of_a_name_and_its_unit_are_named_and_not_taken():
 
 
 def test_a_unit_in_a_name_may_be_spelled_in_another_way_beside_it():
-    assert without_ending("steering_deg", "°") == "steering"
-    assert without_ending("speed_kmh", "kph") == "speed"
-    assert without_ending("speed_kmh", "mph") == "speed_kmh"
+    assert without_units("steering_deg", "°") == ("steering", "")
+    assert without_units("speed_kmh", "kph") == ("speed", "")
+    assert without_units("speed_kmh", "mph") == ("speed", "km/h")
+    assert without_units("VL_Rad", "km/h") == ("VL_Rad", "")
+
+
+@pytest.mark.parametrize(
+    ("signal", "name", "unit", "said"),
+    [
+        ("v_x", "speed_kph [m/s]", "m/s", "km/h"), ("r", "yaw_rate_rad", "deg/s", "rad"),
+        ("delta_f", "delta_f_deg", "rad", "deg"), ("a_y", "ay_g", "m/s^2", "g"),
+        ("v_x", "Speed [mph]", "km/h", "mph"),
+    ],
+)  # fmt: skip
+def test_a_name_that_contradicts_its_unit_is_asked(signal, name, unit, said):
+    found = proposed((name, unit, 0.1 * WAVE))
+    assert not found.is_sure(signal)
+    assert f"its name says {said}, its unit is {unit}" in found.guesses[signal].why
+
+
+def test_a_unit_may_be_the_name():
+    speed, turn = ("MPH", unit_in_name("MPH"), 45.0 + WAVE), ("deg/s", "deg/s", 20.0 * WAVE)
+    found = proposed(speed, turn, ("fps", "", 60.0 + WAVE))
+    assert found.is_sure("v_x") and found.signals()["v_x"].unit == "MPH"
+    assert found.guesses["r"].channel == ("deg/s",) and not found.is_sure("r")
+
+
+def test_a_g_in_a_name_is_its_unit_where_turning_says_so():
+    car = (("Speed", "km/h", 72.0 + WAVE), ("Gyro Z", "rad/s", 0.4 * WAVE))
+    assert proposed(*car, ("G lat", "", 0.8 * WAVE)).signals()["a_y"].unit == "g"
+    assert not proposed(*car, ("G lat", "", 8.0 * WAVE)).is_sure("a_y")
+    assert not proposed(car[0], ("G lat", "", 0.8 * WAVE)).is_sure("a_y")
 
 
 def test_the_carriers_of_carmaker_are_road_wheels():

@@ -16,12 +16,51 @@ def rows(points, sep=","):
     return "".join(f"{x:.6f}{sep}{y:.6f}\n" for x, y in points)
 
 
-@pytest.mark.parametrize("header", ["X_m,Y_m", "x,y", "# x_m,y_m", "\ufeffx, y", "X [m],Y [m]"])
-def test_the_usual_headers_are_understood(tmp_path, header):
-    path = Path.from_csv(write(tmp_path, f"{header}\n{rows(RING)}"))
+HEADERS = [
+    "X_m,Y_m",
+    "x,y",
+    "\ufeffx, y",
+    "X [m],Y [m]",
+    "Pos X (m),Pos Y (m)",
+    "east_m,north_m",
+    "",
+]
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.04])  # a 1:10 car turns at 1.2 m
+@pytest.mark.parametrize("header", HEADERS)
+def test_the_usual_headers_are_understood(tmp_path, header, scale):
+    ring = scale * np.array(RING)
+    path = Path.from_csv(write(tmp_path, f"{header}\n{rows(ring)}"))
     assert path.closed
     assert path.name == "track"
-    assert path.kappa == pytest.approx(1 / 30.0, rel=0.02)
+    assert path.kappa == pytest.approx(1 / 30.0 / scale, rel=0.02)
+
+
+WIDE = np.column_stack((RING, np.full((24, 2), 1.1)))
+LINE = np.column_stack((np.arange(24.0), RING, np.ones((24, 4))))
+
+
+@pytest.mark.parametrize(
+    ("head", "table", "apart"),
+    [
+        ("# s_m; x_m; y_m; psi_rad; kappa_radpm; vx_mps; ax_mps2", LINE, "; "),
+        ("# 5f0c\n# s_m;x_m;y_m;psi_rad;kappa_radpm;vx_mps;ax_mps2", LINE, ";"),
+        ("", LINE, ";"),
+        ("# x_m, y_m, w_tr_right_m, w_tr_left_m", WIDE, ", "),
+        ("", WIDE, ", "),
+        ("x_mm\ty_mm", 1e3 * np.array(RING), "\t"),
+    ],
+)
+@pytest.mark.parametrize("again", [0, 1])
+def test_race_lines_and_center_lines_are_read_with_or_without_the_first_point_again(
+    tmp_path, head, table, apart, again
+):
+    text = "".join(apart.join(f"{x:.3f}" for x in row) + "\n" for row in [*table, *table[:again]])
+    path = Path.from_csv(write(tmp_path, f"{head}\n{text}"))
+    assert path.closed
+    assert path.length == pytest.approx(60.0 * np.pi, rel=1e-4)
+    np.testing.assert_allclose((path.X[0], path.Y[0]), RING[0], atol=1e-9)
 
 
 def test_other_columns_comments_and_empty_lines_do_not_matter(tmp_path):
@@ -48,8 +87,8 @@ def test_an_open_path_stays_open_and_the_caller_decides(tmp_path):
     ("text", "message"),
     [
         ("", "is empty"),
-        ("x,z\n1,2\n", "one column must be Y_m or y, in meters, found 'x, z'"),
-        ("x_mm,y_mm\n1,2\n", "one column must be X_m or x"),
+        ("x,z\n1,2\n", r"must be x and y, in a unit of length \(x_m, .*, found 'x, z'"),
+        ("x [deg/s],y [deg/s]\n1,2\n", "must be x and y"),
         ("x,y,X_m\n1,2,3\n", "found 'x, y, X_m'"),
         ("x,y\n1,2\n3,abc\n", "y must be numeric, line 3 has 'abc'"),
         ("x,y\n1,2\n3,\n", "y must be a finite number, line 3 has none"),
