@@ -3,6 +3,7 @@
 import hashlib
 import json
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from identifier.doctor import diagnose
 from models.maneuvers import Slalom
 from models.plant import Plant
-from models.recordings import write_recording
+from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
 from tireid.cli import main
 from tireid.commands.demo_story import run_story
@@ -76,6 +77,13 @@ def typed(*words):
 def learn_words(folder, log="slalom.csv", *more):
     """Words that identify the tires of the car of a folder on a log, of this folder or by path."""
     return ["identify", folder / log, "--vehicle", folder / "car.toml", *more]
+
+
+def rewritten(log, target, **signals):
+    """The path of a log with other signals; those that are functions are asked with the log."""
+    told = read_recording(log)
+    new = {name: one(told) if callable(one) else one for name, one in signals.items()}
+    return write_recording(replace(told, **new), target)
 
 
 def json_of(path):

@@ -18,12 +18,20 @@ from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.pages import faults_of, outline
 from tests.rivals import rival
-from tests.tireid.conftest import json_of, learn_words, page_in, refusal, table_of, typed
+from tests.tireid.conftest import (
+    json_of,
+    learn_words,
+    page_in,
+    refusal,
+    rewritten,
+    table_of,
+    typed,
+)
 
-METHOD_FILES = {  # figures and tables that belong to a method, and the columns of weights.csv
-    "fit": ((), 0),
-    "axle": (("learnt.png",), 2 * 4 + 2 * 3),
-    "integral": (("error.png", "weights.png", "errors.csv"), 2 * 10 + 10 * 4),
+METHOD_FILES = {  # figures and tables that belong to a method
+    "fit": (),
+    "axle": ("learnt.png",),
+    "integral": ("error.png", "weights.png", "errors.csv"),
 }
 
 
@@ -114,9 +122,8 @@ def test_a_fit_of_a_whole_log_says_nothing_of_online_learning(ended, law):
 
 
 def test_every_curve_is_also_data(result, law):
-    files, columns = METHOD_FILES[law]
     drawn = ("forces.png", "slip.png", "inputs.png", "replay_quick.png")
-    for name in (*files, *drawn, "forces_quick.csv", "weights_4s.json"):
+    for name in (*METHOD_FILES[law], *drawn, "forces_quick.csv", "weights_4s.json"):
         assert (result / name).is_file()
     forces = table_of(result / "forces.csv")
     assert "Fyr_frozen_4s_N" in forces.dtype.names
@@ -126,8 +133,6 @@ def test_every_curve_is_also_data(result, law):
     summary = json_of(result / "summary.json")
     front = summary["rmse_N"]["online"]["slalom"]["front"]
     assert np.sqrt(np.mean((truth - online) ** 2)) == pytest.approx(front, rel=1e-6)
-    weights = table_of(result / "weights.csv")
-    assert len(weights.dtype.names) == 1 + columns
 
 
 def test_slip_angles_and_forces_of_every_axle_are_in_its_own_column(result, logs):
@@ -231,10 +236,7 @@ def test_a_replayed_log_has_the_verdict_of_predict(ended, logs, tmp_path, law, u
 
 
 def test_a_replayed_log_that_the_model_does_not_explain_refuses(logs, tmp_path, capsys, unmade):
-    def biased(row):
-        row["vy"] = repr(float(row["vy"]) + 0.6)
-
-    log = rewritten(logs / "quick.csv", tmp_path / "biased.csv", biased)
+    log = rewritten(logs / "quick.csv", tmp_path / "biased.csv", v_y=lambda log: log.v_y + 0.6)
     words = learn_words(logs)
     words += ["--replay", log, "--out", tmp_path / "out"]
     assert typed(*words) == 3
@@ -270,12 +272,7 @@ def test_the_curve_is_that_of_the_model_and_says_where_it_is_known(result):
 
 
 def test_a_log_without_forces_has_no_error_against_them(logs, tmp_path, laid_out):
-    lines = (logs / "slalom.csv").read_text().splitlines()
-    header = lines[0].split(",")
-    keep = [i for i, name in enumerate(header) if not name.startswith("Fy")]
-    blind = tmp_path / "blind.csv"
-    cells = [line.split(",") for line in lines]
-    blind.write_text("\n".join(",".join(row[i] for i in keep) for row in cells))
+    blind = rewritten(logs / "slalom.csv", tmp_path / "blind.csv", axle_force=None)
     words = learn_words(logs, blind)
     assert typed(*words, "--out", tmp_path / "out") == 0
     summary = json_of(tmp_path / "out" / "summary.json")
@@ -288,22 +285,9 @@ def test_a_log_without_forces_has_no_error_against_them(logs, tmp_path, laid_out
     assert summary["rmse_N"]["frozen_against_online"]["8"]["blind"]["front"] > 0.0
 
 
-def rewritten(log, target, change):
-    """A copy of a log, each row given to `change` as a dictionary of texts."""
-    header, *lines = [line.split(",") for line in log.read_text().splitlines()]
-    rows = [dict(zip(header, line, strict=True)) for line in lines]
-    for row in rows:
-        change(row)
-    target.write_text("\n".join([",".join(header), *(",".join(row.values()) for row in rows)]))
-    return target
-
-
 @pytest.mark.heavy
 def test_a_log_on_a_unix_clock_keeps_its_freeze_times_apart(logs, tmp_path, laid_out):
-    def to_unix(row):
-        row["t"] = f"{float(row['t']) + 1.7e9:.2f}"
-
-    log = rewritten(logs / "slalom.csv", tmp_path / "unix.csv", to_unix)
+    log = rewritten(logs / "slalom.csv", tmp_path / "unix.csv", t=lambda log: log.t + 1.7e9)
     out = tmp_path / "out"
     words = [*learn_words(logs, log), "--out", out]
     assert typed(*words, "--freeze", "1700000004", "1700000008") == 0
@@ -317,12 +301,9 @@ def test_a_log_on_a_unix_clock_keeps_its_freeze_times_apart(logs, tmp_path, laid
 
 def test_samples_at_rest_count_nowhere(logs, tmp_path, capsys, laid_out):
     """A halt of the second half, with forces that are not zero, changes neither size nor error."""
-
-    def halt(row):
-        if float(row["t"]) >= 4.0:
-            row["vx"] = "0.0"
-
-    log = rewritten(logs / "slalom.csv", tmp_path / "halt.csv", halt)
+    log = rewritten(
+        logs / "slalom.csv", tmp_path / "halt.csv", v_x=lambda log: log.v_x * (log.t < 4.0)
+    )
     words = [*learn_words(logs, log), "--no-check"]
     capsys.readouterr()
     assert typed(*words, "--out", tmp_path / "out") == 0
@@ -381,11 +362,8 @@ def test_a_law_that_diverges_on_a_replayed_log_is_refused_by_its_name(
         tmp_path / "design.toml", law="instantaneous", eta_W=1e7, eta_V=1e7, rho_W=0.0, rho_V=0.0
     )
 
-    def crawl(row):
-        if float(row["t"]) >= 0.5:  # before the steering begins
-            row["vx"] = "0.0"
-
-    calm = rewritten(logs / "slalom.csv", tmp_path / "calm.csv", crawl)
+    before = lambda log: log.v_x * (log.t < 0.5)  # noqa: E731 - the steering begins later
+    calm = rewritten(logs / "slalom.csv", tmp_path / "calm.csv", v_x=before)
     words = [*learn_words(logs, calm), "--design", design, "--no-check"]
     assert typed(*[*words, "--out", tmp_path / "alone", "--accept"]) == 0
     line = refusal(capsys, [*words, "--replay", logs / "quick.csv", "--out", tmp_path / "out"])
@@ -545,10 +523,7 @@ def test_what_cannot_be_read_back_as_tires_is_refused_by_the_name_of_its_log(
 
 
 def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path, capsys, unmade):
-    def mirrored(row):
-        row["vy"] = repr(-float(row["vy"]))
-
-    log = rewritten(logs / "slalom.csv", tmp_path / "mirrored.csv", mirrored)
+    log = rewritten(logs / "slalom.csv", tmp_path / "mirrored.csv", v_y=lambda log: -log.v_y)
     words = [*learn_words(logs, log), "--no-check"]
     assert typed(*words, "--out", tmp_path / "refused") == 3
     said = capsys.readouterr().out

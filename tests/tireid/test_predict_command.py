@@ -12,7 +12,7 @@ from models.friction import Friction, FrictionChange
 from models.recordings import read_recording, write_recording
 from tests.identifier.conftest import steered
 from tests.pages import faults_of
-from tests.tireid.conftest import json_of, page_in, refusal, table_of, typed
+from tests.tireid.conftest import json_of, page_in, refusal, rewritten, table_of, typed
 
 
 @pytest.fixture(scope="module")
@@ -23,15 +23,24 @@ def model(logs, tmp_path_factory):
     return path
 
 
-def weaker(data, share):
-    """The stored model with forces of a share of its own at each slip."""
-    found = json.loads(json.dumps(data))
-    for name, one in found["parameters"].items():
+@pytest.fixture(scope="module")
+def blind(logs, tmp_path_factory):
+    """The quick drive without its true forces."""
+    target = tmp_path_factory.mktemp("blind") / "blind.csv"
+    return rewritten(logs / "quick.csv", target, axle_force=None)
+
+
+@pytest.fixture
+def weak(model, tmp_path):
+    """A refused model of half the forces at each slip."""
+    data = json_of(model)
+    for name, one in data["parameters"].items():
         if name.startswith(("ln_stiffness", "ln_grip")):
-            one["value"] += np.log(share)
+            one["value"] += np.log(0.5)
         elif name.startswith("residual"):
-            one["value"] *= share
-    return found
+            one["value"] *= 0.5
+    (tmp_path / "weak.json").write_text(json.dumps(data | {"valid": False}), encoding="utf-8")
+    return tmp_path / "weak.json"
 
 
 def predicted(out, *words, status=0):
@@ -53,10 +62,8 @@ def test_it_says_what_the_interface_says(model, logs, tmp_path, capsys, undrawn)
     assert "wrote" in said.err
 
 
-def test_it_leaves_a_report_with_figures(model, logs, tmp_path, capsys):
-    log = replace(read_recording(logs / "quick.csv"), axle_force=None)
-    write_recording(log, tmp_path / "blind.csv")
-    for name, asked in (("with", logs / "quick.csv"), ("without", tmp_path / "blind.csv")):
+def test_it_leaves_a_report_with_figures(model, logs, blind, tmp_path, capsys):
+    for name, asked in (("with", logs / "quick.csv"), ("without", blind)):
         out = tmp_path / name
         summary, _ = predicted(out, model, asked)
         page = page_in(out)
@@ -73,25 +80,10 @@ def test_it_leaves_a_report_with_figures(model, logs, tmp_path, capsys):
         assert page.index("Axle force over slip angle") < page.index("No warnings.")
 
 
-def test_a_refused_answer_looks_refused(model, logs, tmp_path, undrawn):
-    data = json_of(model)
-    path = tmp_path / "weak.json"
-    weak = {**weaker(data, 0.5), "valid": False}
-    path.write_text(json.dumps(weak), encoding="utf-8")
-    predicted(tmp_path / "out", path, logs / "quick.csv", status=3)
-    page = page_in(tmp_path / "out")
-    assert '<div class="bad"><dt>the verdict' in page and 'class="struck"' in page
-    assert "NOT VALID. Axle force over slip angle" in page
-    assert '<li class="bad">' in page and "was not valid on its identification drive" in page
-    assert '<div class="good">' not in page
-
-
 def test_without_truth_it_says_what_of_the_motion_is_explained(
-    model, logs, tmp_path, capsys, undrawn
+    model, blind, tmp_path, capsys, undrawn
 ):
-    log = replace(read_recording(logs / "quick.csv"), axle_force=None)
-    write_recording(log, tmp_path / "blind.csv")
-    summary, columns = predicted(tmp_path / "out", model, tmp_path / "blind.csv")
+    summary, columns = predicted(tmp_path / "out", model, blind)
     assert (summary["rmse_N"], summary["rms_force_N"]) == (None, None)
     assert not [name for name in columns.dtype.names if "true" in name]
     assert 0.9 < summary["motion"]["explained_lateral"] <= 1.0
@@ -101,19 +93,23 @@ def test_without_truth_it_says_what_of_the_motion_is_explained(
     assert f"explained are {share:.1f} % of the lateral" in said
 
 
-def test_a_model_of_half_the_force_explains_less(model, logs, tmp_path, undrawn):
+def test_a_model_of_half_the_force_explains_less_and_looks_refused(
+    model, weak, logs, tmp_path, undrawn
+):
     """(1/2)² of the mean square stays: three quarters are explained, by the lateral balance."""
-    data = json_of(model)
-    weak = weaker(data, 0.5)
-    path = tmp_path / "weak.json"
-    path.write_text(json.dumps(weak), encoding="utf-8")
     whole, _ = predicted(tmp_path / "whole", model, logs / "quick.csv")
-    half, _ = predicted(tmp_path / "half", path, logs / "quick.csv", status=3)
-    predicted(tmp_path / "accepted", path, logs / "quick.csv", "--accept")
+    half, _ = predicted(tmp_path / "half", weak, logs / "quick.csv", status=3)
+    predicted(tmp_path / "accepted", weak, logs / "quick.csv", "--accept")
     assert whole["verdict"]["valid"]
     assert {one["code"] for one in half["verdict"]["findings"]} >= {"force_missed"}
     assert whole["motion"]["explained_lateral"] > 0.98
     assert half["motion"]["explained_lateral"] == pytest.approx(0.75, abs=0.05)
+    assert max(half["windows_within_band"]) < 0.6 < min(whole["windows_within_band"])
+    page = page_in(tmp_path / "half")
+    assert '<div class="bad"><dt>the verdict' in page and 'class="struck"' in page
+    assert "NOT VALID. Axle force over slip angle" in page
+    assert '<li class="bad">' in page and "was not valid on its identification drive" in page
+    assert '<div class="good">' not in page
 
 
 def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys, undrawn):
@@ -128,11 +124,8 @@ def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys, undrawn):
     assert f"which {100.0 * beyond:.0f} /" in capsys.readouterr().out
 
 
-def test_it_says_how_often_the_band_held(logs, tmp_path, capsys, undrawn):
-    run = ti.identify(read_recording(logs / "slalom.csv"), ti.sedan())
-    tire = run.tire
-    tire.save(tmp_path / "model.json")
-    summary, _ = predicted(tmp_path / "out", tmp_path / "model.json", logs / "quick.csv")
+def test_it_says_how_often_the_band_held(model, logs, tmp_path, capsys, undrawn):
+    summary, _ = predicted(tmp_path / "out", model, logs / "quick.csv")
     held = summary["windows_within_band"]
     said = f"in {100.0 * held[0]:.0f} / {100.0 * held[1]:.0f} % of the windows of 0.3 s"
     assert said in capsys.readouterr().out
@@ -144,10 +137,6 @@ def test_it_says_how_often_the_band_held(logs, tmp_path, capsys, undrawn):
         share = np.mean(away[half > 0.0] <= half[half > 0.0])
         assert summary["truth_within_band"][k] == pytest.approx(share, abs=0.01)
         assert share > 0.7
-    weak = weaker(json_of(tmp_path / "model.json"), 0.6)
-    (tmp_path / "weak.json").write_text(json.dumps(weak))
-    weak, _ = predicted(tmp_path / "weak", tmp_path / "weak.json", logs / "quick.csv", status=3)
-    assert max(weak["windows_within_band"]) < 0.6
 
 
 def test_an_axle_model_is_mounted_on_the_car_that_drove(model, logs, tmp_path, capsys, undrawn):
