@@ -9,6 +9,7 @@ import pytest
 
 from identifier.axle import AxleIdentifier
 from identifier.frozen import FrozenModelError
+from identifier.paper.network import NetworkModel, Weights
 from identifier.run import identify
 from identifier.tire_model import load_model
 from models.maneuvers import RandomSteer
@@ -20,6 +21,15 @@ CAR = Vehicle(
     mass=1500.0, yaw_inertia=2500.0, l_f=1.15, l_r=1.55, cornering_stiffness_front=1.4e5,
     cornering_stiffness_rear=1.2e5,
 )  # fmt: skip
+
+
+def network_model(car, network, rng):
+    """A model of the paper with weights at random."""
+    V = rng.normal(size=(network.hidden, len(network.inputs)))
+    weights = Weights(W=rng.normal(size=(2, network.hidden)), V=V)
+    return NetworkModel(
+        vehicle=car, network=network, weights=weights, force_unit=1500.0, min_speed=1.0
+    )
 
 
 def saturating(alpha, stiffness, peak):

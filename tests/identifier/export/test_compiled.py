@@ -17,14 +17,6 @@ CAR = sedan()
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 
 
-@pytest.mark.parametrize("law", ["integral", "axle", "inertial"])
-def test_a_log_through_the_shipped_c_is_the_method_in_python(law, packages, slalom):
-    expected = identify(slalom, CAR, make_method(law, CAR)).axle_force
-    run = CompiledPackage.of(packages[law]).run(slalom)
-    assert np.abs(run.axle_force - expected).max() < 1e-6
-    assert (run.status == Status.OK).all()
-
-
 @pytest.mark.parametrize("law", ["integral", "inertial"])
 def test_sample_by_sample_is_the_whole_recording(packages, slalom, law):
     one, all_at_once = (CompiledPackage.of(packages[law]) for _ in range(2))
@@ -109,8 +101,6 @@ def test_weights_that_do_not_fit_are_refused(packages):
     weights = run.weights
     with pytest.raises(ValueError, match="shapes"):
         run.set_weights({"W": weights["W"]})
-    with pytest.raises(ValueError, match="finite"):
-        run.set_weights({**weights, "W": np.full((2, 10), np.nan)})
 
 
 @pytest.fixture(scope="module")

@@ -19,6 +19,7 @@ from models.vehicle import sedan
 from mpc.export.pair import DELAY, NoHandoverError, build_pair, frozen_start
 from mpc.realtime import Tracker
 from mpc.tires import prediction_tire
+from tests.identifier.export.conftest import require_silence
 from tests.kept import Kept
 from tests.mpc.export.conftest import LAWS, STRICT, c_files, put_pair
 from tests.rivals import rival
@@ -36,9 +37,8 @@ def test_example_and_handover_have_no_warning_in_any_mix_of_precisions(
 ):
     folder = write_pair(pairs[law])
     defines = [f"-DTIREID_SINGLE={precision[0]}", f"-DTIREID_MPC_SINGLE={precision[1]}"]
-    for source in [*c_files(folder), *c_files(folder, "examples")]:
-        answer = run(compiler, *STRICT, *defines, *INCLUDES, "-O2", "-c", source, cwd=folder)
-        assert (answer.returncode, answer.stderr) == (0, ""), source
+    sources = [*c_files(folder), *c_files(folder, "examples")]
+    require_silence(folder, run, compiler, sources, *defines, *INCLUDES)
 
 
 @pytest.fixture(scope="module")
