@@ -12,7 +12,7 @@ from identifier.frozen import FrozenModelError
 from identifier.paper.network import NetworkModel, Weights
 from identifier.run import identify
 from identifier.tire_model import load_model
-from models.maneuvers import RandomSteer
+from models.maneuvers import RandomSteer, Slalom
 from models.plant import Plant
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle, sedan
@@ -132,6 +132,14 @@ def steered(
     )
     name = f"drive{seed}"
     return Plant(car or sedan()).simulate(maneuver, speed=speed, name=name, **road)
+
+
+def slalom_of(duration):
+    """A slalom of the sedan of some seconds, with its true forces."""
+    maneuver = Slalom(
+        amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=duration
+    )
+    return Plant(sedan()).simulate(maneuver, speed=20.0).recording()
 
 
 def felt(recording):

@@ -11,9 +11,8 @@ from identifier.axle.band import BandCalibration
 from identifier.export.compiled import samples_of
 from identifier.export.package import build_package
 from identifier.methods import make_method
-from models.maneuvers import Slalom
-from models.plant import Plant
 from models.vehicle import sedan
+from tests.identifier.conftest import slalom_of
 from tests.kept import Kept
 
 STRICT = [
@@ -53,11 +52,7 @@ def banded(car, **options):
 
 @pytest.fixture(scope="session")
 def slalom():
-    """45 s of a slalom of the sedan."""
-    maneuver = Slalom(
-        amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=44.99
-    )
-    return Plant(sedan()).simulate(maneuver, speed=20.0).recording()
+    return slalom_of(44.99)
 
 
 @pytest.fixture(scope="session")

@@ -3,13 +3,9 @@
 import casadi as ca
 import numpy as np
 
-from identifier.inertial import InertialIdentifier
 from identifier.inertial.motion import Sample, predicted, static_load, unknowns
 from models.vehicle import load_ratio
-from tests.identifier.axle.test_downforce import RACER
 from tests.identifier.inertial.test_motion import SCALES, STEPS, V_X, N, car, laws, places, state
-
-METHOD = InertialIdentifier.for_vehicle(RACER)
 
 
 def stepped(z, load):
