@@ -52,7 +52,6 @@ WALL = (
     Gate(start=20.0, end=40.0, right=-8.0, left=-5.0),
 )
 LINE = Path.from_waypoints([0.0, 50.0], [0.0, 0.0])
-RING = {"closed": True, "X": [30.0, 0.0, -30.0, 0.0], "Y": [0.0, 30.0, 0.0, -30.0]}
 
 
 def half(**where):

@@ -10,12 +10,10 @@ import pytest
 
 from benchmarks.converged import build_errors, iterated, solve_converged
 from models.vehicle import sedan
-from mpc.prediction import build_rk4
 from mpc.problem import Cost, Limits, Problem
 from mpc.realtime import Status, Tracker
 from mpc.tires import prediction_tire
 from mpc.tires.ladder import oracle_tire
-from mpc.tires.tire import valid_slip
 
 PROBLEM = Problem(
     horizon=25,
@@ -82,27 +80,6 @@ def test_iterated_to_the_end_the_tracker_finds_what_ipopt_finds(tire, tracker, c
     assert cost_of(tire, best.x, best.u, kappa, v_x) == pytest.approx(best.cost, rel=1e-6)
     np.testing.assert_allclose(found.plan_u, best.u, atol=2e-4)
     np.testing.assert_allclose(found.plan_x, best.x, atol=1e-4)
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_the_plan_obeys_motion_and_hard_limits(tire, tracker, case):
-    kappa, v_x = road(*CASES[case][1:])
-    plan = iterated(tracker, start_of(tire, case), kappa, v_x)
-    step = build_rk4(tire.structure)
-    for k in range(PROBLEM.horizon):
-        there = step(
-            plan.plan_x[k],
-            plan.plan_u[k],
-            kappa[k],
-            v_x[k],
-            PROBLEM.dt,
-            tire.car,
-            tire.weights,
-            *valid_slip(tire, PROBLEM.limits.slip),
-        )
-        np.testing.assert_allclose(plan.plan_x[k + 1], np.asarray(there).ravel(), atol=1e-7)
-    assert np.abs(plan.plan_x[:, 4]).max() <= PROBLEM.limits.steering
-    assert np.abs(plan.plan_u).max() <= PROBLEM.limits.steering_rate
 
 
 def test_the_cases_press_against_what_they_say(tire, tracker):

@@ -50,11 +50,6 @@ def compare(one, other, rng, exact):
                 np.testing.assert_allclose(np.array(a), np.array(b), rtol=1e-13, atol=1e-15)
 
 
-def test_a_graph_is_the_function_it_was_read_from(rng):
-    step = learning_step()
-    compare(step, function_of(graph_of(step), step), rng, exact=True)
-
-
 def test_constants_that_are_told_give_the_same_bits(rng):
     step = learning_step()
     told, constants = lifted(step)
@@ -111,14 +106,6 @@ def test_cosine_and_tangent_are_made_of_sines(rng):
     np.testing.assert_allclose(
         np.array(rebuilt(given)).ravel(), [np.cos(given[0]), np.tan(given[1])], rtol=1e-11
     )
-
-
-def test_simplifying_keeps_the_values_and_saves_operations(rng):
-    step = learning_step()
-    graph = recognized(graph_of(step))
-    fewer = simplified(graph)
-    compare(step, function_of(fewer, step, EXPANDED), rng, exact=False)
-    assert len(operations(fewer)) < len(operations(graph))
 
 
 def test_a_constant_in_a_divisor_goes_to_the_other_side_as_its_inverse():

@@ -9,9 +9,10 @@ import pytest
 
 from identifier.axle import AxleIdentifier
 from identifier.frozen import FrozenModelError
+from identifier.paper.network import NetworkModel, Weights
 from identifier.run import identify
 from identifier.tire_model import load_model
-from models.maneuvers import RandomSteer
+from models.maneuvers import RandomSteer, Slalom
 from models.plant import Plant
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle, sedan
@@ -20,6 +21,15 @@ CAR = Vehicle(
     mass=1500.0, yaw_inertia=2500.0, l_f=1.15, l_r=1.55, cornering_stiffness_front=1.4e5,
     cornering_stiffness_rear=1.2e5,
 )  # fmt: skip
+
+
+def network_model(car, network, rng):
+    """A model of the paper with weights at random."""
+    V = rng.normal(size=(network.hidden, len(network.inputs)))
+    weights = Weights(W=rng.normal(size=(2, network.hidden)), V=V)
+    return NetworkModel(
+        vehicle=car, network=network, weights=weights, force_unit=1500.0, min_speed=1.0
+    )
 
 
 def saturating(alpha, stiffness, peak):
@@ -122,6 +132,14 @@ def steered(
     )
     name = f"drive{seed}"
     return Plant(car or sedan()).simulate(maneuver, speed=speed, name=name, **road)
+
+
+def slalom_of(duration):
+    """A slalom of the sedan of some seconds, with its true forces."""
+    maneuver = Slalom(
+        amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=duration
+    )
+    return Plant(sedan()).simulate(maneuver, speed=20.0).recording()
 
 
 def felt(recording):

@@ -12,9 +12,8 @@ from identifier.export.specialize import specialize
 from identifier.methods import METHODS, make_method
 from identifier.refused import SampleLimits, stale_samples
 from identifier.run import OnlineIdentifier
-from models.maneuvers import Slalom
-from models.plant import Plant
 from models.vehicle import sedan
+from tests.identifier.conftest import slalom_of
 
 CAR = sedan()
 BEGIN = 1200  # sample at which a gap begins
@@ -24,11 +23,7 @@ BROKEN = (np.nan, np.inf, -np.inf, 1e308, -1e308)
 
 @pytest.fixture(scope="module")
 def slalom():
-    """25 s of a slalom of the sedan, with its true forces."""
-    maneuver = Slalom(
-        amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=24.99
-    )
-    return Plant(CAR).simulate(maneuver, speed=20.0).recording()
+    return slalom_of(24.99)
 
 
 def rows_of(recording):

@@ -5,26 +5,20 @@ import numpy as np
 import pytest
 
 from codegen.graph import OPERATIONS
-from identifier.paper.network import Network, NetworkModel, Weights
+from identifier.paper.network import Network
 from models.vehicle import sedan
 from mpc.prediction import build_dynamics, build_end, build_rk4, build_stage, state_size
 from mpc.problem import Cost
 from mpc.tires import PredictionTire, oracle_tire, prediction_tire
 from mpc.tires.axles import LadderAxles, curve_weights
 from mpc.tires.tire import ALL, valid_slip
+from tests.identifier.conftest import network_model
 
 CAR, DT, MOST = sedan(), 0.05, (0.06, 0.05)  # situations lie on both sides of these slips
 
 
 def network(seed=0, hidden=10):
-    rng = np.random.default_rng(seed)
-    return NetworkModel(
-        vehicle=CAR,
-        network=Network(hidden=hidden),
-        weights=Weights(W=rng.normal(0, 1, (2, hidden)), V=rng.normal(0, 1, (hidden, 4))),
-        force_unit=1000.0,
-        min_speed=1.0,
-    )
+    return network_model(CAR, Network(hidden=hidden), np.random.default_rng(seed))
 
 
 def ladder():
@@ -47,9 +41,9 @@ TIRES = {
 }
 
 
-def situations(tire, count=60, seed=1):
+def situations(tire, count=60):
     """Arguments of the stage without q: random states, inputs, curvatures and speeds."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     n_x = state_size(tire.structure)
     for _ in range(count):
         x = rng.normal(0.0, 1.0, n_x) * [0.5, 0.15, 1.0, 0.4, 0.08, *[0.06] * (n_x - 5)]

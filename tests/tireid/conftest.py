@@ -3,6 +3,7 @@
 import hashlib
 import json
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,9 @@ import pytest
 from identifier.doctor import diagnose
 from models.maneuvers import Slalom
 from models.plant import Plant
-from models.recordings import write_recording
+from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
+from tests.pages import faults_of
 from tireid.cli import main
 from tireid.commands.demo_story import run_story
 
@@ -35,21 +37,18 @@ def logs(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="session")
-def diagnoses():
-    """What the doctor said, by a digest of the log and the car that it was asked about."""
-    return {}
+DIAGNOSES = {}  # what the doctor said, by a digest of the log and the car that it was asked about
 
 
 @pytest.fixture(autouse=True, scope="module")
-def asked_once(diagnoses):
+def asked_once():
     """The doctor answers the same to the same, and takes long: a log is looked at once."""
 
     def answered(recording, vehicle):
         asked = hashlib.sha256(pickle.dumps((recording, vehicle))).digest()
-        if asked not in diagnoses:
-            diagnoses[asked] = diagnose(recording, vehicle)
-        return diagnoses[asked]
+        if asked not in DIAGNOSES:
+            DIAGNOSES[asked] = diagnose(recording, vehicle)
+        return DIAGNOSES[asked]
 
     with pytest.MonkeyPatch.context() as patch:
         for command in ("commands.doctor", "commands.identify", "learning"):
@@ -60,6 +59,12 @@ def asked_once(diagnoses):
 @pytest.fixture(scope="session")
 def story():
     return run_story()
+
+
+@pytest.fixture
+def out(tmp_path):
+    """Where a command is told to write its results; not there yet."""
+    return tmp_path / "out"
 
 
 @pytest.fixture
@@ -78,6 +83,13 @@ def learn_words(folder, log="slalom.csv", *more):
     return ["identify", folder / log, "--vehicle", folder / "car.toml", *more]
 
 
+def rewritten(log, target, **signals):
+    """The path of a log with other signals; those that are functions are asked with the log."""
+    told = read_recording(log)
+    new = {name: one(told) if callable(one) else one for name, one in signals.items()}
+    return write_recording(replace(told, **new), target)
+
+
 def json_of(path):
     return json.loads(path.read_text(encoding="utf-8"))
 
@@ -93,7 +105,10 @@ def table_of(path):
 
 
 def page_in(folder):
-    return (folder / "report.html").read_text(encoding="utf-8")
+    """The report of a folder, after a look for faults of it."""
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert faults_of(page) == []
+    return page
 
 
 def refusal(capsys, words):

@@ -99,16 +99,14 @@ def test_python_m_tireid_is_the_command_line():
     assert told.stdout == f"tireid {ti.__version__}\n"
 
 
-def test_the_command_and_the_function_write_the_same_model(logs, run, tmp_path, undrawn):
-    out = tmp_path / "out"
+def test_the_command_and_the_function_write_the_same_model(logs, run, out, undrawn):
     words = learn_words(logs)
     assert typed(*words, "--out", out) == 0
     told = {"valid": run.verdict.valid}
     model = run.tire
     assert json_of(out / "weights.json") == model.to_dict() | told
     assert ti.TireModel.load(out / "weights.json").to_dict() == model.to_dict()
-    checked = {name: model.to_dict()[name] for name in ("force_missed",)}
-    assert model.to_dict() == run.freeze().to_dict() | checked
+    assert model.to_dict() == run.freeze().to_dict() | {"force_missed": [*model.model_error]}
 
 
 def test_the_tire_of_a_run_is_what_it_freezes_to_with_a_calibrated_band(log, car):
@@ -116,8 +114,6 @@ def test_the_tire_of_a_run_is_what_it_freezes_to_with_a_calibrated_band(log, car
     tire, frozen = run.tire, run.freeze()
     assert tire.band.calibrated and "calibrated on the drive" in tire.summary()
     assert not frozen.band.calibrated and "run.tire calibrates it" in frozen.summary()
-    checked = {name: tire.to_dict()[name] for name in ("band", "force_missed")}
-    assert tire.to_dict() == frozen.to_dict() | checked
 
 
 def test_a_run_names_its_parts(log, car, tmp_path):
@@ -164,8 +160,6 @@ def test_a_recording_is_sliced_by_time_and_made_a_frame(log):
 
 
 def test_a_recording_of_another_car_is_refused(log, car):
-    from dataclasses import replace
-
     swapped = replace(car, l_f=4.0 * car.l_f, l_r=4.0 * car.l_r, yaw_inertia=16 * car.yaw_inertia)
     with pytest.raises(RecordingError):
         ti.identify(log, swapped)
@@ -245,7 +239,7 @@ def test_force_takes_numbers_and_arrays_of_any_shape(tires, name):
 
 
 @pytest.mark.parametrize("name", KINDS)
-def test_force_is_what_a_straight_drifting_car_would_be_told(tires, car, name):
+def test_force_is_what_a_straight_drifting_car_would_be_told(tires, name):
     """δ = 0, r = 0 and v_y = -v_x tan α: both axles slip by α, and the lag has settled."""
     tire, n, alpha, v_x = tires[name], 400, 0.03, 15.0
     small = name in ("integral", "linear")  # their slip angle is that of (3)
@@ -336,10 +330,10 @@ def test_a_saved_model_comes_back(tires, log, tmp_path, name):
     assert np.array_equal(again.predict(log), tires[name].predict(log))
 
 
-def test_no_method_goes_on_from_a_curve(tires, tmp_path):
+def test_no_method_goes_on_from_a_curve(tires, out):
     with pytest.raises(ValueError, match="no method can continue a LinearModel"):
-        ti.export(tires["linear"], tmp_path / "out")
-    assert not (tmp_path / "out").exists()
+        ti.export(tires["linear"], out)
+    assert not out.exists()
 
 
 def test_logs_runs_and_tires_are_equal_to_themselves_alone(log, run, tires):

@@ -102,24 +102,24 @@ def test_an_interruption_is_said_and_leaves_nothing(monkeypatch, capsys, tmp_pat
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_output_folder_whose_links_go_in_a_circle_is_one_line(tmp_path, capsys):
-    (tmp_path / "out").symlink_to("out")
+def test_an_output_folder_whose_links_go_in_a_circle_is_one_line(tmp_path, out, capsys):
+    out.symlink_to("out")
     for more in ([], ["--force"]):
-        assert typed("check", "--out", tmp_path / "out", *more) == 2
+        assert typed("check", "--out", out, *more) == 2
         error = capsys.readouterr().err.splitlines()[-1]
         assert (
             error == f"tireid check: error: {tmp_path / 'out'}: too many levels of symbolic links"
         )
-    words = ["fleet", "learn", "log.csv", "--vehicle", "car.toml", "--out", tmp_path / "out"]
+    words = ["fleet", "learn", "log.csv", "--vehicle", "car.toml", "--out", out]
     assert typed(*words) == 2
     assert [one.name for one in tmp_path.iterdir()] == ["out"]
 
 
-def test_the_backend_of_a_notebook_is_not_asked_for_by_a_command(tmp_path):
+def test_the_backend_of_a_notebook_is_not_asked_for_by_a_command(out):
     """`!tireid` in a notebook inherits one that another environment has installed."""
     backend = "module://matplotlib_inline_of_another_environment"
     answer = subprocess.run(
-        [sys.executable, "-m", "tireid.cli", "check", "--out", str(tmp_path / "out")],
+        [sys.executable, "-m", "tireid.cli", "check", "--out", str(out)],
         env={**os.environ, "MPLBACKEND": backend},
         capture_output=True,
         text=True,

@@ -14,6 +14,7 @@ from mpc.loop.record import Drive, Plan
 from mpc.path import Path
 from mpc.tires import prediction_tire
 from mpc.tires.tire import curves_at
+from tests.tireid.test_drive_setup import COURSE
 from tireid.driving.known import Known
 from tireid.figures import film
 from tireid.figures.drive import (
@@ -32,10 +33,6 @@ LANE = Path.from_waypoints(
     LANE_X, 1.75 * (np.tanh((LANE_X - 40) / 6) - np.tanh((LANE_X - 90) / 6)), name="lane"
 )
 LANE = replace(LANE, cones=np.array([[20.0, 1.2], [20.0, -1.2], [65.0, 4.8], [65.0, 2.2]]))
-AROUND = np.linspace(0.0, 2.0 * np.pi, 101)[:-1]
-COURSE = Path.from_waypoints(
-    120.0 * np.cos(AROUND), 70.0 * np.sin(AROUND), closed=True, name="course"
-)
 
 
 def made_up(path, off):

@@ -8,29 +8,17 @@ import pytest
 
 from identifier.paper.network import Network, NetworkModel, Weights
 from models.vehicle import sedan
-from mpc.path import Path
 from mpc.tires import prediction_tire
 from mpc.tires.tire import curves_at
+from tests.tireid.test_drive_setup import LANE, setup
 from tireid.driving.results import _known_curves
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
-from tireid.driving.setup import Setup, SpeedWish
+from tireid.driving.setup import SpeedWish
 from tireid.figures.drive import AT_THE_END
 
 CAR = sedan()
 ALPHA = np.linspace(-0.35, 0.35, 281)
-X = np.linspace(0.0, 120.0, 81)
-LANE = Path.from_waypoints(X, 2.0 * np.tanh((X - 40.0) / 6.0), name="lane")
-
-
-@pytest.fixture(scope="module")
-def setup():
-    return Setup(
-        path=LANE,
-        vehicle=CAR,
-        mu=0.9,
-        drops=((60.0, 0.4),),
-        wish=SpeedWish(None, 16.0),
-    )
+SETUP = setup(LANE, SpeedWish(None, 16.0), ((60.0, 0.4),), mu=0.9)
 
 
 def test_the_linear_tire_is_a_line_of_its_stiffness():
@@ -40,19 +28,19 @@ def test_the_linear_tire_is_a_line_of_its_stiffness():
     np.testing.assert_allclose(force[small], ALPHA[small, None] * slope, rtol=1e-6)
 
 
-def test_the_true_tire_is_shown_on_the_first_and_on_the_last_friction(setup):
-    curves = {curve.label: curve for curve in _known_curves([], setup, None)}
+def test_the_true_tire_is_shown_on_the_first_and_on_the_last_friction():
+    curves = {curve.label: curve for curve in _known_curves([], SETUP, None)}
     assert list(curves) == [LINEAR, ORACLE, ORACLE + AT_THE_END]
     most, last = (curves[name].force.max(axis=0) for name in (ORACLE, ORACLE + AT_THE_END))
     np.testing.assert_allclose(last / most, 0.4 / 0.9, rtol=0.1)
-    assert most.sum() == pytest.approx(CAR.mass * setup.grip, rel=0.1)
+    assert most.sum() == pytest.approx(CAR.mass * SETUP.grip, rel=0.1)
 
 
-def test_what_a_tracker_was_told_later_is_shown_as_the_end(setup):
+def test_what_a_tracker_was_told_later_is_shown_as_the_end():
     soft = prediction_tire(replace(CAR, cornering_stiffness_front=4e4))
     same = SimpleNamespace(label=FROZEN, model=soft, final=soft)
     changed = SimpleNamespace(label=LEARNING, model=prediction_tire(CAR), final=soft)
-    labels = [curve.label for curve in _known_curves([same, changed], setup, None)]
+    labels = [curve.label for curve in _known_curves([same, changed], SETUP, None)]
     assert FROZEN in labels and FROZEN + AT_THE_END not in labels
     assert LEARNING + AT_THE_END in labels and LEARNING not in labels
 

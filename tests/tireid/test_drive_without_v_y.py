@@ -6,11 +6,10 @@ import pytest
 import tireid as ti
 from identifier.tire_model import load_model
 from models.vehicle import sedan
-from tests.pages import faults_of, outline
+from tests.pages import outline
 from tests.tireid.conftest import page_in, refusal, table_of, typed
-from tests.tireid.test_drive_command import bend, summary_of  # noqa: F401
+from tests.tireid.test_drive_command import bend, learns_shortly, summary_of  # noqa: F401
 from tireid.commands.drive import parse_fault
-from tireid.driving import learn as drive_learn
 
 TOLD = ("v_y_estimated_m_s", "v_y_estimated_sd_m_s", "side_slip_observable", "a_y_level_m_s2")
 
@@ -20,10 +19,7 @@ def result(bend, tmp_path_factory):  # noqa: F811
     """Tires that go on learning and linear ones, at 90 % of the grip, without v_y."""
     out = tmp_path_factory.mktemp("imu") / "out"
     words = ["drive", "--sensors", "imu", "--path", bend, "--tires", "learning", "linear"]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(drive_learn, "DURATION", 20.0)
-        patch.setattr(drive_learn, "_GROWS", 15.0)
-        assert typed(*words, "--film", "none", "--out", out) == 0
+    learns_shortly([*words, "--film", "none", "--out", out], 20.0)
     return out
 
 
@@ -54,15 +50,13 @@ def test_the_files_hold_what_was_told_in_place_of_what_was_not_measured(result):
 
 
 def test_the_report_shows_the_side_slip_that_was_told(result):
-    page = page_in(result)
-    assert faults_of(page) == []
-    told, text = summary_of(result)["lateral_velocity"], outline(page).text
+    told, text = summary_of(result)["lateral_velocity"], outline(page_in(result)).text
     assert f"{told['rms_error_deg']:.2f}°" in text
     assert "Lateral velocity, which no sensor measured" in text
 
 
 @pytest.mark.heavy
-def test_what_has_all_sensors_says_nothing_of_it(bend, result, tmp_path, capsys, undrawn):  # noqa: F811
+def test_what_has_all_sensors_says_nothing_of_it(bend, result, tmp_path, undrawn):  # noqa: F811
     """And names them or not: the same bits."""
     words = ["drive", "--path", bend, "--weights", result / "weights.json"]
     for name, more in (("named", ["--sensors", "full"]), ("default", [])):
@@ -77,11 +71,11 @@ def test_what_has_all_sensors_says_nothing_of_it(bend, result, tmp_path, capsys,
     assert not (tmp_path / "named" / "lateral.png").exists()
 
 
-def test_the_line_that_is_printed_says_how_right_it_was(result, bend, tmp_path, capsys, undrawn):  # noqa: F811
+def test_the_line_that_is_printed_says_how_right_it_was(result, bend, out, capsys, undrawn):  # noqa: F811
     words = ["drive", "--sensors", "imu", "--path", bend, "--film", "none"]
     words += ["--weights", result / "weights.json", "--no-noise", "--speed", "70%"]
     capsys.readouterr()
-    assert typed(*words, "--out", tmp_path / "out") == 0
+    assert typed(*words, "--out", out) == 0
     printed = capsys.readouterr().out
     assert "no noise, no v_y" in printed
     assert "frozen: v_y estimated to 0.0" in printed

@@ -6,7 +6,8 @@ import pytest
 import tireid as ti
 from identifier.methods import make_method
 from models.tires import MagicFormula
-from tests.tireid.conftest import typed
+from tests.identifier.export.test_emitted import SMALL
+from tests.tireid.conftest import refusal, typed
 
 
 @pytest.fixture(scope="module")
@@ -21,10 +22,7 @@ def stored(tmp_path_factory, logs):
 
 
 def refused(capsys, *words):
-    """Return the one line of an error."""
-    assert typed("emit", *words) == 2
-    (line,) = [one for one in capsys.readouterr().err.splitlines() if "error" in one]
-    return line
+    return refusal(capsys, ["emit", *words])
 
 
 def test_several_outputs_are_written_at_once(stored, tmp_path, capsys):
@@ -88,11 +86,7 @@ def test_a_disk_that_fills_up_leaves_nothing(stored, tmp_path, monkeypatch):
 
 
 def test_a_small_car_becomes_a_folder_of_slipx(stored, tmp_path):
-    small = ti.Vehicle(
-        name="1:10", mass=3.5, yaw_inertia=0.05, l_f=0.16, l_r=0.17,
-        cornering_stiffness_front=200.0, cornering_stiffness_rear=200.0,
-    )  # fmt: skip
-    tire = ti.TireModel.load(stored / "tire.json").mounted_on(small)
+    tire = ti.TireModel.load(stored / "tire.json").mounted_on(SMALL)
     emitted = ti.emit(tire, slipx=tmp_path / "car", understeer=True)
     assert emitted.files == (tmp_path / "car",) and emitted.understeer is not None
     assert len(list((tmp_path / "car" / "tyres").iterdir())) == 2

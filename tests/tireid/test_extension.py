@@ -1,4 +1,4 @@
-"""What another distribution adds: a tire, a method and an exporter, each by a file and one line."""
+"""What another distribution adds: a tire and an exporter, each by a file and one line."""
 
 import sys
 
@@ -14,9 +14,7 @@ from tests.tireid.conftest import typed
 from tireid.cli import build_parser
 
 CAR = ti.sedan()
-POINTS = """[tireid.methods]
-held_still = their_method:make
-[tireid.commands]
+POINTS = """[tireid.commands]
 points = their_command
 absent = their_absent
 """
@@ -37,11 +35,6 @@ class Saturating:
         return self.stiffness
 
     cornering_stiffness = slip_stiffness
-"""
-METHOD = """from identifier.baselines import LinearBaseline
-
-def make(vehicle, seed):
-    return LinearBaseline(dt=0.01, min_speed=2.0)
 """
 COMMAND = '''"""The curves of a model as points."""
 from pathlib import Path
@@ -68,13 +61,13 @@ def installed(tmp_path, monkeypatch):
     folder.mkdir()
     (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
     (folder / "entry_points.txt").write_text(POINTS)
-    for name, text in {"tire": TIRE, "method": METHOD, "command": COMMAND}.items():
+    for name, text in {"tire": TIRE, "command": COMMAND}.items():
         (tmp_path / f"their_{name}.py").write_text(text)
     monkeypatch.syspath_prepend(str(tmp_path))
     installed_names.cache_clear()
     yield
     installed_names.cache_clear()
-    for name in ("tire", "method", "command"):
+    for name in ("tire", "command"):
         sys.modules.pop(f"their_{name}", None)
 
 
@@ -90,8 +83,8 @@ def test_a_tire_is_an_object_that_the_plant_takes():
     assert 1e-4 * moved < np.abs(theirs.r - linear.r).max() < 0.03 * moved  # gentle: nearly linear
 
 
-def test_an_exporter_is_a_command_that_reads_a_model(tmp_path, capsys):
-    run = ti.identify(ti.sample_recording(CAR), CAR, "held_still", check=False)
+def test_an_exporter_is_a_command_that_reads_a_model(tmp_path):
+    run = ti.identify(ti.sample_recording(CAR), CAR, "linear", check=False)
     tire = run.freeze()
     tire.save(tmp_path / "model.json")
     assert typed("points", tmp_path / "model.json", tmp_path / "points.csv") == 0

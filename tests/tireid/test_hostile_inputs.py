@@ -53,10 +53,8 @@ def changed(text, key, value):
         ("dt", "1" + "0" * 400, "dt must be a number, it is a whole number of 1329 bits"),
         ("dt", "[" * 3000, "too deep"),
         ("law", "[]", "law must be a text, it is a list of 0"),
-        ("law", "{}", "law must be a text, it is a table of 0"),
         ("input_source", "[[1]]", "input_source must be a text"),
         ("inputs", '"v_y"', "network.inputs must be a list"),
-        ("inputs", "[[]]", "network.inputs must be a text"),
         ("inputs", '[{a = 1}, "r"]', "network.inputs must be a text"),
         ("scale", '["1", "1", "1", "1"]', "network.scale must be a number"),
         ("A_d", "[[-1e308, 0.0], [0.0, -1e308]]", "|A_d| must lie between 0 and 1e+12"),
@@ -90,7 +88,6 @@ def weights():
     ("keys", "value", "said"),
     [
         (["kind"], [], "kind must be a text, it is a list of 0"),
-        (["kind"], {}, "kind must be a text, it is a table of 0"),
         (["kind"], "onnx", "kind is an ONNX network: make it a method"),
         (["format"], [[]], "not a frozen model"),
         (["vehicle"], [], "vehicle must be a table"),
@@ -107,6 +104,7 @@ def weights():
         (["covariance", 0], 3, "covariance must be a number, it is a list"),
         (["excitation", 0, 0], 1e308, "excitation must hold numbers below"),
         (["ladder"], {}, "ladder must be a number"),
+        (["tells_v_y"], "yes", "tells_v_y must be true or false"),
     ],
 )
 def test_hostile_weights_are_refused_by_their_key(capsys, tmp_path, weights, keys, value, said):
@@ -155,13 +153,13 @@ def log(path, column, value, *, rows=300):
 )
 @pytest.mark.parametrize("unchecked", [[], ["--no-check"]])
 def test_numbers_of_no_car_never_reach_linear_algebra(
-    capsys, tmp_path, column, value, said, unchecked
+    capsys, tmp_path, out, column, value, said, unchecked
 ):
     path = log(tmp_path / "log.csv", column, value)
     sedan().to_toml(tmp_path / "car.toml")
-    words = [*learn_words(tmp_path, path), "--out", tmp_path / "out"]
+    words = [*learn_words(tmp_path, path), "--out", out]
     refused(capsys, [*words, *unchecked], said)
-    assert not (tmp_path / "out").exists()
+    assert not out.exists()
 
 
 def test_a_gzip_bomb_and_too_many_rows_are_refused(capsys, tmp_path, monkeypatch):
@@ -227,8 +225,8 @@ def test_a_limit_that_is_raised_lets_the_file_in(tmp_path, monkeypatch):
         '{"format": "tireid output 1", "files": {}, "folders": 3}',
     ],
 )
-def test_a_hostile_marker_makes_a_folder_foreign(tmp_path, marker):
-    target = tmp_path / "out"
+def test_a_hostile_marker_makes_a_folder_foreign(out, marker):
+    target = out
     target.mkdir()
     (target / MARKER).write_text(marker)
     with (

@@ -25,7 +25,7 @@ def signal(rng):
     return rng.standard_normal(N)
 
 
-def test_all_samples_of_a_short_recording_are_drawn(rng):
+def test_all_samples_of_a_short_recording_are_drawn():
     t = 0.01 * np.arange(1000)
     within = np.flatnonzero((t >= 1.0) & (t <= 2.0))
     np.testing.assert_array_equal(drawn_samples(t, (1.0, 2.0)), within)

@@ -53,8 +53,7 @@ def test_a_folder_appears_with_all_that_was_written(tmp_path):
     assert marker["files"]["result.txt"][0] == len("new")
 
 
-def test_an_empty_folder_is_filled_and_our_own_replaced_when_asked(tmp_path, swaps):
-    out = tmp_path / "out"
+def test_an_empty_folder_is_filled_and_our_own_replaced_when_asked(tmp_path, out, swaps):
     out.mkdir()
     write(out, "first")
     assert "--force" in refused(out, force=False)
@@ -74,10 +73,10 @@ def test_a_foreign_folder_survives_force(tmp_path):
     assert content(tmp_path) == {"data/sub/log.csv": "precious"}
 
 
-def test_what_a_user_added_to_our_folder_survives_force(tmp_path):
-    write(tmp_path / "out")
-    (tmp_path / "out" / "notes.txt").write_text("precious")
-    assert "holds notes.txt" in refused(tmp_path / "out")
+def test_what_a_user_added_to_our_folder_survives_force(tmp_path, out):
+    write(out)
+    (out / "notes.txt").write_text("precious")
+    assert "holds notes.txt" in refused(out)
     assert content(tmp_path)["out/notes.txt"] == "precious"
 
 
@@ -100,9 +99,9 @@ def test_the_home_folder_is_refused(tmp_path, monkeypatch):
     assert content(home)["out/result.txt"] == "new"
 
 
-def test_a_file_in_the_way_is_refused(tmp_path):
-    (tmp_path / "out").write_text("precious")
-    assert "is a file" in refused(tmp_path / "out")
+def test_a_file_in_the_way_is_refused(tmp_path, out):
+    out.write_text("precious")
+    assert "is a file" in refused(out)
     assert content(tmp_path) == {"out": "precious"}
 
 
@@ -122,11 +121,11 @@ def test_a_link_leads_to_the_folder_and_stays_a_link(tmp_path):
     assert "holds log.csv" in refused(link)
 
 
-def test_a_failing_body_leaves_the_old_folder_and_no_scratch(tmp_path):
-    write(tmp_path / "out", "old")
+def test_a_failing_body_leaves_the_old_folder_and_no_scratch(tmp_path, out):
+    write(out, "old")
     before = content(tmp_path)
     for error in (RuntimeError, KeyboardInterrupt):
-        with pytest.raises(error), output_folder(tmp_path / "out", force=True) as folder:
+        with pytest.raises(error), output_folder(out, force=True) as folder:
             (folder / "half.txt").write_text("half")
             raise error
     assert content(tmp_path) == before
@@ -149,26 +148,26 @@ def fail_to_rename(monkeypatch, *, onto, names=("new",)):
     return failures
 
 
-def test_a_rename_that_fails_restores_the_old_folder(tmp_path, monkeypatch):
-    write(tmp_path / "out", "old")
+def test_a_rename_that_fails_restores_the_old_folder(tmp_path, out, monkeypatch):
+    write(out, "old")
     before = content(tmp_path)
-    failures = fail_to_rename(monkeypatch, onto=tmp_path / "out")
+    failures = fail_to_rename(monkeypatch, onto=out)
     with pytest.raises(OSError, match="disk trouble"):
-        write(tmp_path / "out", "new", force=True)
+        write(out, "new", force=True)
     assert len(failures) == 2  # where the place is free, and in place of the old one
     assert content(tmp_path) == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
-def test_an_old_folder_that_cannot_be_put_back_is_kept_aside(tmp_path, monkeypatch, capsys):
-    write(tmp_path / "out", "old")
-    fail_to_rename(monkeypatch, onto=tmp_path / "out", names=("new", "old"))
+def test_an_old_folder_that_cannot_be_put_back_is_kept_aside(tmp_path, out, monkeypatch, capsys):
+    write(out, "old")
+    fail_to_rename(monkeypatch, onto=out, names=("new", "old"))
     with pytest.raises(OSError, match="disk trouble"):
-        write(tmp_path / "out", "new", force=True)
+        write(out, "new", force=True)
     (kept,) = tmp_path.iterdir()
     assert content(kept)["old/result.txt"] == "old"
     monkeypatch.undo()
-    write(tmp_path / "out", "later")
+    write(out, "later")
     assert f"left {kept}" in capsys.readouterr().err
     assert content(kept)["old/result.txt"] == "old"
 
@@ -190,12 +189,12 @@ CHANGES = {
     "other bytes": lambda out: (out / "part" / "deep" / "result.txt").write_text("RESULT"),
     "a spoilt marker": lambda out: (out / MARKER).write_text("[" * 100_000),
 }
-each_change = pytest.mark.parametrize("spoil", CHANGES.values(), ids=CHANGES)
 
 
-@each_change
-def test_what_a_user_does_at_the_last_moment_survives_force(tmp_path, monkeypatch, swaps, spoil):
-    out = tmp_path / "out"
+@pytest.mark.parametrize("spoil", CHANGES.values(), ids=CHANGES)
+def test_what_a_user_does_at_the_last_moment_survives_force(
+    tmp_path, out, monkeypatch, swaps, spoil
+):
     write_deep(out)
 
     calls = []
@@ -215,8 +214,7 @@ def test_what_a_user_does_at_the_last_moment_survives_force(tmp_path, monkeypatc
 
 
 @pytest.mark.parametrize("theirs", ["folder", "results of tireid", "file"])
-def test_what_appears_while_a_run_works_is_left_alone(tmp_path, theirs):
-    out = tmp_path / "out"
+def test_what_appears_while_a_run_works_is_left_alone(tmp_path, out, theirs):
     with pytest.raises(OutputError, match=r"what this run computed is in .*out-2$"):  # noqa: SIM117
         with output_folder(out, force=False) as folder:
             (folder / "result.txt").write_text("hours of work")
@@ -233,9 +231,8 @@ def test_what_appears_while_a_run_works_is_left_alone(tmp_path, theirs):
 
 
 def test_an_interruption_at_any_moment_of_the_exchange_leaves_one_folder_whole(
-    tmp_path, monkeypatch, swaps
+    tmp_path, out, monkeypatch, swaps
 ):
-    out = tmp_path / "out"
     write(out, "old")
     rename = Path.rename
     for moment in range(1, 9):
@@ -258,12 +255,12 @@ def test_an_interruption_at_any_moment_of_the_exchange_leaves_one_folder_whole(
     assert content(tmp_path) == {"out/result.txt": "new"}
 
 
-def test_a_second_run_is_refused_at_once_and_says_why(tmp_path):
-    with output_folder(tmp_path / "out", force=True):
-        assert "another run of tireid is writing" in refused(tmp_path / "out")
+def test_a_second_run_is_refused_at_once_and_says_why(tmp_path, out):
+    with output_folder(out, force=True):
+        assert "another run of tireid is writing" in refused(out)
         with output_folder(tmp_path / "beside", force=True):
             pass
-    write(tmp_path / "out", force=True)
+    write(out, force=True)
 
 
 def test_a_claim_without_locks_is_the_file_itself(tmp_path, monkeypatch):

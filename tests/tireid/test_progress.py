@@ -1,7 +1,5 @@
 """How far work has come: a line now and then, none on standard output."""
 
-import io
-
 import pytest
 
 from tireid import progress
@@ -16,13 +14,6 @@ def clock(monkeypatch):
     return now
 
 
-def streams(monkeypatch):
-    err, out = io.StringIO(), io.StringIO()
-    monkeypatch.setattr(progress.sys, "stderr", err)
-    monkeypatch.setattr(progress.sys, "stdout", out)
-    return err, out
-
-
 def worked(clock, seconds=10):
     work = progress.Progress("work")
     for quarter in range(1, 4 * seconds + 1):
@@ -30,31 +21,27 @@ def worked(clock, seconds=10):
         work(quarter / (4 * seconds))
 
 
-def test_it_is_a_plain_line_now_and_then(clock, monkeypatch):
-    err, out = streams(monkeypatch)
+def test_it_is_a_plain_line_now_and_then(clock, capsys):
     worked(clock, seconds=20)
-    lines = err.getvalue().splitlines()
+    out, err = capsys.readouterr()
+    lines = err.splitlines()
     assert lines[0] == "  work: 10 %, 18 s left"
     assert len(lines) == 4
-    assert "\r" not in err.getvalue() and "\x1b" not in err.getvalue()
-    assert out.getvalue() == ""
+    assert "\r" not in err and "\x1b" not in err and out == ""
 
 
-def test_short_work_says_nothing(clock, monkeypatch):
-    err, _ = streams(monkeypatch)
+def test_short_work_says_nothing(clock, capsys):
     worked(clock, seconds=1)
-    assert err.getvalue() == ""
+    assert capsys.readouterr().err == ""
 
 
-def test_a_program_that_uses_the_library_hears_nothing(clock, monkeypatch):
+def test_a_program_that_uses_the_library_hears_nothing(clock, monkeypatch, capsys):
     monkeypatch.setattr(progress, "_listening", False)
-    err, _ = streams(monkeypatch)
     worked(clock)
-    assert err.getvalue() == ""
+    assert capsys.readouterr().err == ""
 
 
-def test_parts_count_by_how_long_they_last(clock, monkeypatch):
-    err, _ = streams(monkeypatch)
+def test_parts_count_by_how_long_they_last(clock, capsys):
     work = progress.Progress("work", {"first": 1.0, "second": 3.0}, long=True)
     clock[0] += 10.0
     work(1.0)
@@ -62,7 +49,7 @@ def test_parts_count_by_how_long_they_last(clock, monkeypatch):
     for _ in range(3):
         clock[0] += 10.0
         work.step(3)
-    assert err.getvalue().splitlines() == [
+    assert capsys.readouterr().err.splitlines() == [
         "  work: first, 0 %",
         "  work: first, 25 %, 30 s left",
         "  work: second, 25 %, 30 s left",
@@ -72,14 +59,12 @@ def test_parts_count_by_how_long_they_last(clock, monkeypatch):
     ]
 
 
-def test_what_a_file_is_called_neither_commands_the_terminal_nor_breaks_the_line(
-    clock, monkeypatch
-):
-    err, _ = streams(monkeypatch)
+def test_what_a_file_is_called_neither_commands_the_terminal_nor_breaks_the_line(clock, capsys):
     work = progress.Progress("a\x1b[2J\nb")
     clock[0] += 3.0
     work(0.5)
-    assert err.getvalue().count("\n") == 1 and err.getvalue().rstrip("\n").isprintable()
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.isprintable()
 
 
 def test_a_standard_error_that_is_closed_stops_nothing(clock, monkeypatch):

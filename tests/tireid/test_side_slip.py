@@ -11,7 +11,6 @@ from identifier.run import identify
 from models.recordings import read_recording
 from models.vehicle import sedan
 from tests.rivals import INSTALLED
-from tests.tireid.conftest import json_of, typed
 from tireid.figures.side_slip import side_slip_figure
 
 CAR = sedan()
@@ -21,20 +20,6 @@ TOLD = (*("linear_kf", "joint_ekf") * INSTALLED, "inertial")
 @pytest.fixture(scope="module")
 def slalom(logs):
     return read_recording(logs / "slalom.csv")
-
-
-@pytest.fixture(scope="module")
-def result(logs, tmp_path_factory):
-    out = tmp_path_factory.mktemp("side_slip") / "out"
-    words = ["compare", logs / "slalom.csv", logs / "quick.csv", "--vehicle"]
-    words += [logs / "car.toml", "--method", "linear", *TOLD]
-    assert typed(*words, "--out", out) == 0
-    return out
-
-
-@pytest.fixture(scope="module")
-def methods(result):
-    return json_of(result / "compare.json")["methods"]
 
 
 def test_a_sample_too_slow_does_not_count_and_one_that_is_off_does(slalom):

@@ -40,9 +40,9 @@ def wheels(run):
     return shown(run, slips, np.random.default_rng(0))
 
 
-def imu(run, seed=1):
+def imu(run):
     """What an IMU and the steering show, with noise and a bias."""
-    rng, n = np.random.default_rng(seed), run.t.size
+    rng, n = np.random.default_rng(1), run.t.size
     return {
         "t": run.t,
         "r": run.r + 0.002 * rng.normal(size=n),
@@ -93,7 +93,7 @@ def logger(run, wheels, **more):
 
 @pytest.mark.usefixtures("unmade")
 def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
-    run, wheels, tmp_path, capsys
+    run, wheels, tmp_path, out, capsys
 ):
     CAR.to_toml(tmp_path / "car.toml")
     alone = write(tmp_path / "alone.csv", logger(run, wheels))
@@ -112,7 +112,6 @@ def test_a_log_with_a_second_speed_teaches_the_radius_for_one_without(
     data = tomllib.loads(told.read_text())
     np.testing.assert_allclose(data["wheels"]["radius"], RADIUS, rtol=0.005)
     assert typed("channels", alone, "--log", told) == 0
-    out = tmp_path / "out"
     words = [*learn_words(tmp_path, alone), "--log", told]
     assert typed(*words, "--out", out, "--accept") == 0
     captured = capsys.readouterr()

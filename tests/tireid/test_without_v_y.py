@@ -54,7 +54,7 @@ def test_a_log_without_v_y_teaches_the_estimate(history, exact):
     assert np.degrees(np.median(sd) / 20.0) < 0.15
 
 
-def test_what_was_estimated_is_said_to_be_and_never_shown_to_a_method(history, exact):
+def test_what_was_estimated_is_said_to_be_and_never_shown_to_a_method(history):
     told = history.recording
     assert told.estimated == ("v_y",)
     assert told.logged_v_y is None
@@ -148,17 +148,19 @@ def test_a_written_recording_leaves_out_what_was_estimated(history, tmp_path):
 
 
 @pytest.mark.usefixtures("unmade")
-def test_the_command_learns_and_tells_side_slip_with_its_deviation(log, exact, tmp_path, capsys):
+def test_the_command_learns_and_tells_side_slip_with_its_deviation(
+    log, exact, tmp_path, out, capsys
+):
     words = learn_words(tmp_path, log)
-    assert typed(*words, "--out", tmp_path / "out") == 0
+    assert typed(*words, "--out", out) == 0
     said = capsys.readouterr()
     assert "fit learns, and estimates it" in said.err
     assert "side slip was estimated to ±" in said.out
     assert "the log has no lateral velocity" in said.out
-    told = table_of(tmp_path / "out" / "forces.csv")
+    told = table_of(out / "forces.csv")
     away = np.abs(told["v_y_estimated_m_s"] - exact.v_y)
     assert np.mean(away < 2.0 * told["v_y_sd_m_s"]) > 0.8
-    summary = json_of(tmp_path / "out" / "summary.json")
+    summary = json_of(out / "summary.json")
     assert summary["law"] == "fit"
 
 
@@ -169,9 +171,9 @@ def test_the_doctor_and_channels_say_what_they_cannot_see_of_it(log, tmp_path, c
     assert "without vy, identify estimates it" in capsys.readouterr().out
 
 
-def test_a_method_that_needs_v_y_is_refused_in_one_line(log, tmp_path, capsys):
+def test_a_method_that_needs_v_y_is_refused_in_one_line(log, tmp_path, out, capsys):
     words = [*learn_words(tmp_path, log), "--method", "axle"]
-    assert typed(*words, "--out", tmp_path / "out") == 2
+    assert typed(*words, "--out", out) == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert "there is no vy, from which AxleIdentifier learns" in said
-    assert not (tmp_path / "out").exists()
+    assert not out.exists()

@@ -28,11 +28,6 @@ def a_design(car):
     return AxleIdentifier.for_vehicle(car)
 
 
-@pytest.fixture(name="run")
-def a_run(car, drive):
-    return identify(drive(n=1500, amplitude=0.07), car, AxleIdentifier.for_vehicle(car))
-
-
 def test_forces_of_the_corners_are_those_of_linear_programs(design):
     """Each most and each least force of the set, by HiGHS."""
     W = corners(design.bounds, design.ladder)

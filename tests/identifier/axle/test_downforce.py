@@ -112,16 +112,10 @@ def test_curves_with_a_speed_are_those_of_its_load(model):
     for speed in (15.0, 40.0, 70.0):
         curve = model.force(SLIPS, v_x=speed)
         np.testing.assert_allclose(curve, model.force(SLIPS) * pressed(speed), rtol=1e-9)
+        np.testing.assert_allclose(np.mean(model.band.at(SLIPS, v_x=speed), axis=0), curve)
     assert model.force(0.03, "rear") == pytest.approx(model.force(np.array([0.03]))[0, 1])
     assert "30 m/s" in model.summary()
     assert "30 m/s" not in replace(model, vehicle=UNTOLD).summary()
-
-
-def test_a_band_at_a_speed_is_around_the_force_at_that_speed(model):
-    for speed in (None, 30.0, 60.0):
-        low, high = model.band.at(0.03, "rear", v_x=speed)
-        assert 0.5 * (low + high) == pytest.approx(model.force(0.03, "rear", v_x=speed))
-    assert model.force(0.03, "rear", v_x=60.0) > 1.05 * model.force(0.03, "rear")
 
 
 def test_motion_and_lag_are_those_of_the_replay(model, drive):
@@ -155,7 +149,7 @@ def _slip_rate(model):
     return [ports[0], v_y, r, delta, v_x], list(told)
 
 
-def test_bands_hold_at_every_speed(run, drive):
+def test_bands_hold_at_every_speed(run):
     model, other = calibrated(run), race(phase=2.0)
     half = model.band.over(other)
     inside = np.abs(model.predict(other) - other.axle_force) <= half

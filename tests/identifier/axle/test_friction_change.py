@@ -9,7 +9,6 @@ import pytest
 
 from benchmarks.random_cars import good_sensors
 from identifier.axle import AxleIdentifier
-from identifier.axle.car import larger, smaller, within
 from identifier.axle.learning import RoadChange, RoadState, believed, evidence
 from identifier.run import identify
 from models.faults import SensorFault
@@ -75,15 +74,6 @@ def test_a_step_that_the_limit_of_a_sample_cuts_goes_on_with_the_errors_that_are
     expected = w * np.array([0.3**2 + 0.2**2, left @ [0.3, 0.2], left @ left])
     np.testing.assert_allclose([A, b, E], numbers.keep * expected, rtol=1e-9)
     assert ln_friction == change
-
-
-def test_larger_smaller_and_within_are_those_of_numpy(rng):
-    a, b = rng.normal(size=20), rng.normal(size=20)
-    a[0] = b[0]
-    np.testing.assert_array_equal(np.array(larger(ca.DM(a), ca.DM(b))).ravel(), np.maximum(a, b))
-    np.testing.assert_array_equal(np.array(smaller(ca.DM(a), ca.DM(b))).ravel(), np.minimum(a, b))
-    clipped = np.array(within(ca.DM(a), -0.3, 0.5)).ravel()
-    np.testing.assert_array_equal(clipped, np.clip(a, -0.3, 0.5))
 
 
 @cache

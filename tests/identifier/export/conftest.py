@@ -11,9 +11,8 @@ from identifier.axle.band import BandCalibration
 from identifier.export.compiled import samples_of
 from identifier.export.package import build_package
 from identifier.methods import make_method
-from models.maneuvers import Slalom
-from models.plant import Plant
 from models.vehicle import sedan
+from tests.identifier.conftest import slalom_of
 from tests.kept import Kept
 
 STRICT = [
@@ -53,11 +52,7 @@ def banded(car, **options):
 
 @pytest.fixture(scope="session")
 def slalom():
-    """45 s of a slalom of the sedan."""
-    maneuver = Slalom(
-        amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=44.99
-    )
-    return Plant(sedan()).simulate(maneuver, speed=20.0).recording()
+    return slalom_of(44.99)
 
 
 @pytest.fixture(scope="session")
@@ -114,6 +109,52 @@ def run():
         return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
 
     return ran
+
+
+ALLOWED = {"sqrt", "sqrtf", "floor", "floorf", "memcpy", "memset"}
+
+
+def require_silence(folder, run, compiler, sources, *flags):
+    """No compiler has anything to say of these files."""
+    for source in sources:
+        answer = run(compiler, *STRICT, "-O2", *flags, "-c", source, cwd=folder)
+        assert (answer.returncode, answer.stderr) == (0, ""), source
+
+
+def require_own_symbols(folder, run, compiler, sources, name, allowed=ALLOWED):
+    """No data that changes; symbols begin with a name, and others are of what is allowed."""
+    flags = ["-std=c99", "-O2", "-fno-stack-protector", "-Iinclude", "-Isrc", "-c", "-o", "x.o"]
+    for source in sources:
+        assert run(compiler, *flags, source, cwd=folder).returncode == 0
+        lines = run("nm", "x.o", cwd=folder).stdout.splitlines()
+        symbols = [line.split()[-2:] for line in lines]
+        assert not [word for kind, word in symbols if kind in "dDbBC"], "data that changes"
+        own = {word for kind, word in symbols if kind in "TR"}
+        assert own and all(word.startswith(f"{name}_") for word in own)
+        foreign = {word for kind, word in symbols if kind == "U"}
+        assert {word for word in foreign if not word.startswith(f"{name}_")} <= allowed
+
+
+def require_no_fast_math(folder, run, compiler, sources, flag):
+    for source in sources:
+        answer = run(compiler, flag, "-Iinclude", "-Isrc", "-c", source, cwd=folder)
+        assert answer.returncode != 0
+        assert "guards against NaN" in answer.stderr
+
+
+SANITIZED = "-std=c99 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=all"
+RUNS, BUILDS = "-O1", "-O0"  # many steps wait for the program, an alarm for the compiler
+
+
+def sanitized(folder, run, hostile, sources, macros, optimized=RUNS):
+    """Build a program of hostile input under AddressSanitizer and UBSan, and return its path."""
+    (folder / "hostile.c").write_text(hostile.read_text())
+    words = [*SANITIZED.split(), optimized, *macros, "-Iinclude", "-Isrc", *sources, "hostile.c"]
+    answer = run("gcc", *words, "-lm", "-o", "hostile", cwd=folder)
+    if "cannot find" in answer.stderr and "san" in answer.stderr:
+        pytest.skip("needs the sanitizers of gcc")
+    assert answer.returncode == 0, answer.stderr
+    return str(folder / "hostile")
 
 
 @pytest.fixture(params=["gcc", "clang"])

@@ -18,14 +18,6 @@ CAR = sedan()
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="needs a C compiler")
 
 
-@pytest.mark.parametrize("law", ["integral", "axle", "inertial"])
-def test_a_log_through_the_shipped_c_is_the_method_in_python(law, packages, slalom):
-    expected = identify(slalom, CAR, make_method(law, CAR)).axle_force
-    run = Shipped.of(packages[law]).run(slalom)
-    assert np.abs(run.axle_force - expected).max() < 1e-6
-    assert (run.status == Status.OK).all()
-
-
 @pytest.mark.parametrize("law", ["integral", "inertial"])
 def test_sample_by_sample_is_the_whole_recording(packages, slalom, law):
     one, all_at_once = (Shipped.of(packages[law]) for _ in range(2))

@@ -79,6 +79,7 @@ def test_a_property_file_reads_back_the_axle_over_slip_and_load(tmp_path, i):
     model = fitted(PRESSED, **TIRES)
     axle = ("front", "rear")[i]
     tire = read(model, axle, tmp_path)
+    assert pytest.approx(0.5 * PRESSED.axle_loads[i]) == tire.coefficients.FNOMIN
     alpha = np.linspace(-1.0, 1.0, 41) * model.known_slip[i]
     assert PRESSED.load_ratio(40.0)[i] > 1.1
     for v_x in (0.0, 20.0, 40.0):  # its load grows with speed
@@ -125,6 +126,14 @@ def test_limits_of_a_car_are_those_that_the_ellipse_leaves_by_hand():
     found = limits(level(load_transfer=0.0, **use))
     np.testing.assert_allclose(found.braking, GRAVITY / 1.25, rtol=1e-3)
     np.testing.assert_allclose(found.driving, GRAVITY / 2.0, rtol=1e-3)
+
+
+def test_the_end_of_what_is_not_known_of_the_ellipse_is_taken():
+    model = level(load_transfer=0.0, **{**NO_ELLIPSE, "braking_r": 1.25})
+    covariance, k = model.covariance.copy(), INDEX["braking_r"]
+    covariance[k, k] = 0.2**2
+    found = limits(replace(model, covariance=covariance))
+    np.testing.assert_allclose(found.braking, GRAVITY / (1.25 + Z * 0.2), rtol=1e-3)
 
 
 @pytest.mark.parametrize(

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from identifier.axle import AxleIdentifier
+from tests.identifier.export.conftest import BUILDS, sanitized
 
-HOSTILE = (Path(__file__).parent / "hostile.c").read_text()
-SANITIZED = "-std=c99 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=all"
-SAMPLES, BUILDS = "-O1", "-O0"  # a million samples wait for the program, an alarm for the compiler
-SOURCES = ["src/tireid.c", "src/tireid_equations.c", "hostile.c"]
+HOSTILE = Path(__file__).parent / "hostile.c"
+SOURCES = ["src/tireid.c", "src/tireid_equations.c"]
 
 
 def declared(package, **changed):
@@ -33,23 +32,12 @@ def declared(package, **changed):
     return ["-DBOUNDED=1", *(f"-D{key}={value}" for key, value in numbers.items())]
 
 
-def build(folder, run, compiler, single, macros=(), optimized=SAMPLES):
-    (folder / "hostile.c").write_text(HOSTILE)
-    macros = [f"-DTIREID_SINGLE={single}", *macros]
-    flags = [*SANITIZED.split(), optimized, *macros, "-Iinclude", "-Isrc"]
-    answer = run(compiler, *flags, *SOURCES, "-lm", "-o", "hostile", cwd=folder)
-    if "cannot find" in answer.stderr and "san" in answer.stderr:
-        pytest.skip(f"needs the sanitizers of {compiler}")
-    assert answer.returncode == 0, answer.stderr
-    return folder / "hostile"
-
-
 @pytest.mark.sweep("0-integral")
 @pytest.mark.parametrize("law", ["integral", "axle"])
 @pytest.mark.parametrize("single", [0, 1])
 def test_a_million_hostile_samples_find_nothing(law, single, packages, write, run):
-    program = build(write(packages[law]), run, "gcc", single, declared(packages[law]))
-    answer = run(str(program))
+    macros = [f"-DTIREID_SINGLE={single}", *declared(packages[law])]
+    answer = run(sanitized(write(packages[law]), run, HOSTILE, SOURCES, macros))
     assert (answer.returncode, answer.stderr) == (0, ""), answer.stdout + answer.stderr
     counts = {name: int(n) for name, n in re.findall(r"(\w+) (\d+)", answer.stdout)}
     assert sum(counts.values()) == 1_000_000
@@ -81,6 +69,6 @@ def test_without_a_guard_the_alarm_rings(guard, complaint, packages, write, run)
     if guard.startswith("tireid_accepts"):  # a second guard alone still keeps the state
         without = without.replace("tireid_believes(params, sum, &out)", "true")
     source.write_text(without)
-    answer = run(str(build(folder, run, "gcc", 0, optimized=BUILDS)))
+    answer = run(sanitized(folder, run, HOSTILE, SOURCES, ["-DTIREID_SINGLE=0"], BUILDS))
     assert answer.returncode != 0
     assert re.search(complaint, answer.stdout), answer.stdout

@@ -60,6 +60,9 @@ class Master:
             instanceName="one",
         )
         self.fmu.instantiate()
+        self.begin(start_time)
+
+    def begin(self, start_time):
         if self.two:
             self.fmu.setupExperiment(startTime=start_time)
             self.fmu.enterInitializationMode()
@@ -198,6 +201,18 @@ def test_a_saved_state_goes_on_as_if_nothing_had_happened(master, version):
     other.run(-inputs[:10], 0.01)
     restore(other, saved)
     assert (other.run(inputs[120:], 0.01, first=120) == through).all()
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_after_a_reset_it_waits_for_its_initialization_and_is_as_new(master, version):
+    inputs, one = rows(swaying(60)), master(version)
+    first = one.run(inputs, 0.01)
+    one.fmu.reset()
+    with pytest.raises(Exception, match="status 3"):
+        one.step(0.0, 0.01)
+    one.fmu.reset()
+    one.begin(0.0)
+    assert (one.run(inputs, 0.01) == first).all()
 
 
 @pytest.mark.sweep("3")

@@ -38,12 +38,6 @@ def driven(slalom, package):
     return samples_of(slalom, package.inputs)[:1500]
 
 
-@pytest.fixture
-def rows(slalom):
-    """15 s of a slalom with gaps of 0.03 to 2 s, in one channel each, in all, and of each kind."""
-    return with_gaps(samples_of(slalom)[:1500])
-
-
 def with_gaps(rows):
     rows[300:303, 1] = np.nan
     rows[400:420, 2] = np.inf

@@ -8,8 +8,9 @@ import pytest
 
 from identifier.export.onnx import MissingOnnxError, NoOnnxError, onnx_bytes
 from identifier.methods import make_method
-from identifier.paper.network import SIGNALS, Network, NetworkModel, Weights
+from identifier.paper.network import SIGNALS, Network
 from identifier.run import identify
+from tests.identifier.conftest import network_model
 
 onnx = pytest.importorskip("onnx", reason="needs the package onnx")
 runtime = pytest.importorskip("onnxruntime", reason="needs the package onnxruntime")
@@ -19,17 +20,6 @@ STRUCTURES = [
     Network(inputs=("alpha_f", "alpha_r", "v_x"), hidden=3),
     Network(inputs=tuple(reversed(SIGNALS)), hidden=7),
 ]
-
-
-def frozen(car, network, rng):
-    W, V = rng.standard_normal((2, network.hidden)), rng.standard_normal((network.hidden, 1))
-    return NetworkModel(
-        vehicle=car,
-        network=network,
-        weights=Weights(W=W, V=V * rng.standard_normal((1, len(network.inputs)))),
-        force_unit=1000.0,
-        min_speed=1.0,
-    )
 
 
 def stopping(drive, rng):
@@ -51,7 +41,7 @@ def run(content, drive, number=np.float64):
 @pytest.mark.parametrize(("single", "tolerance"), [(False, 1e-9), (True, 1e-6)])
 def test_onnxruntime_gives_the_forces_of_the_network(car, drive, rng, network, single, tolerance):
     recording = stopping(drive(400), rng)
-    model = frozen(car, network, rng)
+    model = network_model(car, network, rng)
     expected = model.predict(recording)
     number = np.float32 if single else np.float64
     forces = run(onnx_bytes(model, single=single), recording, number)
@@ -61,7 +51,7 @@ def test_onnxruntime_gives_the_forces_of_the_network(car, drive, rng, network, s
 
 
 def test_every_port_tells_its_unit(car, rng):
-    graph = onnx.load_from_string(onnx_bytes(frozen(car, Network(), rng))).graph
+    graph = onnx.load_from_string(onnx_bytes(network_model(car, Network(), rng))).graph
     units = {port.name: port.doc_string.rsplit(" ", 1)[1] for port in (*graph.input, *graph.output)}
     assert units == {
         "v_x": "[m/s]", "v_y": "[m/s]", "r": "[rad/s]", "delta_f": "[rad]", "delta_r": "[rad]",
@@ -91,7 +81,7 @@ def test_a_model_that_is_no_network_is_refused(car, drive):
 
 
 def test_without_the_package_it_says_what_to_install(car, rng, monkeypatch):
-    model = frozen(car, Network(), rng)
+    model = network_model(car, Network(), rng)
     monkeypatch.setitem(sys.modules, "onnx", None)
     with pytest.raises(MissingOnnxError, match="needs the package onnx: pip install onnx "):
         onnx_bytes(model)

@@ -81,12 +81,6 @@ def test_a_forgotten_constant_would_be_noticed(slalom):
     assert np.abs(run_folded(specialize(other, CAR), slalom) - expected).max() > 1.0
 
 
-def test_a_run_starts_with_weights_that_were_learnt(slalom):
-    method = make_method("integral", CAR)
-    model = identify(slalom, CAR, method).freeze(40.0)
-    np.testing.assert_array_equal(specialize(method, CAR, model).carry["W"], model.weights.W)
-
-
 def test_what_is_learnt_is_told_apart_from_filters():
     assert specialize(make_method("integral", CAR), CAR).learnt == ("W", "V")
     assert "filters" not in specialize(make_method("axle", CAR), CAR).learnt

@@ -1,36 +1,11 @@
 """Without a lateral velocity, of a car that pushes on the road with the square of its speed."""
 
-from dataclasses import replace
-
 import casadi as ca
 import numpy as np
-import pytest
 
-from identifier.inertial import InertialIdentifier
 from identifier.inertial.motion import Sample, predicted, static_load, unknowns
-from identifier.run import identify
-from models.recordings import Recording
 from models.vehicle import load_ratio
-from tests.identifier.axle.test_downforce import RACER, UNTOLD, race
 from tests.identifier.inertial.test_motion import SCALES, STEPS, V_X, N, car, laws, places, state
-
-METHOD = InertialIdentifier.for_vehicle(RACER)
-
-
-def felt(recording: Recording) -> Recording:
-    """The drive with what an accelerometer shows, and without v_y."""
-    a_y = recording.axle_force.sum(axis=1) / RACER.mass
-    return replace(recording, a_y=a_y, v_y=None)
-
-
-@pytest.fixture(scope="module")
-def drive():
-    return race()
-
-
-@pytest.fixture(scope="module")
-def models(drive):
-    return [identify(felt(drive), one, METHOD).freeze() for one in (RACER, UNTOLD)]
 
 
 def stepped(z, load):

@@ -118,9 +118,9 @@ def integrated(z, tilt, duration, dt=1e-4):
     return z, tilt
 
 
-def walked(dt, duration=0.08):
+def walked(dt):
     z, tilt = state(), np.array([2.0, 1.0])
-    for k in range(round(duration / dt)):
+    for k in range(round(0.08 / dt)):
         z, tilt = stepped(z, tilt, k * dt, dt)
     return z, tilt
 

@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.paper.laws import LAWS, DrivingError, Gains
+from identifier.paper.laws import LAWS, DrivingError
 from identifier.stability.certificate import certify
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL, Loop, direction_matrix
 from identifier.stability.lyapunov import lyapunov
 from identifier.stability.margins import drift_frequency, gain_margin
-from identifier.stability.operation import Operation
-from identifier.stability.sampled_bound import Disturbance
+from tests.identifier.stability.test_certificate import CITY, gains
 
 SKEWED = np.array([[-4.0, 6.0], [-0.5, -3.0]])
 LEAD = 0.75  # s: along P positive real from 0.735 on
@@ -58,14 +57,9 @@ def test_for_skewed_error_dynamics_only_the_lyapunov_direction_is_positive_real(
     law = DrivingError(1.0, LEAD)
     assert drift_frequency(A_d=SKEWED, forgetting=3.0, law=law) < 1e4
     assert drift_frequency(A_d=SKEWED, forgetting=3.0, law=law, direction=pair.P) == np.inf
-
-
-def test_with_skewed_error_dynamics_the_printed_direction_has_a_limit_even_with_lead():
-    pair, law = lyapunov(SKEWED, 2.0 * np.eye(2)), DrivingError(1.0, LEAD)
     printed = Loop(A_d=SKEWED, forgetting=3.0, law=law, G=np.eye(2))
-    passive = Loop(A_d=SKEWED, forgetting=3.0, law=law, G=np.eye(2), direction=pair.P)
     assert np.isfinite(gain_margin(printed).factor)
-    assert gain_margin(passive).factor == np.inf
+    assert gain_margin(replace(printed, direction=pair.P)).factor == np.inf
 
 
 def test_the_law_that_runs_goes_along_p_of_the_lyapunov_equation():
@@ -81,26 +75,9 @@ def test_the_law_that_runs_goes_along_p_of_the_lyapunov_equation():
 
 
 def test_the_certificate_finds_no_gain_limit_of_the_lead_even_for_skewed_error_dynamics():
-    task = Operation(
-        n_h=4,
-        dt=0.001,
-        bandwidth=0.5,
-        disturbance=Disturbance(residual=2.0),
-        needed_force=2.0,
-        x_bar_max=1.0,
-        input_feedback=None,
-    )
-    gains = Gains(
-        A_d=tuple(map(tuple, SKEWED)),
-        forgetting=3.0,
-        eta_W=1.0,
-        eta_V=0.0,
-        rho_W=0.1,
-        rho_V=0.1,
-        lead=LEAD,
-    )
-    certificate = certify(gains, LAWS["pi_lead"], task)
+    skewed = replace(gains(lam=3.0, eta_W=1.0, lead=LEAD), A_d=tuple(map(tuple, SKEWED)))
+    certificate = certify(skewed, LAWS["pi_lead"], CITY)
     assert certificate["gain_continuous"].margin == np.inf
     assert certificate["drift"].limit == np.inf
-    short = certify(replace(gains, lead=0.2 * LEAD), LAWS["pi_lead"], task)
+    short = certify(replace(skewed, lead=0.2 * LEAD), LAWS["pi_lead"], CITY)
     assert short["drift"].limit < np.inf

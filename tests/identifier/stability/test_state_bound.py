@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from identifier.run import identify
 from identifier.stability.bounds import small_gain, steady_capacity
 from identifier.stability.loop import INSTANTANEOUS, INTEGRAL
 from identifier.stability.lyapunov import lyapunov
-from identifier.stability.operation import Operation, proven_bounds
+from identifier.stability.operation import proven_bounds
 from identifier.stability.printed import (
     _bound_14,
     _canceling_pair,
@@ -23,6 +25,7 @@ from identifier.stability.sampled_bound import (
     output_layer,
 )
 from tests.identifier.stability.limits import integral_euler_limit
+from tests.identifier.stability.test_certificate import CITY
 
 SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])
 LAWS = {"integral": INTEGRAL, "instantaneous": INSTANTANEOUS, "pi_lead": DrivingError(1.0, 0.3)}
@@ -69,9 +72,9 @@ def simulated(A_d, law, lam, eta, rho, f, s, dt=2e-3, leak_scale=1.0, W=0.0):
     return largest
 
 
-def nasty_inputs(rng, n_h, f_max, n=5000):
+def nasty_inputs(rng, n_h, f_max):
     """A residual and hidden units that switch at random between their largest values."""
-    hold = int(rng.integers(50, 500))
+    n, hold = 5000, int(rng.integers(50, 500))
     turns = rng.uniform(0, 2 * np.pi, n // hold + 1)
     f = f_max * np.column_stack([np.cos(turns), np.sin(turns)])
     s = np.sign(rng.standard_normal((n // hold + 1, n_h)))
@@ -207,16 +210,8 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage(run):
     V_start = float(np.linalg.norm(history.state["V"][0]))
     signals = np.hstack([history.recording.x, history.recording.u])
     x_bar_max = np.linalg.norm(signals / np.array(history.method.network.scale), axis=1).max()
-    operation = Operation(
-        n_h=8,
-        dt=0.01,
-        bandwidth=0.7,
-        disturbance=Disturbance(residual=f_max),
-        needed_force=f_max,
-        x_bar_max=x_bar_max,
-        input_feedback=None,
-        V_start=V_start,
-    )
+    acting = {"disturbance": Disturbance(residual=f_max), "needed_force": f_max}
+    operation = replace(CITY, n_h=8, x_bar_max=x_bar_max, V_start=V_start, **acting)
     inverse = np.eye(2) / 6.0
     proven = proven_bounds(history.method.gains, INTEGRAL, operation, inverse)
     bounds = proven.leakage
@@ -226,13 +221,18 @@ def test_the_identifier_itself_keeps_the_bounds_of_leakage(run):
     assert np.linalg.norm(history.state["V"], axis=(1, 2)).max() <= proven.V
 
 
+def nudged(a, rho, n_h, dt, share, n, nudge):
+    """The largest error after a nudge at a share of the limit of the gain, and η."""
+    eta = share * integral_euler_limit(a, a, dt) / n_h
+    f, s = np.zeros((n, 2)), np.ones((n, n_h))
+    f[:50] = nudge
+    return simulated(-a * np.eye(2), INTEGRAL, a, eta, rho, f, s, dt=dt)[0], eta
+
+
 def test_the_integral_law_passes_bound_14_many_times_over():
     """No residual, ideal weights zero, w_bar = 0: (14) allows next to nothing."""
-    a, lam, rho, n_h, dt = 6.0, 6.0, 0.05, 4, 2e-3
-    eta = 1.2 * integral_euler_limit(a, lam, dt) / n_h
-    f, s = np.zeros((40000, 2)), np.ones((40000, n_h))
-    f[:50] = 1e-2  # a nudge
-    error, _ = simulated(-a * np.eye(2), INTEGRAL, lam, eta, rho, f, s, dt=dt)
+    a, rho, n_h = 6.0, 0.05, 4
+    error, eta = nudged(a, rho, n_h, 2e-3, 1.2, 40000, 1e-2)
     pair = _canceling_pair(-a * np.eye(2), eta_W=eta, rho_W=rho)
     ideal = {"W_M": 1.0, "n_h": n_h, "eta_W": eta, "rho_W": rho}  # generous: W_M is 0
     tight = _bound_14(pair, w_bar=0.0, k_b=_tight_k_b(pair, **ideal))
@@ -241,11 +241,8 @@ def test_the_integral_law_passes_bound_14_many_times_over():
 
 @pytest.mark.heavy
 def test_the_integral_law_passes_even_the_printed_route_where_a_is_slow():
-    a, lam, rho, n_h, dt = 0.1, 0.1, 1.0, 1, 0.05
-    eta = 4.0 * integral_euler_limit(a, lam, dt)
-    f, s = np.zeros((60000, 2)), np.ones((60000, n_h))
-    f[:50] = 1e-3
-    error, _ = simulated(-a * np.eye(2), INTEGRAL, lam, eta, rho, f, s, dt=dt)
+    a, rho, n_h = 0.1, 1.0, 1
+    error, eta = nudged(a, rho, n_h, 0.05, 4.0, 60000, 1e-3)
     pair = lyapunov(-a * np.eye(2), 2.0 * eta / rho * np.eye(2))  # |P| = (η/ρ)/a: b is smallest
     k_b = _printed_k_b(pair, W_M=0.0, n_h=n_h, eta_W=eta, rho_W=rho)
     printed = _bound_14(pair, w_bar=0.0, k_b=k_b)

@@ -1,10 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from identifier.paper.laws import Gains
 from identifier.stability.loop import INSTANTANEOUS
 from identifier.stability.lyapunov import LyapunovError, lyapunov
-from identifier.stability.operation import Operation
 from identifier.stability.printed import (
     _bound_14,
     _canceling_pair,
@@ -15,6 +15,7 @@ from identifier.stability.printed import (
     ultimate_bound,
 )
 from identifier.stability.sampled_bound import Disturbance
+from tests.identifier.stability.test_certificate import CITY, gains
 
 SKEWED = np.array([[-4.0, 3.0], [-0.5, -6.0]])
 NUMBERS = {"W_M": 1.5, "n_h": 6, "eta_W": 3.0, "rho_W": 0.8}
@@ -87,18 +88,9 @@ def test_the_canceling_pair_gives_the_closed_form_of_the_tight_bound():
 
 def best_printed(*, w_bar, n_h, eta_W, rho_W):
     """The certificate's "printed_bound" for SKEWED: the ideal weights are zero."""
-    A_d = tuple(map(tuple, SKEWED.tolist()))
-    gains = Gains(A_d=A_d, forgetting=1.0, eta_W=eta_W, eta_V=0.0, rho_W=rho_W, rho_V=0.0)
-    operation = Operation(
-        n_h=n_h,
-        dt=0.01,
-        bandwidth=1.0,
-        disturbance=Disturbance(residual=w_bar),
-        needed_force=1.0,
-        x_bar_max=1.0,
-        input_feedback=None,
-    )
-    entries = printed_bounds(gains, INSTANTANEOUS, operation, trivial=1.0)
+    skewed = replace(gains(eta_W=eta_W, rho_W=rho_W), A_d=tuple(map(tuple, SKEWED.tolist())))
+    operation = replace(CITY, n_h=n_h, disturbance=Disturbance(residual=w_bar))
+    entries = printed_bounds(skewed, INSTANTANEOUS, operation, trivial=1.0)
     return {entry.name: entry.value for entry in entries}["printed_bound"]
 
 

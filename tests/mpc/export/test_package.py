@@ -13,11 +13,16 @@ from mpc.export.package import build_mpc_package, mpc_readme
 from mpc.problem import Cost, Problem
 from mpc.realtime import Tracker
 from mpc.tires import prediction_tire
+from tests.identifier.export.conftest import (
+    ALLOWED,
+    require_no_fast_math,
+    require_own_symbols,
+    require_silence,
+)
 from tests.mpc.export.conftest import LAWS, STRICT, c_files, planted
 
 CAR = sedan()
 SHORT = Problem(horizon=8)
-ALLOWED = {"sqrt", "sqrtf", "floor", "floorf", "memcpy", "memset", "memmove"}
 
 
 @pytest.mark.heavy
@@ -25,10 +30,9 @@ ALLOWED = {"sqrt", "sqrtf", "floor", "floorf", "memcpy", "memset", "memmove"}
 @pytest.mark.parametrize("single", [0, 1])
 def test_no_compiler_has_anything_to_say(law, single, compiler, packages, write, run):
     folder = write(packages[law])
-    flags = [*STRICT, "-O2", f"-DTIREID_MPC_SINGLE={single}", "-Iinclude", "-Isrc", "-c"]
-    for source in [*c_files(folder), *c_files(folder, "tests")]:
-        answer = run(compiler, *flags, source, cwd=folder)
-        assert (answer.returncode, answer.stderr) == (0, ""), source
+    flags = f"-DTIREID_MPC_SINGLE={single}", "-Iinclude", "-Isrc"
+    sources = [*c_files(folder), *c_files(folder, "tests")]
+    require_silence(folder, run, compiler, sources, *flags)
 
 
 @pytest.mark.heavy
@@ -36,27 +40,15 @@ def test_symbols_begin_with_the_name_and_nothing_is_called_but_roots_and_copies(
     compiler, write, run
 ):
     folder = write(build_mpc_package(prediction_tire(CAR), SHORT, name="left_mpc"))
-    flags = ["-std=c99", "-O2", "-fno-stack-protector", "-Iinclude", "-Isrc", "-c", "-o", "x.o"]
-    for source in c_files(folder):
-        assert run(compiler, *flags, source, cwd=folder).returncode == 0
-        lines = run("nm", "x.o", cwd=folder).stdout.splitlines()
-        symbols = [line.split()[-2:] for line in lines]
-        assert not [name for kind, name in symbols if kind in "dDbBC"], "data that changes"
-        own = {name for kind, name in symbols if kind in "TR"}
-        foreign = {name for kind, name in symbols if kind == "U"}
-        assert own
-        assert all(name.startswith("left_mpc_") for name in own)
-        assert {name for name in foreign if not name.startswith("left_mpc_")} <= ALLOWED
+    allowed = ALLOWED | {"memmove"}
+    require_own_symbols(folder, run, compiler, c_files(folder), "left_mpc", allowed)
 
 
 @pytest.mark.sweep("gcc--ffast-math", "clang--Ofast", "*finite*")
 @pytest.mark.parametrize("flag", ["-Ofast", "-ffast-math", "-ffinite-math-only"])
 def test_fast_math_is_refused(flag, compiler, packages, write, run):
     folder = write(packages["integral"])
-    for source in c_files(folder):
-        answer = run(compiler, flag, "-Iinclude", "-Isrc", "-c", source, cwd=folder)
-        assert answer.returncode != 0
-        assert "guards against NaN" in answer.stderr
+    require_no_fast_math(folder, run, compiler, c_files(folder), flag)
 
 
 def test_the_same_input_gives_the_same_bytes():
@@ -93,7 +85,7 @@ def test_the_manifest_tells_all_that_went_in(packages):
         assert hashlib.sha256(package.files[path].encode()).hexdigest() == hashed
 
 
-def self_test(folder, run, compiler="gcc", single=0):
+def self_test(folder, run, compiler, single):
     sources = [*c_files(folder), *c_files(folder, "tests")]
     words = [
         *STRICT,
@@ -108,20 +100,15 @@ def self_test(folder, run, compiler="gcc", single=0):
     return run(str(folder / "self_test"))
 
 
-@pytest.mark.sweep("gcc-axle")
+@pytest.mark.sweep("gcc-0-axle", "clang-1-axle")
 @pytest.mark.parametrize("law", LAWS)
-def test_steering_is_bit_for_bit_that_of_python_in_double(law, compiler, packages, write, run):
-    answer = self_test(write(packages[law]), run, compiler)
+@pytest.mark.parametrize("single", [0, 1])
+def test_steering_is_that_of_python_in_double_bit_for_bit(
+    single, law, compiler, packages, write, run
+):
+    answer = self_test(write(packages[law]), run, compiler, single)
     assert answer.returncode == 0, answer.stdout
-    assert "largest difference of the steering: 0 rad" in answer.stdout
-
-
-@pytest.mark.sweep("clang-axle")
-@pytest.mark.parametrize("law", LAWS)
-def test_float_passes_the_self_test(law, compiler, packages, write, run):
-    answer = self_test(write(packages[law]), run, compiler, single=1)
-    assert answer.returncode == 0, answer.stdout
-    assert "largest difference of the steering: 0 rad" not in answer.stdout
+    assert ("largest difference of the steering: 0 rad" in answer.stdout) == (not single)
 
 
 def test_the_vectors_are_those_of_a_tracker_that_plans_and_falls_back(packages):

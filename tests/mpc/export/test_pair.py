@@ -12,19 +12,18 @@ import pytest
 from identifier.axle.slip import Sensors
 from identifier.export.package import build_package
 from identifier.methods import make_method
-from models.maneuvers import Slalom
-from models.plant import Plant
 from models.vehicle import sedan
 from mpc.export.pair import DELAY, NoHandoverError, build_pair, frozen_start
 from mpc.realtime import Tracker
 from mpc.tires import prediction_tire
+from tests.identifier.conftest import slalom_of
+from tests.identifier.export.conftest import require_silence
 from tests.kept import Kept
 from tests.mpc.export.conftest import LAWS, STRICT, c_files, put_pair
 from tests.rivals import rival
 from tests.shipped import Shipped
 
 CAR = sedan()
-SLALOM = Slalom(amplitude=np.radians(4.0), frequency=0.5, onset=1.0, rate_limit=1.0, duration=9.99)
 INCLUDES = ["-Iinclude", "-Iidentifier/include", "-Impc/include"]
 
 
@@ -36,9 +35,8 @@ def test_example_and_handover_have_no_warning_in_any_mix_of_precisions(
 ):
     folder = write_pair(pairs[law])
     defines = [f"-DTIREID_SINGLE={precision[0]}", f"-DTIREID_MPC_SINGLE={precision[1]}"]
-    for source in [*c_files(folder), *c_files(folder, "examples")]:
-        answer = run(compiler, *STRICT, *defines, *INCLUDES, "-O2", "-c", source, cwd=folder)
-        assert (answer.returncode, answer.stderr) == (0, ""), source
+    sources = [*c_files(folder), *c_files(folder, "examples")]
+    require_silence(folder, run, compiler, sources, *defines, *INCLUDES)
 
 
 @pytest.fixture(scope="module")
@@ -82,7 +80,7 @@ def test_a_car_with_an_accelerometer_keeps_its_lane(law, single, sensing, write_
 def test_what_is_learnt_without_v_y_is_handed_over_whole(sensing, write_pair):
     """Compliance, the share of sway, and the zero of the steering: as Python makes the tire."""
     pair = sensing("inertial")
-    drive = replace(Plant(CAR).simulate(SLALOM, speed=20.0).recording(), v_y=None)
+    drive = replace(slalom_of(9.99), v_y=None)
     drive = replace(drive, delta_f=drive.delta_f - 0.004)
     library = joined(write_pair(pair))
     learnt = Shipped.of(pair.identifier, single=False)
@@ -121,11 +119,10 @@ def test_cmake_builds_both_and_the_learning_car_keeps_its_lane(law, single, pair
 @pytest.fixture(scope="module")
 def taught(pairs):
     """By law, the identifier after 10 s of a slalom, as C has learnt it."""
-    recording = Plant(CAR).simulate(SLALOM, speed=20.0).recording()
 
     def make(law):
         learner = Shipped.of(pairs[law].identifier, single=False)
-        learner.run(recording)
+        learner.run(slalom_of(9.99))
         return learner
 
     return Kept(make)

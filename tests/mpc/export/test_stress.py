@@ -9,30 +9,22 @@ from models.vehicle import sedan
 from mpc.export.package import build_mpc_package
 from mpc.problem import Problem
 from mpc.tires import prediction_tire
+from tests.identifier.export.conftest import BUILDS, RUNS, sanitized
 from tests.mpc.export.conftest import LAWS, c_files, planted
 
-HOSTILE = (Path(__file__).parent / "hostile.c").read_text()
-SANITIZED = "-std=c99 -g -ffp-contract=off -fsanitize=address,undefined -fno-sanitize-recover=all"
-SOLVES, BUILDS = "-O1", "-O0"  # thousands of solves wait for the program, an alarm for the compiler
+HOSTILE = Path(__file__).parent / "hostile.c"
 
 
-def build(folder, run, single, steps, optimized=SOLVES):
-    (folder / "hostile.c").write_text(HOSTILE)
-    macros = [f"-DTIREID_MPC_SINGLE={single}", f"-DSTEPS={steps}L"]
-    flags = [*SANITIZED.split(), optimized, *macros]
-    words = [*flags, "-Iinclude", "-Isrc", *c_files(folder), "hostile.c", "-lm", "-o", "hostile"]
-    answer = run("gcc", *words, cwd=folder)
-    if "cannot find" in answer.stderr and "san" in answer.stderr:
-        pytest.skip("needs the sanitizers of gcc")
-    assert answer.returncode == 0, answer.stderr
-    return str(folder / "hostile")
+def build(folder, run, steps, optimized=RUNS):
+    macros = ["-DTIREID_MPC_SINGLE=0", f"-DSTEPS={steps}L"]
+    return sanitized(folder, run, HOSTILE, c_files(folder), macros, optimized)
 
 
 @pytest.mark.heavy
 @pytest.mark.parametrize("steps", [1000, 3000])
 @pytest.mark.parametrize("law", LAWS)
 def test_thousands_of_hostile_measurements_find_nothing(law, steps, packages, write, run):
-    answer = run(build(write(packages[law]), run, 0, steps=steps))
+    answer = run(build(write(packages[law]), run, steps))
     assert (answer.returncode, answer.stderr) == (0, ""), answer.stdout + answer.stderr
     counts = {name: int(n) for name, n in re.findall(r"(\w+) (\d+)", answer.stdout)}
     assert counts.pop("unsolved") == 0
@@ -62,7 +54,7 @@ def test_thousands_of_hostile_measurements_find_nothing(law, steps, packages, wr
 def test_without_a_guard_the_alarm_rings(file, pattern, replacement, complaint, write, run):
     folder = write(build_mpc_package(prediction_tire(sedan()), Problem(horizon=8)))
     planted(folder, file, pattern, replacement)
-    answer = run(build(folder, run, 0, steps=500, optimized=BUILDS))
+    answer = run(build(folder, run, 500, BUILDS))
     assert answer.returncode != 0
     if complaint:
         assert re.search(complaint, answer.stdout), answer.stdout + answer.stderr

@@ -38,7 +38,7 @@ def forces_by_hand(tire, samples):
     return np.array(told)
 
 
-def test_forces_along_a_drive_are_those_by_hand(tire, dry, rng):
+def test_forces_along_a_drive_are_those_by_hand(tire, dry):
     samples = samples_of(dry[1])[:200]
     weights = np.stack([tire.weights, 0.9 * tire.weights])
     told = axle_forces(tire, weights, samples, 0.01)

@@ -17,15 +17,15 @@ COUNT = 10.0  # independent errors, whatever the samples
 class Formula(Told):
     """Mean chi-square = size (least + slope (ln μ - ln μ_true)²) of a tire of friction μ."""
 
-    def __init__(self, tire, *, true, least, slope, size=1.0):
-        self._grip = grip(tire.weights, tire)
+    def __init__(self, tire, *, true, least, slope, size=1.0, count=COUNT):
+        self._grip, self._count = grip(tire.weights, tire), count
         self._true, self._least, self._slope, self._size = true, least, slope, size
 
     def chi_squares(self, tire, weights, samples):
         del samples
         away = [np.log(grip(w, tire) / self._grip / self._true) for w in weights]
         means = [self._size * (self._least + self._slope * a**2) for a in away]
-        return [ChiSquare(COUNT * mean, COUNT, np.zeros(2)) for mean in means]
+        return [ChiSquare(self._count * mean, self._count, np.zeros(2)) for mean in means]
 
 
 def grip(weights, tire):
@@ -130,6 +130,21 @@ def test_the_road_before_comes_back_where_it_explains_enough_more(tire, size):
     assert change.tire is tire
     assert change.road == Road(tire, changed_at=10.0)
     assert change.before - change.after == pytest.approx(17.0 * size)
+
+
+def test_the_road_before_does_not_come_back_where_chi_square_is_at_its_baseline(tire):
+    wet = at_friction(tire, 0.5)
+    judge = Formula(tire, true=1.0, least=0.1, slope=10.0, count=40.0)  # mean in use 4.9
+    assert look(Road(wet, before=tire), wet, judge, baseline=2.0).verdict is Verdict.RECOVERY
+    assert look(Road(wet, before=tire), wet, judge, baseline=5.0) is None
+
+
+def test_the_first_base_is_remembered_and_only_where_friction_was_lost(tire):
+    first, second, third = (tire._replace(weights=share * tire.weights) for share in (1, 0.9, 0.8))
+    assert Road(first).on(second) == Road(second)  # nothing was lost
+    lost = Road(first, ratio=0.5, changed_at=3.0).on(second)
+    assert lost == Road(second, before=first, changed_at=3.0)
+    assert lost._replace(ratio=0.7).on(third).before is first  # lost twice: the first road
 
 
 def test_a_drop_is_sought_down_to_ice_and_in_the_last_moments_alone(tire):

@@ -50,7 +50,7 @@ def test_from_nothing_the_learnt_tire_takes_over_and_is_better(car, dry):
     assert judge.chi_square(supervisor.target, late).total < judge.chi_square(begun, late).total
 
 
-def test_a_friction_that_comes_back_is_regained_up_to_what_was_learnt(car, learnt, tire):
+def test_a_friction_that_comes_back_is_regained_up_to_what_was_learnt(car, learnt):
     """Begun on the low friction that was found, on a road that is dry again."""
     steer = RandomSteer(
         amplitude=0.05, frequency=0.5, seed=5, onset=0.2, rate_limit=1.0, duration=8.0
@@ -171,14 +171,15 @@ def test_a_learnt_tire_is_taken_by_evidence_in_parts_of_the_baseline(
     assert taken or reason in supervisor.last.reason
 
 
-def test_another_structure_and_an_unproven_law_are_refused_at_the_start(car, learnt):
+def test_another_structure_and_an_unproven_law_are_refused_at_the_start(car):
     with pytest.raises(ValueError, match="begin with a tire of the identifier"):
         supervisor_of(car, in_use=prediction_tire(car))
     design = make_method("integral", car)
     wild = replace(design, gains=replace(design.gains, eta_W=100.0 * design.gains.eta_W))
-    identifier = OnlineIdentifier(wild, car, 0.01)
+    good, unproven = (OnlineIdentifier(one, car, 0.01) for one in (design, wild))
+    assert Supervisor(good, prediction_tire(good.model())).decisions == []
     with pytest.raises(ValueError, match="certificate fails"):
-        Supervisor(identifier, prediction_tire(identifier.model()))
+        Supervisor(unproven, prediction_tire(unproven.model()))
 
 
 def test_a_fault_takes_back_what_was_handed_over_just_before_and_teaches_nothing(

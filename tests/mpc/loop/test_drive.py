@@ -82,7 +82,7 @@ def test_a_gentle_path_is_followed_to_its_end(noisy, bump):
     assert len(noisy) == pytest.approx(bump.length / 12.0 / 0.01, rel=0.02)
 
 
-def test_the_tracker_sees_what_is_measured_and_not_the_truth(bump):
+def test_the_tracker_sees_what_is_measured_and_not_the_truth():
     biased = CarSensors(Y=Sensor(bias=0.3), r=Sensor(resolution=0.5))
     tracker = Fixed()
     run = drive(STRAIGHT, car(), tracker, speed=15.0, sensors=biased, rng=seeded())
@@ -92,7 +92,7 @@ def test_the_tracker_sees_what_is_measured_and_not_the_truth(bump):
 
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
-def test_a_command_acts_as_many_periods_later_as_is_said(ring, delay):
+def test_a_command_acts_as_many_periods_later_as_is_said(delay):
     run = drive(STRAIGHT, car(), Fixed(0.01, start=5), speed=15.0, delay=delay, rng=seeded())
     assert run.command[5] == 0.01
     assert run.command[4] == 0.0

@@ -28,17 +28,11 @@ def fields_of(path, **changes):
     return {"name": "planted", "closed": path.closed, **arrays, **changes}
 
 
-def test_the_parameter_is_arc_length_everywhere(path, rng):
-    s, h = rng.uniform(0.01, path.length - 0.01, 5000), 1e-4
-    X_0, Y_0, _ = path.pose(s - h)
-    X_1, Y_1, _ = path.pose(s + h)
-    assert np.abs(np.hypot(X_1 - X_0, Y_1 - Y_0) / (2 * h) - 1.0).max() < 1e-6
-
-
-def test_heading_is_the_direction_of_the_line_and_curvature_its_rate(path, rng):
+def test_over_arc_length_heading_is_the_direction_and_curvature_its_rate(path, rng):
     s, h = rng.uniform(0.01, path.length - 0.01, 5000), 1e-4
     X_0, Y_0, psi_0 = path.pose(s - h)
     X_1, Y_1, psi_1 = path.pose(s + h)
+    assert np.abs(np.hypot(X_1 - X_0, Y_1 - Y_0) / (2 * h) - 1.0).max() < 1e-6
     direction = np.arctan2(Y_1 - Y_0, X_1 - X_0)
     off = np.abs(np.angle(np.exp(1j * (direction - path.pose(s)[2]))))
     assert off.max() < 2e-5

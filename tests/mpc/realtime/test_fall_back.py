@@ -34,11 +34,10 @@ def gains_at(found, v_x):
 
 def closed_loop(gains, v_x, delay, vehicle=CAR):
     """The linear car with its commands on the way, each whole periods old, under the gains."""
-    A, B = motion(vehicle, v_x, 1.0)
+    A, _ = motion(vehicle, v_x, 1.0)
     M = np.zeros((5, 5))
     M[:4, :4], M[:4, 4:] = A[:4, :4], A[:4, 4:]
     held = expm(PERIOD * M)
-    del B
     loop = np.zeros((4 + delay, 4 + delay))
     loop[:4, :4], loop[:4, 3 + delay] = held[:4, :4], held[:4, 4]
     loop[4, :4], loop[4, 3 + delay] = -gains[:4], -gains[4]

@@ -8,9 +8,9 @@ from mpc.realtime import Measurement, Status, Tracker
 PERIOD = 0.05
 
 
-def driven(tire, problem, *, prepared, steps=12, seed=0, kick=0.0, hidden=0.0):
+def driven(tire, problem, *, prepared, steps=12, kick=0.0, hidden=0.0):
     """Commands of a drive along the tracker's own plans, with a kick to each measurement."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     tracker = Tracker(tire, problem, period=PERIOD)
     one = np.ones(problem.horizon + 1)
     kappa, v_x = 0.01 * one, 20.0 * one

@@ -45,15 +45,10 @@ def test_a_model_may_be_driven_in_another_car(car):
     np.testing.assert_array_equal(prediction_tire(car, heavy).car, model.car)
 
 
-@pytest.mark.parametrize("kind", [DugoffTire, FialaTire, MagicFormula])
-def test_a_mounted_tire_is_that_of_the_static_load(car, forces, kind):
+def test_a_mounted_tire_is_that_of_the_static_load(car, forces):
     tire, alpha = MagicFormula.from_tir(car.chassis.tire), np.linspace(0.01, 0.4, 20)
-    if kind is not MagicFormula:
-        tire = kind(C_alpha=6.0e4, C_kappa=8.0e4, friction=0.9)
-    worst = 0.005 if kind is MagicFormula else 0.013
-    require_forces(
-        at_slip(forces, prediction_tire(tire, car), alpha), car, tire, tire, alpha, worst
-    )
+    force = at_slip(forces, prediction_tire(tire, car), alpha)
+    require_forces(force, car, tire, tire, alpha, 0.005)
 
 
 def require_forces(force, car, front, rear, alpha, worst):

@@ -5,21 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identifier.paper.network import Network, NetworkModel, Weights
+from identifier.paper.network import Network
 from mpc.tires import prediction_tire
-
-
-def model_of(car, network, rng):
-    n_in = len(network.inputs)
-    return NetworkModel(
-        vehicle=car,
-        network=network,
-        weights=Weights(
-            W=rng.normal(0.0, 1.0, (2, network.hidden)), V=rng.normal(0, 1, (network.hidden, n_in))
-        ),
-        force_unit=1500.0,
-        min_speed=1.0,
-    )
+from tests.identifier.conftest import network_model
 
 
 @pytest.mark.parametrize(
@@ -31,14 +19,14 @@ def model_of(car, network, rng):
     ],
 )
 def test_forces_are_those_of_the_frozen_model(network, car, motions, forces, at, rng):
-    model = model_of(car, network, rng)
+    model = network_model(car, network, rng)
     predicted, _ = forces(prediction_tire(model), *at(motions))
     expected = model.predict(motions)
     np.testing.assert_allclose(predicted, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
 def test_scale_unit_and_stiffness_are_weights(car, rng):
-    model = model_of(car, Network(), rng)
+    model = network_model(car, Network(), rng)
     others = (
         replace(model, force_unit=1.0),
         replace(model, network=replace(model.network, scale=(2.0, 1.0, 1.0, 1.0))),
