@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array
-from models.logs.foreign import apart, need
+from models.apart import apart
+from models.logs.foreign import need
 from models.logs.grouped import require_room
-from models.logs.log import few
+from models.logs.log import RecordingError, few
 from models.logs.tree import Leaf, Tree, Unread
 from models.schema import swells
 
@@ -26,7 +27,7 @@ _INTERNAL = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
 
 def read_tree(path: Path) -> dict[str, Tree]:
     """Return the variables of a file; numbers are read when they are asked for."""
-    return apart(path, 0.0, _read_tree, path)
+    return apart(RecordingError, path, 0.0, _read_tree, path)
 
 
 def _read_tree(path: Path) -> dict[str, Tree]:
@@ -135,7 +136,9 @@ class _Reader:
 def _load(path: Path, name: str, shape: tuple[int, int], turned: bool) -> Array:
     """Read a dataset, (rows, columns)."""
     require_room(path, max(shape), 8 * min(shape))  # an array may be larger than its file
-    values = np.asarray(apart(path, 8.0 * math.prod(shape), _numbers, path, name), np.float64)
+    values = np.asarray(
+        apart(RecordingError, path, 8.0 * math.prod(shape), _numbers, path, name), np.float64
+    )
     return values.T.reshape(shape) if turned else values.reshape(shape)
 
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from codegen.escape import displayed
+from models.apart import apart, each
 from models.logs.arrow import doubles, whole_numbers, words
-from models.logs.foreign import apart, need, one_line
+from models.logs.foreign import need, one_line
 from models.logs.log import RecordingError, dense, few, require_small
 from models.logs.spelling import unit_in_name
 from models.logs.stamps import MISSING, nanoseconds
@@ -27,7 +28,7 @@ def open_parquet(path: Path) -> TableLog:
     need(path, "pyarrow", "Parquet", "parquet")
     require_file(path, RecordingError, limit="megabytes")
     with one_line(path, _WHAT):
-        return TableLog(table=apart(path, 0.0, _table, path))
+        return TableLog(table=apart(RecordingError, path, 0.0, _table, path))
 
 
 def _table(path: Path) -> "_ParquetTable":
@@ -72,7 +73,7 @@ class _ParquetTable:
     @cached_property
     def _head(self) -> dict[int, list[str]]:
         with one_line(self.path, _WHAT):
-            return apart(self.path, 0.0, _ParquetTable._read_head, self)
+            return apart(RecordingError, self.path, 0.0, _ParquetTable._read_head, self)
 
     def _read_head(self) -> dict[int, list[str]]:
         """Return the first rows of the columns that may be read, which all are looked at."""
@@ -94,11 +95,6 @@ class _ParquetTable:
         kinds : column from 0 -> how its cells are read.
         run : a column and the word that it must have; other rows are left out.
         """
-        with one_line(self.path, _WHAT):
-            size = 8.0 * self.rows * len(kinds)
-            return apart(self.path, size, _ParquetTable._cells, self, kinds, run)
-
-    def _cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None) -> Cells:
         gathered = Gathered(self.path, kinds, self.columns.names, "row", run)
         wanted = gathered.kinds
         for column, kind in wanted.items():
@@ -110,15 +106,22 @@ class _ParquetTable:
         if self.rows == 0:
             raise RecordingError(f"{self.path}: has columns but no row of data")
         require_small(self.path, self.rows * len(wanted))
-        order = list(wanted)
-        for batch in self._batches(order, _BATCH):
-            rows = np.arange(1, len(batch[0]) + 1) + len(gathered)
-            columns = {
-                column: self._column(column, wanted[column], cells, rows)
-                for column, cells in zip(order, batch, strict=True)
-            }
-            gathered.extend(rows, columns)
+        size = 8.0 * self.rows * len(wanted)
+        with one_line(self.path, _WHAT):
+            for block in each(RecordingError, self.path, size, _ParquetTable._read, self, wanted):
+                gathered.extend(*block)
         return gathered.finished()
+
+    def _read(self, wanted: Mapping[int, Kind]) -> Iterator[tuple[Any, dict[int, Any]]]:
+        seen = 0
+        for batch in self._batches(list(wanted), _BATCH):
+            rows = np.arange(1, len(batch[0]) + 1) + seen
+            seen += rows.size
+            columns = {
+                column: self._column(column, kind, cells, rows)
+                for (column, kind), cells in zip(wanted.items(), batch, strict=True)
+            }
+            yield rows, columns
 
     def _batches(self, columns: Sequence[int], size: int) -> Iterator[list[Any]]:
         """Yield the cells of columns, some rows at a time; names may repeat, places do not."""

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.logs import foreign
+from models import apart
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.schema import _SWELLS
@@ -25,7 +25,6 @@ ROOM = 700_000_000  # bytes beyond what the readers themselves take
 READER = f"""
 import resource, sys
 import h5py, pyarrow.parquet, numpy
-from models.logs import foreign
 from models.logs.door import open_log
 taken = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
 resource.setrlimit(resource.RLIMIT_AS, (taken + {ROOM}, resource.RLIM_INFINITY))
@@ -184,7 +183,7 @@ def test_what_a_file_unpacks_to_is_told_by_it_and_judged_first(
     written, words, tmp_path, monkeypatch
 ):
     path = written(tmp_path / "log")
-    monkeypatch.setattr("models.logs.foreign.resource", None)  # no process apart: it is not patched
+    monkeypatch.setattr("models.apart.resource", None)  # no process apart: it is not patched
     monkeypatch.setattr("models.schema._SWOLLEN_FROM", 10_000_000)
     with contextlib.suppress(RecordingError):  # such as that nothing rises
         open_log(path).listed()
@@ -213,35 +212,37 @@ def test_an_hdf5_file_with_a_changed_byte_is_read_or_refused_in_one_line(tmp_pat
         path.write_bytes(raw[:place] + bytes([raw[place] ^ 0xFF]) + raw[place + 1 :])
         with contextlib.suppress(RecordingError):
             open_log(path).listed()
-    assert foreign.apart(path, 0.0, len, "again") == 5
+    assert apart.apart(RecordingError, path, 0.0, len, "again") == 5
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
         ((bytes, 10**10), "takes more than .* GB of memory"),
-        ((os.abort,), "crashes its library"),
+        ((os.abort,), "crashes"),
         ((pow, 7, 10**9), "takes more than 0 s"),
     ],
 )
 def test_a_library_that_takes_too_much_or_crashes_is_stopped(call, words, tmp_path, monkeypatch):
-    monkeypatch.setattr(foreign, "_LEAST_SECONDS", 0.0)
+    monkeypatch.setattr(apart, "_LEAST_SECONDS", 0.0)
     path = tmp_path / "log"
     path.write_bytes(b"x")
     with pytest.raises(RecordingError, match=f"log: is damaged, reading it {words}.*; save it"):
-        foreign.apart(path, 0.0, *call)
-    assert foreign.apart(path, 0.0, len, "again") == 5
+        apart.apart(RecordingError, path, 0.0, *call)
+    assert apart.apart(RecordingError, path, 0.0, len, "again") == 5
 
 
 KILLED = """
 import os, threading
 from pathlib import Path
-from models.logs import foreign
+from models import apart
 def stop():
-    print(foreign._Worker.running._process.pid, flush=True)
+    print(worker.pid, flush=True)
     os.kill(os.getpid(), 9)
+worker = apart._started()
+apart._started = lambda: worker
 threading.Timer(0.7, stop).start()
-foreign.apart(Path("."), 0.0, pow, 7, 10**9)
+apart.apart(ValueError, Path("."), 0.0, pow, 7, 10**9)
 """
 
 
