@@ -5,6 +5,7 @@ references. Links to other files and arrays that lie in them are not followed.
 """
 
 import math
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from codegen.arrays import Array
-from models.apart import apart
+from models.apart import apart, each
 from models.logs.foreign import need
 from models.logs.grouped import require_room
 from models.logs.log import RecordingError, few
@@ -21,6 +22,8 @@ from models.schema import swells
 
 _LONGEST_TEXT = 1_000_000  # bytes of all texts of a dataset
 _MOST_TEXTS = 10_000  # of a dataset
+
+_AT_ONCE = 1 << 17  # numbers that are handed over at a time
 
 _INTERNAL = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
 
@@ -136,15 +139,25 @@ class _Reader:
 def _load(path: Path, name: str, shape: tuple[int, int], turned: bool) -> Array:
     """Read a dataset, (rows, columns)."""
     require_room(path, max(shape), 8 * min(shape))  # an array may be larger than its file
-    values = np.asarray(
-        apart(RecordingError, path, 8.0 * math.prod(shape), _numbers, path, name), np.float64
-    )
-    return values.T.reshape(shape) if turned else values.reshape(shape)
+    values, at = np.empty(shape[::-1] if turned else shape), 0
+    along = values if values.shape[0] >= values.shape[1] else values.T
+    for piece in each(RecordingError, path, values.nbytes, _pieces, path, name):
+        end = at + piece.size // max(along.shape[1], 1)
+        part = along[at:end] if along is values else along[at:end].T
+        part[...] = piece.reshape(part.shape)
+        at = end
+    return values.T if turned else values
 
 
-def _numbers(path: Path, name: str) -> Any:
+def _pieces(path: Path, name: str) -> Iterator[Any]:
+    """Yield the numbers of a dataset along its longest axis, in whole chunks."""
     with need(path, "h5py", "MATLAB 7.3 or HDF5", "mat").File(path, "r") as file:
-        return np.asarray(file[name][()])
+        node = file[name]
+        axis = int(np.argmax(node.shape)) if node.shape else 0
+        size, chunk = (*node.shape, 1)[axis], (node.chunks or (1, 1))[axis]
+        step = max(1, _AT_ONCE * size // max(node.size, 1) // chunk) * chunk
+        for k in range(0, size, step):
+            yield node[(slice(None),) * axis + (slice(k, k + step),)] if node.shape else node[()]
 
 
 def _chunk(node: Any) -> int:
