@@ -10,7 +10,6 @@ Assumed away: pitch, steer by the suspension, aligning moments of the tires, spi
 (longitudinal slip follows from the wanted force at once), rolling and air resistance.
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
