@@ -114,6 +114,23 @@ def test_where_the_drive_does_not_tell_how_a_heading_counts_it_is_asked_for():
     assert abs(motion_of(straight, declared=True).r.values).max() < 0.05
 
 
+@pytest.mark.parametrize("turned", [0.0, 0.05, -0.08])
+def test_how_the_frame_of_a_pose_is_turned_is_taken_off(turned):
+    psi = noisy(PSI + turned, np.radians(0.3), 4)
+    motion = motion_of(posed(noisy(X, 1e-3, 5), noisy(Y, 1e-3, 6), psi))
+    assert np.mean((motion.v_y.values - V_Y) / V_X) == pytest.approx(0.0, abs=3e-3)
+    assert ("deg off the travel" in motion.said) == (turned != 0.0)
+
+
+def test_a_drive_to_one_side_does_not_tell_how_the_frame_is_turned():
+    r = np.abs(R)
+    psi, v_y = integral(r), 0.08 * r - 0.05 * V_X * r
+    x = integral(V_X * np.cos(psi) - v_y * np.sin(psi))
+    y = integral(V_X * np.sin(psi) + v_y * np.cos(psi))
+    found = motion_of(posed(x, y, psi + 0.05))
+    assert np.mean((found.v_y.values - v_y) / V_X) == pytest.approx(-0.05, abs=3e-3)
+
+
 def test_a_car_that_reverses_for_a_while_keeps_its_heading():
     back = np.where((T > 8.0) & (T < 14.0), -1.0, 1.0) * V_X
     x, y = integral(back * np.cos(PSI)), integral(back * np.sin(PSI))
