@@ -292,8 +292,9 @@ def _no_tire(evaluated: _Evaluated) -> Iterator[Objection]:
         if not least <= each <= most:
             soft = "play of the steering, " if axle == "front" and each < least else ""
             text = (
-                f"the force at {np.degrees(_SECANT):.2g} deg of slip is {each:.2g} static loads per "
-                f"rad of it, tires have {least:g} to {most:g}: check {soft}signs, units and the vehicle file"
+                f"the force at {np.degrees(_SECANT):.2g} deg of slip is {each:.2g} static loads "
+                f"per rad, tires have {least:g} to {most:g}: check {soft}signs, units and the "
+                "vehicle file"
             )
             yield Objection("no_tire", axle, text, True)
 

@@ -245,8 +245,8 @@ def _heading(
             in_unit = signals["heading"].unit or ("rad" if alike[:2].any() else "deg")
             raise RecordingError(
                 f"{label}: the drive does not tell whether the heading counts to the left or "
-                f'clockwise: declare it by --columns "x={x}" "y={y}" "heading={angle} [{in_unit}]", '
-                "with *-1 behind the unit if clockwise"
+                f'clockwise: declare it by --columns "x={x}" "y={y}" '
+                f'"heading={angle} [{in_unit}]", with *-1 behind the unit if clockwise'
             )
         best = 0
     (sign, unit), away = ways[best], float(np.angle(axes[best])) / 2.0
