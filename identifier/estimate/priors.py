@@ -79,9 +79,9 @@ OF_CAR: dict[str, _Belief] = {
     "v_y_angle": _Belief(0.0, 0.007, -INF, INF, ""),  # mounted to 0.4 degrees
     "v_y_lever": _Belief(0.0, 0.015, -INF, INF, "L"),  # place measured to 4 cm
 }
-# Standard deviations of a 1:10 car. That of the angle was chosen on 9 such random cars whose v_y was
-# turned by 1.7 degrees and 15 mm off: all valid, the angle found to 0.15 degrees, with that above 8
-# of 9 and 0.55; as good where it was not.
+# Standard deviations of a 1:10 car. That of the angle was chosen on 9 such random cars whose v_y
+# was turned by 1.7 degrees and 15 mm off: all valid, the angle found to 0.15 degrees, with that
+# above 8 of 9 and 0.55; as good where it was not.
 OF_SMALL = {
     "v_y_angle": 0.03,  # the frame of a tracker is aligned by eye
     "steering_play": _PLAY_SD,

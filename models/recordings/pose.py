@@ -144,27 +144,16 @@ def _motion_of(
             f"{label}: the pose must have at least {_FEWEST_SAMPLES} samples without a gap, "
             f"it has {t.size}"
         )
-    angles, unit, turned = _heading(label, pieces, signals, declared)
-    angle = np.concatenate(angles)
-    dx, dy = np.concatenate([piece.rates for piece in pieces]).T
-    each = zip(angles, pieces, strict=True)
-    rates = [np.gradient(one, piece.step, edge_order=2) for one, piece in each]
+    body, r, unit, turned = _in_axes(label, pieces, signals, declared)
     rows = np.concatenate([piece.rows for piece in pieces])
     clock = np.concatenate([piece.t for piece in pieces])
-    v_x, v_y, r = (
-        Raw(clock, one, x.place, rows)
-        for one in (
-            dx * np.cos(angle) + dy * np.sin(angle),
-            -dx * np.sin(angle) + dy * np.cos(angle),
-            np.concatenate(rates),
-        )
-    )
+    v_x, v_y, turns = (Raw(clock, one, x.place, rows) for one in (body.real, body.imag, r))
     place, heading = np.median([piece.noise for piece in pieces], axis=0)
     said = (
         f"{turned}; its position scatters by {place:.2g} m, its heading by "
         f"{math.degrees(unit * heading):.2g} deg"
     )
-    return _Motion(v_x, v_y, r, said)
+    return _Motion(v_x, v_y, turns, said)
 
 
 class _Piece(NamedTuple):
@@ -216,11 +205,12 @@ def _smoothed(z: Array) -> tuple[Array, float]:
     return values, noise
 
 
-def _heading(
+def _in_axes(
     label: str, pieces: Sequence[_Piece], signals: Mapping[str, Signal], declared: bool
-) -> tuple[list[Array], float, str]:
-    """Return the headings, counted from x to y in rad, the unit that they had [rad], and in words
-    what was done to them: the sense and unit that leave the least velocity across the car.
+) -> tuple[NDArray[np.complex128], Array, float, str]:
+    """Return v_x + i v_y [m/s] and r [rad/s], the unit of the heading [rad], and how it was read.
+
+    The sense and unit count that leave the least velocity across the car.
     declared : whether somebody said how it counts, which holds where the drive does not tell.
     """
     v = np.concatenate([piece.rates @ np.array([1.0, 1j]) for piece in pieces])
@@ -254,18 +244,22 @@ def _heading(
     whole = _TURN * round(away / _TURN)
     shift = whole if abs(away - whole) < _ALONG else away
     body = turned[best] * np.exp(-1j * shift)
-    r = sign * unit * np.concatenate([np.gradient(p.heading, p.step) for p in pieces])
+    r = (
+        sign
+        * unit
+        * np.concatenate([np.gradient(one.heading, one.step, edge_order=2) for one in pieces])
+    )
     each = slice(None, None, max(1, round(_APART / pieces[0].step)))
     terms = np.column_stack([body.real, r, r * body.real**2])[each]  # turned, ahead and slip
     found = least_squares(terms, body.imag[each])
-    aside = abs(r.sum()) / np.abs(r).sum()  # 1 where it turns to one side, as slip then does
-    if aside < _BOTH and abs(found.theta[0]) > max(_SURELY * found.error[0], _TURNED):
+    both = abs(r.sum()) < _BOTH * np.abs(r).sum()  # else slip is to one side, too
+    if both and abs(found.theta[0]) > max(_SURELY * found.error[0], _TURNED):
         shift += float(found.theta[0])
     said = ["its heading is clockwise"] if sign < 0 else []
     said += ["its heading is in degrees"] if unit != 1.0 else []
     said += [f"its heading lies {math.degrees(shift):.3g} deg off the travel"] if shift else []
     words = f" ({', '.join(said)})" if said else ""
-    return [sign * unit * piece.heading + shift for piece in pieces], unit, words
+    return turned[best] * np.exp(-1j * shift), r, unit, words
 
 
 def _lateness(gyro: Raw, pose: Raw) -> float | None:
