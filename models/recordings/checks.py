@@ -44,6 +44,8 @@ _LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart wi
 _LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars; in kN 0.3 at most
 _LARGEST_SLIP = 0.7  # [rad], 40 degrees in the median window: nobody drives a whole run like that
 
+_PLACED = 0.03  # [m] to which the place of a v_y is known: more slip than that tells a sign
+
 _DOCTOR = "tireid doctor LOG --vehicle FILE looks for other faults, and repairs them"
 
 
@@ -472,7 +474,7 @@ def _check_rear_rises(alpha: Array, w: Means, l_r: float, other: str) -> str | N
     Where an accelerometer has the slope 1 on v̇_y the sign of v_y is right, and the car is wrong.
     """
     falls = _falls(alpha, w.acceleration)
-    if falls is None:
+    if falls is None or np.mean(alpha**2) < np.mean((_PLACED * w.r / w.v_x) ** 2):
         return None
     car = f"name the right vehicle; this file declares l_r = {l_r:g} m"
     place = "move vy to the center of gravity"
