@@ -8,7 +8,7 @@ import pytest
 
 from identifier.doctor.samples import CERTAIN, _is_late, sample_findings
 from models.recordings import Recording
-from models.recordings.samples import alike_by_rounding
+
 
 DT = 0.01
 T = np.arange(3000) * DT
