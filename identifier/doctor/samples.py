@@ -26,7 +26,7 @@ _REPEATED = 0.01  # of a noisy channel: share of repeated samples
 _FEW = 5  # of a noisy channel: how often it repeats
 _CAUGHT_UP = 0.025  # of a rounded channel: share of samples after which it catches up
 _ALIKE_DELAYS = math.log(1.6)  # of the times by which samples of two channels are late
-_COARSE = 0.05  # quantum over the rms of a channel
+_COARSE = 0.2  # steps over the standard deviation of a channel, from which models get worse
 CERTAIN = 0.99  # confidence in what samples show by themselves
 
 LATERAL = ("v_y", "r", "delta_f", "a_y")
@@ -89,7 +89,8 @@ def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:
             continue
         value = f"{float(getattr(there[0], name)[0]):g} {UNITS[name]}"
         text = (
-            f"{name} is {value} throughout while the car moves: no sensor, or it was not connected"
+            f"{name} is {value} throughout while the car moves: no sensor, not connected, or too "
+            "few digits"
             if len(there) == len(pieces)
             else _stopped(name, float(there[0].t[0]), there[0].duration)
         )
@@ -125,13 +126,14 @@ def _copies(moving: Mapping[str, Array]) -> Iterator[Finding]:
 def _channel(name: str, recording: Recording, jumps: bool) -> Iterator[Finding]:
     signal, dt = getattr(recording, name), recording.dt
     noise, step, runs = facts.noise(signal), facts.resolution(signal), facts.Runs.of(signal)
-    if step > _COARSE * float(np.std(signal)):
+    share = step / max(float(np.std(signal)), 1e-300)
+    if name in LATERAL and share > _COARSE:
         text = (
-            f"{name} comes in steps of {step:.3g} {UNITS[name]}: a coarse sensor, or too few "
-            "digits were written"
+            f"{name} comes in steps of {step:.3g} {UNITS[name]}, {share:.2g} of its standard "
+            "deviation: write more digits, or the tires are less exact"
         )
         coarse = _found("quantized", name, step, CERTAIN, text)
-        yield replace(coarse, unit=UNITS[name])
+        yield replace(coarse, unit=UNITS[name], note=True)
     lost = facts.dropouts(signal, noise)
     if lost.size:
         text = (

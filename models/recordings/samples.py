@@ -23,13 +23,14 @@ _SPARSE = 40  # steps, by which values of a rounded signal differ at least
 _SAMPLED = 200  # differences of values that tell most steps wrong
 _ON_GRID_REPEATED = 0.9  # the same of values that repeat
 FAR = 1.5  # steps of a rounded signal that rounding alone does not make
-_ROUNDING = 0.3  # variance in steps² that rounding may add where a signal moves: 1/12 of white noise
+_ROUNDING = 0.3  # steps², variance that rounding may add where a signal moves; 1/12 if white
 _ROUNDED_JUMP = 0.5  # of a step, in which rounding lets both sides of an instant disagree
 _FEW = 5  # steps that tell the rounding of values that repeat
 _GOES_ON = 0.6  # of a step after a rest, that the next but one has where a signal begins to move
 _SPIKE = 12.0  # times the noise beyond its neighbors
 _OUTLIER = 16.0  # times the variance that is expected of a difference, and not more
 _BLOCK = 5  # samples in a row that were logged before, of all signals
+_ALIKE = 2  # samples at its ends that rounding may make alike
 _SIDE = 12  # samples on each side of a jump
 _JUMP = 5.5  # of the usual disagreement of both sides of a jump, in two signals
 _ALSO = 2.5  # of the same disagreement, in a third signal
@@ -163,7 +164,7 @@ class Runs(NamedTuple):
         far &= ~((now * later > _GOES_ON * now**2) & (step > 0.0))
         may: NDArray[np.bool_] = (self.length > 1) & far[self.first + self.length - 1]
         before = np.abs(change[:-3][far[1:]])
-        one, two = (np.count_nonzero(np.abs(before - k * step) < 0.05 * step) for k in (1, 2))
+        one, two = (float(np.sum(np.abs(before - k * step) < 0.05 * step)) for k in (1, 2))
         return may, 0.5 * one * (one / max(two, 0.5)) ** (1.0 / 3.0)
 
 
@@ -263,7 +264,7 @@ def logged_again(signals: Mapping[str, Array]) -> tuple[int, int] | None:
     lags, count = np.unique(back[back > _BLOCK], return_counts=True)
     for lag in lags[count >= np.maximum(_BLOCK, 0.5 * lags)]:
         runs = Runs.of((code[lag:] != code[:-lag]).astype(np.float64))
-        for first in runs.first[runs.length == lag]:
+        for first in runs.first[(runs.length >= lag) & (runs.length <= lag + _ALIKE)]:
             block = table[first : first + lag]
             if code[first] == code[first + lag] and np.all(np.ptp(block, axis=0) > 0.0):
                 return int(first + lag), int(lag)
