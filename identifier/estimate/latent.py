@@ -41,6 +41,7 @@ _SMALL_DELAY = 0.003  # [s] of a sedan, a delay that does not matter
 _LOOKS = 4  # at a delay
 _LEFT_LATE = 0.01  # [s] of a sedan, sd of what is left of a delay that was taken out
 _ANY_PLACE = 0.3  # [L], sd of a place of the accelerometer that is looked for
+_MOST_PLACE = 1.0  # [L], the farthest: it is in the car
 _LEFT_PLACE = 0.05  # [L], sd of what is left of a place that was found
 _SURELY = 3.0  # sd of a delay or a place, above which it is taken out; a single step tells none
 _GAINED = 8.0  # nats that a delay or a place gains, more where more is left (`Trust.usual`)
@@ -64,7 +65,6 @@ _SHORTEST = 50  # nodes from which noise is learnt
 N, P = len(STATES), len(NAMES)
 OF_V_Y = ("v_y_bias", "v_y_angle", "v_y_lever")
 FELT = {"a_y_bias": 0.015, "roll": 0.04, "a_y_delay": 0.0007, "a_y_lever": 0.01}  # sd; lever in L
-DEBUG = None
 _DELAY, _PLACE = (LATENT_NAMES.index(name) for name in ("a_y_delay", "a_y_lever"))
 AGAIN = ("steering_zero", "r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")  # of each log
 
@@ -171,18 +171,18 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, off: "Off | None" = None) -
     if not moves[inertia]:
         information[inertia, inertia], moves[inertia] = _INERTIA**-2, True
     felt = np.array(list(FELT.values())) * [1.0, 1.0, 1.0, vehicle.wheelbase]
-    mean_felt = [0.0, _ROLL, 0.0, 0.0 if off is None else off.place]
     if off is not None and (off.late > 0.0 or off.instead):
         felt[2] = (_ANY_DELAY if off.instead else _LEFT_LATE) * scale
     if off is not None and (off.place or off.instead):
         felt[3] = (_ANY_PLACE if off.instead else _LEFT_PLACE) * vehicle.wheelbase
+    place = 0.0 if off is None else off.place
     whole = np.zeros((P + len(felt),) * 2)
     whole[:P, :P] = information
     whole[range(P, len(whole)), range(P, len(whole))] = felt**-2
     far = np.full(len(felt), np.inf)
     return replace(
         beliefs,
-        mean=np.concatenate([mean, mean_felt]),
+        mean=np.concatenate([mean, [0.0, _ROLL, 0.0, place]]),
         low=np.concatenate([beliefs.low, -far]),
         high=np.concatenate([beliefs.high, far]),
         information=whole,
@@ -350,9 +350,7 @@ class _Latent:
 
     # The optimum.
 
-    def begin(
-        self, stiffer: float = 0.0, off: "Off | None" = None
-    ) -> tuple[Array, Array, float]:
+    def begin(self, stiffer: float = 0.0, off: "Off | None" = None) -> tuple[Array, Array, float]:
         """Return states whose rear axle does not slip, the parameters that are believed, and how
         firmly.
         stiffer : by which ln C of both axles is larger.
@@ -610,18 +608,16 @@ def accelerometer_off(recording: Recording, vehicle: Vehicle, priors: Priors) ->
         mean[_PLACE] = p[_PLACE] if _PLACE in wanted else 0.0
         z, p, left = problem(late, mean).descend(z, p, _NEAR, R, enough=_NEARLY)
         known = abs(late) > max(small, _SURELY * sd[_DELAY] * (late > 0.0))
-        placed = abs(mean[_PLACE]) > _SURELY * sd[_PLACE]
+        placed = _SURELY * sd[_PLACE] < abs(mean[_PLACE]) < _MOST_PLACE * L
         surely = known >= (_DELAY in wanted) and placed >= (_PLACE in wanted)
         return left if surely else np.inf, Off(late, float(mean[_PLACE]), 0.0, t, z, p)
 
     more = max(1.0, 2.0 * promised / max(on_time.nodes.counts.sum(), 1) / TRUST.usual)
-    found = sorted([explained(_DELAY), explained(_PLACE)], key=lambda one: one[0])
-    (left, best), (other, second) = found
-    if DEBUG is not None: DEBUG.append((least, more, found))
+    either = [explained(_DELAY), explained(_PLACE)]
+    (left, best), (other, second) = sorted(either, key=lambda one: one[0])
     if least - left < _GAINED * more:
         return none
     both, off = explained(_DELAY, _PLACE)
-    if DEBUG is not None: DEBUG.append((both, off))
     if left - both > _GAINED * more and off.late > 0.0:
         return off
     if other - left < _SAME * more:

@@ -133,7 +133,8 @@ def notes(reach: Reach, p: Array, covariance: Array) -> tuple[tuple[str, str], .
             )
         )
     late, place = (one or reach.a_y_instead for one in (reach.a_y_late, reach.a_y_place))
-    delay = f"a_y is {1e3 * late:.0f} ms late against the yaw rate"
+    when = "late" if late > 0.0 else "early"
+    delay = f"a_y is {1e3 * abs(late):.0f} ms {when} against the yaw rate"
     side = "behind" if place < 0.0 else "ahead of"
     arm = f"measured {abs(place):.2g} m {side} the center of gravity"
     if reach.a_y_instead:

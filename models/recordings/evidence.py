@@ -382,7 +382,8 @@ def computed_v_y(recording: Recording) -> str | None:
     of, x = min(formulas, key=lambda one: left(y, one[1]))
     beside = [x] if left(y) > _COMPUTED * needed else []
     e, missed = rest(w.mean(y), *beside), left(y, *beside)
-    moved = r, v_x * recording.delta_f, *slips[::3], v_x * slips[3]
+    moved = [*slips[::3], v_x * slips[3], behind(r, 0.2), behind(r, 0.4)]  # not r: its own noise
+    moved += [] if beside else [r, v_x * recording.delta_f]
     random = np.std(rest(e, *beside, *moved)) ** 2 > (1.0 - _AT_RANDOM) * missed**2
     exact = missed < _EXACTLY * min(needed, left(y))
     angle = min(left(v_x * y + one, v_x * r) for one in slips)
