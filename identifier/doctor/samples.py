@@ -16,6 +16,7 @@ from identifier.doctor.finding import Finding, first_of_each
 from identifier.doctor.pieces import SLOWEST, driven_pieces, usual_speed
 from models.recordings import Recording
 from models.recordings import samples as facts
+from models.recordings.evidence import computed_v_y
 from models.recordings.record import CHANNELS
 from models.recordings.repair import Repair
 
@@ -29,6 +30,7 @@ _ALIKE_DELAYS = math.log(1.6)  # of the times by which samples of two channels a
 _COARSE = 0.2  # steps over the standard deviation of a channel, from which models get worse
 CERTAIN = 0.99  # confidence in what samples show by themselves
 
+NOT_MEASURED = ("computed", "copied")  # codes of what no sensor showed
 LATERAL = ("v_y", "r", "delta_f", "a_y")
 UNITS = {"v_x": "m/s", "v_y": "m/s", "r": "rad/s", "delta_f": "rad", "delta_r": "rad",
          "a_y": "m/s^2"}  # fmt: skip
@@ -37,6 +39,8 @@ _ESTIMATED, _SWITCHED = ("v_y", "r"), 2  # channels that may be, how often they 
 
 def sample_findings(recording: Recording) -> list[Finding]:
     pieces = driven_pieces(recording)
+    if computed := _computed(pieces):
+        return [computed]
     listed = [*_missing(pieces), *(one for piece in pieces for one in _piece_findings(piece))]
     late = {one.channel: one.size for one in listed if one.code == "jitter"}
     return [
@@ -76,6 +80,14 @@ def _piece_findings(recording: Recording) -> list[Finding]:
         if name not in named:
             found += _channel(name, recording, jump is not None)
     return found
+
+
+def _computed(pieces: tuple[Recording, ...]) -> Finding | None:
+    """Return a v_y that follows a formula in most pieces, with which nothing else can be told."""
+    told = [one for one in map(computed_v_y, pieces) if one is not None]
+    if 2 * len(told) <= len(pieces):
+        return None
+    return _found("computed", "v_y", math.nan, CERTAIN, told[0])
 
 
 def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:

@@ -16,7 +16,7 @@ from identifier.day import ENOUGH as ENOUGH_DRIVEN
 from identifier.estimate.day import days_apart
 from identifier.estimate.drive import FASTEST, Drive, hardest
 from identifier.estimate.information import CHANGES, Information
-from identifier.estimate.latent import Learnt, lateness, latent_priors, learn_latent
+from identifier.estimate.latent import Learnt, accelerometer_off, latent_priors, learn_latent
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes, TooShortError
 from identifier.estimate.posterior import Posterior, Reach, Segment
@@ -144,21 +144,21 @@ def fit(
     beliefs = before if found is None else _after(before, found)
     for blind in (one for one in recordings if one.logged_v_y is None):
         try:
-            late = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
+            off = accelerometer_off(blind, vehicle, latent_priors(vehicle, beliefs))
             nodes = Nodes.of(
                 blind,
                 vehicle,
                 hardest(blind, _BLIND),
-                a_y_late=max(late.seconds, 0.0),
+                a_y_late=max(off.late, 0.0),
                 ln_sway=float(beliefs.mean[INDEX["ln_sway"]]),
             )
         except TooShortError:
             if len(recordings) == 1:
                 raise
             continue
-        reach = reach.with_(Reach(a_y_late=late.seconds))
+        reach = reach.with_(Reach(a_y_late=off.late, a_y_place=off.place, a_y_instead=off.instead))
         if nodes.counts.any():
-            learnt = learn_latent(nodes, vehicle, beliefs, late)
+            learnt = learn_latent(nodes, vehicle, beliefs, off)
             found, reach = learnt.posterior, reach.with_(_reach_of_states(learnt))
             beliefs = _after(beliefs, found)
         went_on(blind.duration)

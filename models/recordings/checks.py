@@ -19,6 +19,7 @@ from models.recordings.evidence import (
     Means,
     Pair,
     Steering,
+    computed_v_y,
     correlation,
     course_rate,
     least_squares,
@@ -57,6 +58,7 @@ def check_physics(recording: Recording) -> None:
 def _refuse(recording: Recording, contradiction: str | None) -> None:
     """Raise what contradicts, and say who finds out why."""
     if contradiction is not None:
+        contradiction = ("vy" in contradiction and computed_v_y(recording)) or contradiction
         raise RecordingError(f"{recording.name}: {contradiction}; {_DOCTOR}")
 
 

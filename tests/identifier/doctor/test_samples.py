@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from identifier.doctor.samples import CERTAIN, _is_late, sample_findings
 from models.recordings import Recording
+from models.recordings.evidence import computed_v_y
 from models.recordings.samples import Runs, resolution
 
 DT = 0.01
@@ -232,3 +234,44 @@ def test_samples_are_late_where_those_of_r_and_another_channel_are_alike():
         assert not _is_late("r", {"r": 0.05, "delta_f": size}, DT)
     assert not _is_late("v_y", {"v_y": 0.05, "a_y": 0.05}, DT), "without r"
     assert not _is_late("r", {"r": 0.006, "delta_f": 0.006}, DT), "within a sample"
+
+
+def cornering(v_y=None):
+    """A car of 3 m from axle to axle whose rear tires have 14 loads per rad, and its v_y or one."""
+    rng = np.random.default_rng(8)
+    r, v_x = swing(rng, 0.2), 18.0 + 4.0 * np.sin(0.3 * T)
+    slip, times = np.zeros(T.size), v_x / (9.81 * 14.0)
+    for k in range(1, T.size):
+        late = times[k] * v_x[k] * r[k] - slip[k - 1]
+        slip[k] = slip[k - 1] + DT / (times[k] + DT) * late
+    true, delta_f = 1.5 * r - slip, 3.0 * r / v_x + 0.002 * v_x * r
+    log = {"v_x": v_x, "v_y": true if v_y is None else v_y(r, v_x * delta_f), "r": r}
+    log |= {"delta_f": delta_f, "a_y": v_x * r + np.gradient(true, DT)}
+    noise = NOISE | {"v_y": 0.002, "delta_f": 0.0002}
+    shown = {n: x + noise[n] * rng.standard_normal(T.size) for n, x in log.items()}
+    return Recording(name="made", t=T, delta_r=0.0 * T, **shown)
+
+
+@pytest.mark.parametrize(
+    ("v_y", "said"),
+    [
+        (lambda r, _: 0.0 * r, "held near zero"),
+        (lambda r, _: 1.5 * r, "computed from r (v_y = 1.50 r)"),
+        (lambda r, _: -0.8 * r, "computed from r (v_y = -0.80"),
+        (lambda r, _: lfilter([0.05], [1.0, -0.95], 1.5 * r), "computed from r (v_y = 1."),
+        (lambda _, steered: 0.5 * steered, "computed from vx delta_f (v_y = 0.50"),
+    ],
+)
+def test_a_v_y_that_was_computed_is_named_alone_with_what_it_follows_from(v_y, said):
+    found = only(cornering(v_y))
+    assert (found.code, found.channel, found.confidence) == ("computed", "v_y", CERTAIN)
+    assert said in found.text and "leave the column vy out of the log: ay is there" in found.text
+
+
+@pytest.mark.parametrize("times", [1.0, 1.0 / 18.0, -1.0, 3.6])
+def test_a_v_y_that_was_measured_is_none_whatever_its_unit(times):
+    log = cornering()
+    v_y = 1.5 * log.r + 0.02 * np.random.default_rng(4).standard_normal(T.size)
+    slow = replace(log, v_x=0.1 * log.v_x, v_y=v_y, a_y=None)  # no tire slips there
+    for one in (replace(log, v_y=times * log.v_y), slow):
+        assert computed_v_y(one) is None
