@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -28,6 +29,7 @@ from models.logs.spelling import unit_in_name, without_unit
 from models.logs.stamps import (
     MISSING,
     Stamps,
+    alike_clocks,
     clocks_of_channels,
     find_clock,
     given_clock,
@@ -249,7 +251,7 @@ class TableLog:
         if self.rate:
             return None
         if not self.clock_name:
-            return find_clock(self.names, self._columns.units, table.first_rows)
+            return self._rising(find_clock(self.names, self._columns.units, table.first_rows))
         name = self.clock_name
         if name not in self._places:  # it may stand with its unit in the file, or the unit be given
             bare = [one for one in self.names if without_unit(one) == without_unit(name)]
@@ -263,6 +265,24 @@ class TableLog:
                 f"{displayed(', '.join(table.first_rows(column)[:3]))}"
             )
         return given
+
+    def _rising(self, first: Clock | None) -> Clock | None:
+        """Return a clock, or the first of those with its steps that rises over the whole log."""
+        table = self.table
+        if first is None or self._run_column is not None:
+            return first
+        with suppress(RecordingError):  # of columns that cannot be read
+            others = alike_clocks(self.names, self._columns.units, table.first_rows, first)
+            if not others:
+                return first
+            found = (first, *others)
+            cells = table.cells({one.column: kind_of(one) for one in found})
+            for one in found:
+                with suppress(RecordingError):
+                    seconds("", one, cells.columns[one.column], cells.rows, table.place)
+                    said = f"; {first.name!r} does not rise throughout" * (one != first)
+                    return one._replace(words=one.words + said)
+        return first
 
     @property
     def may_be_long(self) -> bool:

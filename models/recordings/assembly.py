@@ -139,7 +139,8 @@ def recording_of(
 def _notes(log: LogFile) -> tuple[str, ...]:
     """Return what a format says of what it took or mended."""
     clock = log.clock
-    said = () if clock is None or clock.unit == "s" else (f"time is {clock.words}",)
+    plain = clock is None or (clock.unit == "s" and ";" not in clock.words)
+    said = () if plain or clock is None else (f"time is {clock.words}",)
     return (*said, *log.notes)
 
 
