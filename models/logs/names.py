@@ -21,6 +21,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.logs.axes import Triad, along_axes, triads
+from models.logs.clock import without_codes
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import BETA, COLUMNS, POSE, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import unit_in_name, without_ending
@@ -452,7 +453,8 @@ def _seen(log: LogFile, names: list[str], run: str | None) -> dict[str, Channel]
     if not names:
         return {}
     try:
-        return dict(zip(names, log.read(names, chosen), strict=True))
+        read = log.read(names, chosen)
+        return {name: without_codes(one)[0] for name, one in zip(names, read, strict=True)}
     except RecordingError:
         if len(names) == 1:
             return {}

@@ -18,6 +18,7 @@ from models.logs.clock import (
     on_one_clock,
     require_rising,
     typical_step,
+    without_codes,
     without_empty,
 )
 from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
@@ -157,7 +158,8 @@ def _channels(
     for ours, signal in signals.items():
         found[ours] = []
         for name in signal.channel:
-            logged, cut = by_name[name], log_map.holes == CUT
+            logged, codes = without_codes(by_name[name])
+            cut, coded = log_map.holes == CUT, by_name[name].values.size - logged.values.size
             channel = without_empty(logged, cut=cut)
             unit = signal.unit if is_given(signal.unit) else channel.unit
             what = f"{label}: {column_of(ours)}"
@@ -171,8 +173,8 @@ def _channels(
                 sign = by_name[signal.sign]
                 values = signed(values, channel.t, sign.t, sign.values)
             _require_of_a_car(label, ours, values, channel)
-            empty = holes(logged).size if cut else 0
-            found[ours].append(Raw(channel.t, values, channel.place, channel.rows, empty))
+            empty = coded + (holes(logged).size if cut else 0)
+            found[ours].append(Raw(channel.t, values, channel.place, channel.rows, empty, codes))
     return found
 
 
@@ -293,11 +295,14 @@ def _pieces(t: Array, longest: float) -> list[slice]:
 
 def _hole_notes(parts: Mapping[str, list[Raw]]) -> tuple[str, ...]:
     """Return what is to be said of cells without a value that were cut out."""
-    counts = {column_of(name): sum(raw.holes for raw in raws) for name, raws in parts.items()}
-    empty = {name: count for name, count in counts.items() if count}
-    if not empty:
+    given = ", ".join(
+        f"{raw.holes} of {column_of(name)}" + f" ({raw.codes} means no value)" * bool(raw.codes)
+        for name, raws in parts.items()
+        for raw in raws
+        if raw.holes
+    )
+    if not given:
         return ()
-    given = ", ".join(f"{count} of {name}" for name, count in empty.items())
     return (f"cells without a value are cut out: {given}",)
 
 

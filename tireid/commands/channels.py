@@ -11,7 +11,7 @@ import numpy as np
 
 from codegen.escape import visible
 from models.files import write_atomically
-from models.logs.clock import holes
+from models.logs.clock import holes, without_codes
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
 from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, WHEELS, Signal, given_by
@@ -63,8 +63,12 @@ def run(options: argparse.Namespace) -> int:
     signals = choice.with_wheels(signals, proposal)
     missing = choice.missing_signals(signals)
     tell("\n".join(_head(log, chosen)))
-    seen = _seen(log, listed, signals, chosen)
+    coded = {name: without_codes(one) for name, one in _seen(log, listed, signals, chosen).items()}
+    seen = {name: one for name, (one, _) in coded.items()}
     tell(_channels_text(listed, seen, signals, proposal, frozenset(sure)))
+    for name, (_, codes) in coded.items():
+        if codes:
+            tell(f"{visible(name)} is {codes} where it has no value: left out")
     empty = _holes_text(seen, signals)
     if empty:
         cut = "cut out, as given" if log_map.holes == CUT else _CUT_BY_MAP
