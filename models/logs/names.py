@@ -262,6 +262,12 @@ def _name_confidence(signal: str, name: str) -> float:
     return _VAGUE if rule.vague & set(ends) else 0.0
 
 
+def called(signal: str, headings: Sequence[Heading]) -> list[str]:
+    """Return the channels that name and unit alone let be a signal, the surest first."""
+    found = [one for one in _candidates(signal, headings) if one.confidence > HINT]
+    return [one.channel[0] for one in sorted(found, key=lambda one: -one.confidence)]
+
+
 def _is_hint(signal: str, one: Heading) -> bool:
     """Return whether a word of a name and its unit let a channel be what no rule knows."""
     words = _with_parts(_words_of(_field(one.name)))

@@ -7,12 +7,16 @@ something is not sure, the error says what it may be, and the word that tells it
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from itertools import combinations, product
 from typing import NamedTuple
+
+import numpy as np
 
 from codegen.escape import displayed
 from models.logs.log import Heading, LogFile, RecordingError, some
-from models.logs.names import HINT, STILL, Proposal, propose
+from models.logs.names import HINT, STILL, Proposal, called, propose
 from models.logs.signals import (
     BETA,
     COLUMNS,
@@ -28,8 +32,13 @@ from models.logs.signals import (
     signal_name,
 )
 from models.logs.spelling import without_unit
-from models.logs.units import SI
+from models.logs.units import RATE, SI, to_si
+from models.recordings.checks import world_axes
 from models.recordings.map import LogMap
+from models.recordings.record import Recording, resample
+
+_SAME = 0.02  # of a speed, by which two sensors of it differ
+_DT = 0.01  # [s], of a look at the directions of velocities
 
 _INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
 
@@ -54,13 +63,16 @@ def chosen_signals(
 ) -> _Reading:
     names = [one.name for one in headings]
     by_map = as_listed(log, log_map.signals, names)
+    headings, turned, world = of_the_car(log, headings, run)
+    names = [one.name for one in headings]
     lost: tuple[str, ...] = ()
     if "v_x" in log_map.signals and "v_x" not in by_map:
         channels = displayed(" + ".join(log_map.signals["v_x"].channel))
         lost = (f"there is no column {channels}: vx is computed from the wheels",)
     if log_map.is_complete:
         return _Reading(by_map, lost)
-    given = _without_wheels(_beside(standard_signals(log, names), by_map), by_map)
+    lost += (world,) * bool(world)
+    given = _without_wheels(_beside({**standard_signals(log, names), **turned}, by_map), by_map)
     missing = missing_signals(given)
     if has_v_y(given) and not missing:
         return _Reading(given, lost)
@@ -82,6 +94,47 @@ def chosen_signals(
     if aside := aside_text(found, proposal):
         notes.append(aside)
     return _Reading(found, tuple(notes))
+
+
+def of_the_car(
+    log: LogFile, headings: Sequence[Heading], run: str | None
+) -> tuple[Sequence[Heading], dict[str, Signal], str]:
+    """Return headings less a velocity of the world's axes beside one of the car's, this one where
+    it is in SI as that is, and a note.
+
+    Both are of one size, and the direction of one turns as the car does.
+    run : of the log; None its only one.
+    """
+    along, across, turns = (called(name, headings) for name in ("v_x", "v_y", "r"))
+    pairs = combinations(product(along, across), 2) if turns else ()
+    twice = [both for both in pairs if not set(both[0]) & set(both[1])]
+    if not twice:
+        return headings, {}, ""
+    with suppress(RecordingError):  # of channels that cannot be read
+        first, *others = log.read([turns[0], *along, *across], run)
+        r = to_si(first.unit, RATE, first.name) * first.values
+        there = {one.name: np.interp(first.t, one.t, one.values) for one in others}
+
+        def apart(both: Iterable[tuple[str, str]]) -> float:
+            one, other = (np.hypot(there[x], there[y]) for x, y in both)
+            return float(np.mean(np.abs(one - other)) / np.mean(one))
+
+        def of_world(pair: tuple[str, str]) -> bool:
+            some = dict(zip(("v_x", "v_y"), map(there.__getitem__, pair), strict=True))
+            t, some = resample(first.t, {**some, "r": r}, _DT)
+            still = np.zeros(t.size)
+            drive = Recording(name="", t=t, **some, delta_f=still, delta_r=still)
+            return world_axes(drive) is not None
+
+        best = min(twice, key=apart)
+        ours, world = sorted(best, key=of_world)
+        if of_world(world) and not of_world(ours):
+            in_si = all(map(signal_name, world)) and apart(best) < _SAME
+            ours_are = dict(zip(("v_x", "v_y"), (Signal(channel=(x,)) for x in ours), strict=True))
+            said = f"{' and '.join(world)} are of the world's axes, as they turn with the car: "
+            left = [one for one in headings if one.name not in world]
+            return left, ours_are if in_si else {}, f"{said}{' and '.join(ours)} are of the car's"
+    return headings, {}, ""
 
 
 def as_listed(

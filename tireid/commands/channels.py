@@ -56,9 +56,11 @@ def run(options: argparse.Namespace) -> int:
     chosen = one_run(log.path, runs if wanted else runs[:1], wanted or None)
     listed = log.listed()
     names = [one.name for one in listed]
-    proposal = propose(log, log.headings(), chosen)
+    headings, turned, world = choice.of_the_car(log, log.headings(), chosen)
+    proposal = propose(log, headings, chosen)
     by_map = choice.as_listed(log, log_map.signals, names)
-    sure = {**choice.standard_signals(log, names), **by_map}
+    standard = choice.standard_signals(log, [one.name for one in headings])
+    sure = {**standard, **turned, **by_map}
     signals = choice.likely_signals(sure, proposal)
     signals = choice.with_wheels(signals, proposal)
     missing = choice.missing_signals(signals)
@@ -66,6 +68,8 @@ def run(options: argparse.Namespace) -> int:
     coded = {name: without_codes(one) for name, one in _seen(log, listed, signals, chosen).items()}
     seen = {name: one for name, (one, _) in coded.items()}
     tell(_channels_text(listed, seen, signals, proposal, frozenset(sure)))
+    if world:
+        tell(world)
     for name, (_, codes) in coded.items():
         if codes:
             tell(f"{visible(name)} is {codes} where it has no value: left out")
