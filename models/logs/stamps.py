@@ -44,7 +44,8 @@ _SAME_DRIVE = 60.0  # [s] between the beginnings of two clocks of one drive, at 
 
 _ALIKE = 0.1  # of a step, by which those of two columns of one time differ
 _INTERVAL = 0.5  # of the median, by which intervals between samples differ from it
-_LATE = 1.5  # usual steps by which the one over the end of a counter differs from a usual one
+_LATE = 2.5  # usual steps that may lie about the end of a counter
+_FULL = 100.0  # usual steps, in four rounds, until a counter is full: fewer are samples astray
 _RUN = 1.0  # [s]: a counter that begins again sooner is no run of its own
 
 MISSING = -(2**63)  # an instant that is not there, in ns
@@ -52,11 +53,9 @@ _DAY = 86400.0
 NAMES: tuple[str, ...] = tuple(TABLES["clock"]["names"].split())
 _INTERVALS = tuple(TABLES["clock"]["intervals"].split())
 _CALLED = (*NAMES, *_INTERVALS)
-# [s] after which counters begin again: of bits and their tick, of decimals (no tick tells them).
-_PERIODS = sorted(
-    [(2.0**bits * 10.0**-k, 10.0**-k) for bits in (8, 16, 24, 32) for k in range(10)]
-    + [(period, math.inf) for period in (*(10.0**k for k in range(-2, 5)), 60.0, 3600.0)]
-)
+# [s] after which counters begin again: of ticks in words of bits; of decimals and of the clock.
+_OF_BITS = [2.0**bits * tick for bits in (8, 16, 24, 32) for tick in (1e-3, 1e-4, 1e-6, 1e-9)]
+_ROUND = [*(10.0**k for k in range(-2, 5)), 60.0, 3600.0]
 # Between 1980 and 2100 in each unit: a number so large counts from 1970.
 _EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
 _MICROSECONDS = 1e6
@@ -141,12 +140,12 @@ def alike_clocks(
     names: Sequence[str], units: Sequence[str], head: _Head, clock: Clock
 ) -> list[Clock]:
     """Return other columns that rise by the steps of a clock, as that of a drive by a lap's."""
-    own = np.diff(_times(clock, head(clock.column)))
+    others = _even(names, units, head, [clock.column])
+    own, *steps = (np.diff(_times(one, head(one.column))) for one in (clock, *others))
     return [
         one
-        for one in (_even(names, units, head, [clock.column]) if own.size else ())
-        if (steps := np.diff(_times(one, head(one.column)))).size
-        and abs(np.median(steps) - np.median(own)) < _ALIKE * np.median(own)
+        for one, step in zip(others, steps, strict=True)
+        if abs(np.median(step) - np.median(own)) < _ALIKE * np.median(own)
     ]
 
 
@@ -503,20 +502,19 @@ def seconds(
 def _gone_on(t: Array, *, calendar: bool) -> tuple[Array, list[str]]:
     """Return stamps over midnight, or of a counter that is full, as if they went on; and a note.
 
-    A run begins at zero, too, and may last a round number of seconds, or of its samples.
+    A run begins at zero, too, and may last a round number of seconds.
     """
     steps = np.diff(t)
     usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else math.nan
-    slack = 0.1 * _DAY if calendar else _LATE * usual
-    for period, tick in [(_DAY, 0.0)] if calendar else _PERIODS:
-        falls = np.abs(steps + period) < slack + usual * (not calendar)
-        begins = np.abs(np.remainder(t[1:][falls] + slack, 0.5 * period) - slack) < slack
-        is_run = tick > usual / _LATE and t[0] < 3.0 * usual
-        is_run &= period > _RUN or np.count_nonzero(falls) < 2
-        if calendar or (falls.any() and begins.all() and not is_run and period > 10.0 * usual):
+    for period in [_DAY] if calendar else [*_OF_BITS, *_ROUND]:
+        slack = 0.1 * _DAY if calendar else _LATE * usual
+        falls = (steps < 0.0) & (np.abs(steps + period) < slack)
+        times = np.count_nonzero(falls)
+        is_run = period in _ROUND and t[0] < _LATE * usual and (period > _RUN or times < 2)
+        if calendar or (min(times, 4) * period > _FULL * usual and not is_run):
             t = np.round(t + period * np.concatenate([[0.0], np.cumsum(falls)]), 9)
             said = f"begins again each {period:.9g} s, as a counter that is full: taken as going on"
-            return t, [] if calendar else [f"{said} ({np.count_nonzero(falls)} times)"]
+            return t, [] if calendar else [f"{said} ({times} times)"]
     return t, []
 
 

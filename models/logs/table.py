@@ -268,20 +268,15 @@ class TableLog:
 
     def _rising(self, first: Clock | None) -> Clock | None:
         """Return a clock, or the first of those with its steps that rises over the whole log."""
-        table = self.table
-        if first is None or self._run_column is not None:
-            return first
-        with suppress(RecordingError):  # of columns that cannot be read
-            others = alike_clocks(self.names, self._columns.units, table.first_rows, first)
-            if not others:
-                return first
-            found = (first, *others)
-            cells = table.cells({one.column: kind_of(one) for one in found})
-            for one in found:
-                with suppress(RecordingError):
-                    seconds("", one, cells.columns[one.column], cells.rows, table.place)
-                    said = f"; {first.name!r} does not rise throughout" * (one != first)
-                    return one._replace(words=one.words + said)
+        table, found = self.table, [first]
+        if first is not None and self._run_column is None:
+            found += alike_clocks(self.names, self._columns.units, table.first_rows, first)
+        for one in found if len(found) > 1 else ():
+            with suppress(RecordingError):  # as it does not rise, or cannot be read
+                cells = table.cells({one.column: kind_of(one)})
+                seconds("", one, cells.columns[one.column], cells.rows, table.place)
+                said = f"; {first.name!r} does not rise throughout" * (one != first)
+                return one._replace(words=one.words + said)
         return first
 
     @property

@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
@@ -100,41 +99,27 @@ def of_the_car(
     log: LogFile, headings: Sequence[Heading], run: str | None
 ) -> tuple[Sequence[Heading], dict[str, Signal], str]:
     """Return headings less a velocity of the world's axes beside one of the car's, this one where
-    it is in SI as that is, and a note.
-
-    Both are of one size, and the direction of one turns as the car does.
+    it is in SI as that is, and a note: both are of one size, and one turns as the car does.
     run : of the log; None its only one.
     """
     along, across, turns = (called(name, headings) for name in ("v_x", "v_y", "r"))
-    pairs = combinations(product(along, across), 2) if turns else ()
-    twice = [both for both in pairs if not set(both[0]) & set(both[1])]
-    if not twice:
-        return headings, {}, ""
+    pairs, found = list(zip(along, across, strict=False))[: 2 if turns else 0], []
     with suppress(RecordingError):  # of channels that cannot be read
-        first, *others = log.read([turns[0], *along, *across], run)
-        r = to_si(first.unit, RATE, first.name) * first.values
-        there = {one.name: np.interp(first.t, one.t, one.values) for one in others}
-
-        def apart(both: Iterable[tuple[str, str]]) -> float:
-            one, other = (np.hypot(there[x], there[y]) for x, y in both)
-            return float(np.mean(np.abs(one - other)) / np.mean(one))
-
-        def of_world(pair: tuple[str, str]) -> bool:
-            some = dict(zip(("v_x", "v_y"), map(there.__getitem__, pair), strict=True))
-            t, some = resample(first.t, {**some, "r": r}, _DT)
-            still = np.zeros(t.size)
-            drive = Recording(name="", t=t, **some, delta_f=still, delta_r=still)
-            return world_axes(drive) is not None
-
-        best = min(twice, key=apart)
-        ours, world = sorted(best, key=of_world)
-        if of_world(world) and not of_world(ours):
-            in_si = all(map(signal_name, world)) and apart(best) < _SAME
-            ours_are = dict(zip(("v_x", "v_y"), (Signal(channel=(x,)) for x in ours), strict=True))
-            said = f"{' and '.join(world)} are of the world's axes, as they turn with the car: "
-            left = [one for one in headings if one.name not in world]
-            return left, ours_are if in_si else {}, f"{said}{' and '.join(ours)} are of the car's"
-    return headings, {}, ""
+        for pair in pairs if len(pairs) > 1 else ():
+            r, *both = log.read([turns[0], *pair], run)
+            x, y = (np.interp(r.t, one.t, one.values) for one in both)
+            rate = to_si(r.unit, RATE, r.name) * r.values
+            t, some = resample(r.t, {"v_x": x, "v_y": y, "r": rate}, _DT)
+            drive = Recording(name="", t=t, **some, delta_f=0.0 * t, delta_r=0.0 * t)
+            found.append((world_axes(drive) is not None, pair, np.hypot(x, y)))
+    if {turned for turned, *_ in found} != {True, False}:
+        return headings, {}, ""
+    (_, ours, speed), (_, world, size) = sorted(found, key=lambda one: one[0])
+    alike = np.mean(np.abs(speed - size)) < _SAME * np.mean(size) and all(map(signal_name, world))
+    sure = {name: Signal(channel=(one,)) for name, one in zip(("v_x", "v_y"), ours, strict=True)}
+    said = f"{world[0]} and {world[1]} are of the world's axes, as they turn with the car: "
+    left = [one for one in headings if one.name not in world]
+    return left, sure if alike else {}, f"{said}{ours[0]} and {ours[1]} are of the car's"
 
 
 def as_listed(
