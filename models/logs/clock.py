@@ -90,7 +90,7 @@ def without_codes(channel: Channel) -> tuple[Channel, str]:
     ends = np.concatenate([ends[:2], ends[2:][-2:]])
     ends = ends[_are_codes(ends)]
     rest = np.where(np.isin(values, ends), np.nan, values)
-    step = np.fmax.reduce(np.abs(np.diff(rest)))
+    step = np.fmax.reduce(np.abs(np.diff(rest)), initial=0.0)
     codes = [one for one in ends if np.fmin.reduce(np.abs(rest - one)) > _FAR * step > 0.0]
     kept = ~np.isin(values, codes)
     t, rows, said = channel.t[kept], channel.rows[kept], ", ".join(f"{one:.9g}" for one in codes)

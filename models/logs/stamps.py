@@ -45,7 +45,7 @@ _SAME_DRIVE = 60.0  # [s] between the beginnings of two clocks of one drive, at 
 _ALIKE = 0.1  # of a step, by which those of two columns of one time differ
 _INTERVAL = 0.5  # of the median, by which intervals between samples differ from it
 _LATE = 2.5  # usual steps that may lie about the end of a counter
-_FULL = 100.0  # usual steps, in four rounds, until a counter is full: fewer are samples astray
+_FULL = 40.0  # usual steps, in four rounds, until a counter is full: fewer are samples astray
 _RUN = 1.0  # [s]: a counter that begins again sooner is no run of its own
 
 MISSING = -(2**63)  # an instant that is not there, in ns
@@ -509,7 +509,7 @@ def _gone_on(t: Array, *, calendar: bool) -> tuple[Array, list[str]]:
     for period in [_DAY] if calendar else [*_OF_BITS, *_ROUND]:
         slack = 0.1 * _DAY if calendar else _LATE * usual
         falls = (steps < 0.0) & (np.abs(steps + period) < slack)
-        times = np.count_nonzero(falls)
+        times = int(np.count_nonzero(falls))
         is_run = period in _ROUND and t[0] < _LATE * usual and (period > _RUN or times < 2)
         if calendar or (min(times, 4) * period > _FULL * usual and not is_run):
             t = np.round(t + period * np.concatenate([[0.0], np.cumsum(falls)]), 9)

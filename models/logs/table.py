@@ -251,7 +251,8 @@ class TableLog:
         if self.rate:
             return None
         if not self.clock_name:
-            return self._rising(find_clock(self.names, self._columns.units, table.first_rows))
+            found = find_clock(self.names, self._columns.units, table.first_rows)
+            return found and self._rising(found)
         name = self.clock_name
         if name not in self._places:  # it may stand with its unit in the file, or the unit be given
             bare = [one for one in self.names if without_unit(one) == without_unit(name)]
@@ -266,10 +267,10 @@ class TableLog:
             )
         return given
 
-    def _rising(self, first: Clock | None) -> Clock | None:
+    def _rising(self, first: Clock) -> Clock:
         """Return a clock, or the first of those with its steps that rises over the whole log."""
         table, found = self.table, [first]
-        if first is not None and self._run_column is None:
+        if self._run_column is None:
             found += alike_clocks(self.names, self._columns.units, table.first_rows, first)
         for one in found if len(found) > 1 else ():
             with suppress(RecordingError):  # as it does not rise, or cannot be read

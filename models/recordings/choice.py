@@ -110,7 +110,10 @@ def of_the_car(
             x, y = (np.interp(r.t, one.t, one.values) for one in both)
             rate = to_si(r.unit, RATE, r.name) * r.values
             t, some = resample(r.t, {"v_x": x, "v_y": y, "r": rate}, _DT)
-            drive = Recording(name="", t=t, **some, delta_f=0.0 * t, delta_r=0.0 * t)
+            v_x, v_y, rate = some.values()
+            drive = Recording(
+                name="", t=t, v_x=v_x, v_y=v_y, r=rate, delta_f=0.0 * t, delta_r=0.0 * t
+            )
             found.append((world_axes(drive) is not None, pair, np.hypot(x, y)))
     if {turned for turned, *_ in found} != {True, False}:
         return headings, {}, ""

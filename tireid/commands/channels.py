@@ -11,13 +11,13 @@ import numpy as np
 
 from codegen.escape import visible
 from models.files import write_atomically
-from models.logs.clock import holes, without_codes
+from models.logs.clock import holes, without_codes, without_empty
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
 from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, WHEELS, Signal, given_by
 from models.logs.units import SI, is_given
 from models.recordings import LogMap, choice, split_log_argument
-from models.recordings.assembly import wheel_scales, wheel_units
+from models.recordings.assembly import require_often, wheel_scales, wheel_units
 from models.recordings.choice import column_of
 from models.recordings.map import CUT
 from models.recordings.wheels import scale_text, wheel_factor, with_scales
@@ -84,6 +84,9 @@ def run(options: argparse.Namespace) -> int:
     elif not choice.has_v_y(signals) and not missing:
         tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
     said, of_wheels, rolls = _wheels(log, signals, log_map, chosen)
+    if not missing:
+        for name in {channel for one in signals.values() for channel in one.channel} & set(seen):
+            require_often(str(log.path), without_empty(seen[name]).t, log.clock)
     if rolls or missing:
         tell(_missing_text(options.log, missing, proposal, signals))
     if said:
