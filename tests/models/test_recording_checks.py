@@ -442,15 +442,12 @@ def test_a_log_without_any_motion_sideways_is_judged_without_a_warning():
     check_physics(replace(made, axle_force=None, **dict.fromkeys(names, nothing)))
 
 
-def columns_of(made):
-    return {"t": made.t, "r": made.r, "delta_f": made.delta_f}
-
-
 def test_of_two_velocities_that_of_the_car_is_read_by_their_directions():
     made = drive()
     world = (made.v_x + 1j * made.v_y) * np.exp(1j * np.cumsum(made.r) * made.dt)
     velocities = {"v_x": world.real, "v_y": world.imag, "v_long": made.v_x, "v_tran": made.v_y}
-    read = read_recording({**columns_of(made), **velocities})
+    rest = {"t": made.t, "r": made.r, "delta_f": made.delta_f}
+    read = read_recording({**rest, **velocities})
     np.testing.assert_array_equal(read.v_x, made.v_x)
     np.testing.assert_array_equal(read.v_y, made.v_y)
     assert any("v_x and v_y are of the world's axes" in note for note in read.notes)
@@ -463,7 +460,7 @@ def test_of_two_velocities_that_of_the_car_is_read_by_their_directions():
 def test_the_channel_that_is_the_lateral_acceleration_is_offered(rng, name, factor, offered):
     made = drive()
     other = 0.5 * np.sin(made.t) + 0.05 * rng.normal(size=made.t.size)
-    a_y = {"vx": made.v_x, "ay": other, name: factor * made.a_y}
+    rest = {"t": made.t, "r": made.r, "delta_f": made.delta_f, "vx": made.v_x}
     with pytest.raises(RecordingError, match="its slope on v_x r") as refused:
-        read_recording({**columns_of(made), **a_y})
+        read_recording({**rest, "ay": other, name: factor * made.a_y})
     assert f'--columns "{offered}"' in str(refused.value)
