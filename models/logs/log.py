@@ -57,13 +57,15 @@ class Heading(NamedTuple):
 class Clock(NamedTuple):
     """The column that is the time.
     column: from 0; name: as in the file; unit: of `units.PER_SECOND`, "hhmmss" or "instant"; words:
-    for people.
+    for people, what is unusual behind a semicolon; summed: whether it holds the time since the
+    sample before.
     """
 
     column: int
     name: str
     unit: str
     words: str
+    summed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
