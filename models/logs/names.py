@@ -677,14 +677,17 @@ def _beside_turning(
 def _levered(guess: Guess, best: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
     """Return a guess of the steering, of the hand wheel where it turns too far for the car's bend.
 
-    v_x δ / r is the wheelbase, and more of a car that understeers.
+    v_x δ / r is the wheelbase, and more of a car that understeers; a_y, where its unit is given,
+    tells v_x r whatever the unit of r.
     """
-    there = {"v_x": best["v_x"], "r": best["r"], "delta_f": guess}
-    v, r, delta = (
+    turning = "a_y" if "a_y" in best and _is_given(best["a_y"]) else "r"
+    there = {"v_x": best["v_x"], turning: best[turning], "delta_f": guess}
+    v, turn, delta = (
         _root_mean_square(seen[one.channel[0]].values) * to_si(one.unit, QUANTITIES[name], name)
         for name, one in there.items()
     )
-    if guess.hand or not v * delta > _LONGEST * r > 0.0:
+    turn = turn if turning == "r" else turn / max(v, 1e-9)
+    if guess.hand or not v * delta > _LONGEST * turn > 0.0:
         return guess
     return replace(_said(guess, "too far for how the car turns"), hand=True)
 
