@@ -166,18 +166,21 @@ def fit(
         name = recordings[0].name
         raise ValueError(f"{name}: no sample is fast enough to learn from")
     model = FittedModel(vehicle=vehicle, p=found.p, covariance=found.covariance, reach=reach)
-    if softness(found.p)[0][0] < -_SOFT and not before.moves[_PLAY]:
-        loose = fit(recordings, vehicle, before.with_play(), block=block, coarse=coarse, days=days)
-        if loose.posterior.p[_PLAY] > _SURELY * loose.posterior.sd(NAMES[_PLAY]):
-            return loose
+    soft = softness(found.p)[0][0] < -_SOFT  # as of wheels with play, or of zeros that differ
     if days == "found" and sum(len(_alone(one)) for one in measured) > 1:
         apart = len({one.dt for one in measured}) == 1
         apart = apart and bool(days_apart(joined(measured), vehicle, model.p, model.covariance))
         share = 0.0 if apart else _missed(measured, model)
-        if apart or share > _NOTHING_FITS:  # then tires tell no zeros apart
+        if apart or soft or share > _NOTHING_FITS:  # then tires tell no zeros apart
             each = fit(recordings, vehicle, priors, block=block, coarse=coarse, days="each")
             if apart or _missed(measured, each.model) < _MUCH_LESS * share:
                 return each
+            if soft and days_apart(joined(measured), vehicle, each.model.p, each.model.covariance):
+                return each
+    if soft and not before.moves[_PLAY]:
+        loose = fit(recordings, vehicle, before.with_play(), block=block, coarse=coarse, days=days)
+        if loose.posterior.p[_PLAY] > _SURELY * loose.posterior.sd(NAMES[_PLAY]):
+            return loose
     return _Fit(model, found, parts)
 
 
