@@ -6,12 +6,12 @@ counts from the first message that is read of any topic.
 """
 
 import re
-import struct
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
+from operator import attrgetter
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -22,8 +22,6 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from models.limits import limits
 from models.logs.cdr import (
-    ORDERS,
-    PREFIX,
     CdrError,
     Definitions,
     Field,
@@ -143,49 +141,24 @@ def _samples(
 
 def _moving(path: Path, bag: Any) -> list[_Moving]:
     """Return the frames of /tf that move."""
-    found: dict[str, tuple[list[int], list[tuple[float, ...]]]] = {}
+    typesys = need(path, "rosbags.typesys", "ROS 2 bags", "ros")
+    store = typesys.get_typestore(typesys.Stores.LATEST)
+    found: dict[str, list[tuple[float, ...]]] = {}
     count = 0
     for connection, _, raw in bag.messages([c for c in bag.connections if c.msgtype == _TF]):
-        for name, ns, values in _transforms(raw):
-            times, rows = found.setdefault(f"{connection.topic}/{name}", ([], []))
-            times.append(ns)
-            rows.append(values)
+        for one in store.deserialize_cdr(raw, _TF).transforms:
+            parent, child = (x.strip("/") for x in (one.header.frame_id, one.child_frame_id))
+            stamp, get = one.header.stamp, attrgetter(*_OF_TF)
+            ns = stamp.sec * 1_000_000_000 + stamp.nanosec
+            name = f"{connection.topic}/{parent}->{child}"
+            found.setdefault(name, []).append((ns, *get(one.transform)))
             count += 1
         few(path, count, "samples", "transforms")
     return [
-        _Moving(name, np.array(times), np.array(rows))
-        for name, (times, rows) in found.items()
-        if len(set(rows)) > 1
+        _Moving(name, np.array([row[0] for row in rows]), np.array([row[1:] for row in rows]))
+        for name, rows in found.items()
+        if len({row[1:] for row in rows}) > 1
     ]
-
-
-def _transforms(raw: bytes) -> Iterator[tuple[str, int, tuple[float, ...]]]:
-    """Yield the transforms of a message: parent to child, stamp [ns], translation and rotation.
-    It is a sequence of: seconds, nanoseconds, name of the parent, name of the child, 7 doubles.
-    """
-    order, place = ORDERS.get(bytes(raw[:2])), PREFIX
-    if order is None:
-        raise CdrError("a message is not plain CDR")
-
-    def read(form: str, size: int) -> tuple[Any, ...]:
-        nonlocal place
-        place += -(place - PREFIX) % size
-        values = struct.unpack_from(order + form, raw, place)
-        place += struct.calcsize(order + form)
-        return values
-
-    def text() -> str:
-        nonlocal place
-        (length,) = read("I", 4)
-        place += length
-        return (
-            bytes(raw[place - length : place]).rstrip(b"\0").decode("utf-8", "replace").strip("/")
-        )
-
-    for _ in range(read("I", 4)[0]):
-        seconds, nanoseconds = read("iI", 4)
-        name = f"{text()}->{text()}"
-        yield name, seconds * 1_000_000_000 + nanoseconds, read("7d", 8)
 
 
 def _plugin(path: Path) -> str:

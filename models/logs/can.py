@@ -13,10 +13,10 @@ import math
 import re
 import struct
 import zlib
-from array import array
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -35,7 +35,7 @@ from models.logs.mdf import is_bus, opened
 from models.logs.stamps import nanoseconds, since, typical_rate
 from models.schema import LONGEST_NAME, read_bytes
 
-_FRAMES_AT_ONCE = 1 << 16  # frames that are stored at a time
+_FRAMES_AT_ONCE = 1 << 16  # frames that are gathered at a time
 _SHORT = 0x7FF  # largest identifier of 11 bits
 _IDENTIFIER = (1 << 29) - 1  # mask of the 29 bits of the longest identifier
 _INFLATION = 1032  # most bytes that deflate makes of one
@@ -44,6 +44,7 @@ _DEFLATED = 2  # way in which one is packed that is read: by zlib
 _FROM_ALL = 0xFE  # address that a database of J1939 gives where any may send
 _FLOATS = (16, 32, 64)  # bits of a signal that is a float
 _LONGEST_SIGNAL = 64  # bits
+_LONGEST_FRAME = 1785  # bytes, of J1939 in several packets
 CALENDAR = 1e8  # [s]: times above count from 1970
 
 _FRAME = "CAN_DataFrame"  # of MDF
@@ -87,68 +88,65 @@ class _Frames(NamedTuple):
     data: NDArray[np.uint8]
 
 
-class _Gathered:
-    """Frames of one identifier as they come, all of the same bytes."""
+class _Part(NamedTuple):
+    """Some frames of one identifier on one bus: t (n,) [s], sizes (n,) and data (n, bytes)."""
 
-    def __init__(self, width: int) -> None:
-        self.width = width
-        self._times = array("d")
-        self._bytes = bytearray()
-        self._t, self._data = Growing(), Growing(np.uint8)
-
-    def add(self, time: float, data: bytes) -> None:
-        self._times.append(time)
-        self._bytes += data[: self.width]
-        if len(self._times) == _FRAMES_AT_ONCE:
-            self._store()
-
-    def extend(self, times: Array, data: NDArray[np.uint8]) -> None:
-        """Take the next frames.   times : (n,) [s].   data : (n, bytes)."""
-        self._t.extend(times)
-        self._data.extend(data[:, : self.width].reshape(-1))
-
-    def _store(self) -> None:
-        if self._times:
-            times, data = np.frombuffer(self._times), np.frombuffer(self._bytes, np.uint8)
-            self.extend(times, data.reshape(-1, self.width))
-            self._times, self._bytes = array("d"), bytearray()
-
-    def finished(self) -> _Frames:
-        self._store()
-        return _Frames(self._t.finished(), self._data.finished().reshape(-1, self.width))
+    bus: str
+    identifier: int
+    t: Array
+    sizes: NDArray[np.int64]
+    data: NDArray[np.uint8]
 
 
 _Log = tuple[dict[_Key, _Frames], Counter[str]]  # and how many others it has, by what they are
 
 
 def _gather(path: Path, kind: str, given: _Dbc) -> _Log:
-    if kind == "MDF4":
-        return _of_mdf(path, given)
-    found: dict[_Key, _Gathered] = {}
+    found: dict[_Key, tuple[Growing, Growing]] = {}
     others: Counter[str] = Counter()
     count = 0
-    for message in _messages(path, kind):
-        identifier = message.arbitration_id | (_EXTENDED if message.is_extended_id else 0)
-        if message.is_error_frame or message.is_remote_frame:
-            others["error and remote"] += 1
-        elif (known := given.message(identifier)) is None:
-            others["unknown"] += 1
-        elif len(message.data) < known.length:
-            others["cut short"] += 1
-        else:
-            key = str(message.channel), identifier
-            if key not in found:
-                found[key] = _Gathered(known.length)
-            found[key].add(message.timestamp, message.data)
-            count += 1
-            if count % _FRAMES_AT_ONCE == 0:
-                few(path, count, "samples", "frames")
-    frames = {key: one.finished() for key, one in found.items()}
+    for bus, identifier, t, sizes, data in (
+        _of_mdf(path, others) if kind == "MDF4" else _of_messages(path, kind, others)
+    ):
+        if (message := given.message(identifier)) is None:
+            others["unknown"] += t.size
+            continue
+        whole = sizes >= message.length
+        others["cut short"] += int(np.sum(~whole))
+        if whole.any():
+            times, rows = found.setdefault((bus, identifier), (Growing(), Growing(np.uint8)))
+            times.extend(t[whole])
+            rows.extend(data[whole, : message.length].reshape(-1))
+            count += int(np.sum(whole))
+            few(path, count, "samples", "frames")
+    frames = {}
+    for key, (times, rows) in found.items():
+        t, data = times.finished(), rows.finished().reshape(len(times), -1)
+        if kind == "MDF4" and np.any(t[1:] < t[:-1]):  # groups of a file follow one another
+            order = np.argsort(t, kind="stable")
+            t, data = t[order], data[order]
+        frames[key] = _Frames(t, data)
     first = min((float(kept.t.min()) for kept in frames.values()), default=0.0)
     if first > CALENDAR:
-        for key, kept in frames.items():
-            frames[key] = kept._replace(t=since(kept.t, first))
+        frames = {key: kept._replace(t=since(kept.t, first)) for key, kept in frames.items()}
     return frames, others
+
+
+def _of_messages(path: Path, kind: str, others: Counter[str]) -> Iterator[_Part]:
+    messages = _messages(path, kind)
+    while some := list(islice(messages, _FRAMES_AT_ONCE)):
+        found: dict[_Key, list[Any]] = {}
+        for one in some:
+            if one.is_error_frame or one.is_remote_frame:
+                others["error and remote"] += 1
+            else:
+                identifier = one.arbitration_id | _EXTENDED * one.is_extended_id
+                found.setdefault((str(one.channel), identifier), []).append(one)
+        for key, frames in found.items():
+            t, sizes = np.array([(one.timestamp, len(one.data)) for one in frames]).T
+            # Shorter ones are filled up by zeros.
+            data = np.array([bytes(one.data[:_LONGEST_FRAME]) for one in frames])
+            yield _Part(*key, t, sizes, data.view(np.uint8).reshape(t.size, -1))
 
 
 def _messages(path: Path, kind: str) -> Iterator[Any]:
@@ -286,10 +284,8 @@ def _require_whole_blf(path: Path) -> None:
             file.seek(body + length % 4, 1)
 
 
-def _of_mdf(path: Path, given: _Dbc) -> _Log:
-    """Read the frames of the buses that an MDF4 file logs."""
-    found: dict[_Key, _Gathered] = {}
-    others: Counter[str] = Counter()
+def _of_mdf(path: Path, others: Counter[str]) -> Iterator[_Part]:
+    """Yield the frames of the buses that an MDF4 file logs."""
     with opened(path, "CAN frames of MDF") as file:
         if str(file.version) < "4":
             raise RecordingError(f"{path}: an MDF3 file holds no frames; leave the DBC out")
@@ -305,39 +301,21 @@ def _of_mdf(path: Path, given: _Dbc) -> _Log:
                 continue
             for first in range(0, samples, _FRAMES_AT_ONCE):
                 count = min(_FRAMES_AT_ONCE, samples - first)
-                _add_part(file, names, number, slice(first, first + count), given, found, others)
-    frames = {key: one.finished() for key, one in found.items()}
-    for key, (t, data) in frames.items():
-        if np.any(t[1:] < t[:-1]):  # groups of a file follow one another
-            order = np.argsort(t, kind="stable")
-            frames[key] = _Frames(t[order], data[order])
-    return frames, others
+                yield from _of_group(file, names, number, first, count)
 
 
-def _add_part(
-    file: Any,
-    names: set[str],
-    number: int,
-    part: slice,
-    given: _Dbc,
-    found: dict[_Key, _Gathered],
-    others: Counter[str],
-) -> None:
-    """Add some frames of a group to those of their bus and identifier."""
-    count = part.stop - part.start
+def _of_group(file: Any, names: set[str], number: int, first: int, count: int) -> Iterator[_Part]:
+    """Yield some frames of a group by their bus and identifier."""
 
     def signal(name: str) -> Any:
-        full = f"{_FRAME}.{name}"
-        if full not in names:
-            return None
         return file.get(
-            full, group=number, raw=True, ignore_invalidation_bits=True, record_offset=part.start,
-            record_count=count,
+            f"{_FRAME}.{name}", group=number, raw=True, ignore_invalidation_bits=True,
+            record_offset=first, record_count=count,
         )  # fmt: skip
 
     def whole(name: str, otherwise: Any) -> NDArray[np.int64]:
-        found = signal(name)
-        return np.broadcast_to(otherwise, count) if found is None else found.samples.astype(int)
+        there = f"{_FRAME}.{name}" in names
+        return np.broadcast_to(signal(name).samples.astype(int) if there else otherwise, count)
 
     identifiers = signal("ID")
     data = np.asarray(signal("DataBytes").samples, dtype=np.uint8).reshape(count, -1)
@@ -347,18 +325,9 @@ def _add_part(
     ids, buses = np.where(is_long, ids | _EXTENDED, ids), whole("BusChannel", 0)
     sizes = np.minimum(whole("DataLength", data.shape[1]), data.shape[1])
     t = np.asarray(identifiers.timestamps, dtype=np.float64)
-    for identifier in np.unique(ids).tolist():
-        mine = ids == identifier
-        message = given.message(identifier)
-        if message is None:
-            others["unknown"] += int(mine.sum())
-            continue
-        complete = mine & (sizes >= message.length)
-        others["cut short"] += int(mine.sum() - complete.sum())
-        for bus in np.unique(buses[complete]).tolist():
-            which = complete & (buses == bus)
-            frames = found.setdefault((str(bus), identifier), _Gathered(message.length))
-            frames.extend(t[which], data[which])
+    for identifier, bus in np.unique([ids, buses], axis=1).T.tolist():
+        which = (ids == identifier) & (buses == bus)
+        yield _Part(str(bus), identifier, t[which], sizes[which], data[which])
 
 
 # Signals of frames, by a DBC.
@@ -511,21 +480,19 @@ def _fault(message: Any, signal: Any) -> str:
     if signal.length not in sizes:
         allowed = "16, 32 or 64" if signal.is_float else f"1 to {_LONGEST_SIGNAL}"
         return f"must have {allowed} bits, it has {signal.length}"
-    _, end = _bytes_of(signal)
-    return "" if end <= message.length else f"lies beyond its frame of {message.length} bytes"
+    inside = _place(signal)[0].stop <= message.length
+    return "" if inside else f"lies beyond its frame of {message.length} bytes"
 
 
-def _bytes_of(signal: Any) -> tuple[int, int]:
-    """Return the first byte of a frame that a signal lies in, and the one behind its last."""
-    first = _first_bit(signal)
-    return first // 8, (first + signal.length - 1) // 8 + 1
+def _place(signal: Any) -> tuple[slice, int]:
+    """Return the bytes of a frame that a signal lies in, and how many bits of them are before it.
 
+    Motorola numbers the bits of a byte downwards, and a signal by its highest bit.
+    """
+    from cantools.database.utils import start_bit
 
-def _first_bit(signal: Any) -> int:
-    """Return the bit that a signal begins at, counted in the order of its bytes."""
-    # Motorola numbers the bits of a byte downwards, and a signal by its highest bit.
-    start = int(signal.start)
-    return start if signal.byte_order == "little_endian" else 8 * (start // 8) + 7 - start % 8
+    first = start_bit(signal)
+    return slice(first // 8, (first + signal.length - 1) // 8 + 1), first % 8
 
 
 def _selectors(message: Any, signal: Any) -> _Selectors:
@@ -556,10 +523,9 @@ def _values_of(data: NDArray[np.uint8], signal: Any) -> Array:
     """
     raw = _raw_values(data, signal)
     values = raw.astype(np.float64) * float(signal.scale) + float(signal.offset)
-    named = {value: str(name).replace("_", " ") for value, name in (signal.choices or {}).items()}
-    values[np.isin(raw, [value for value, name in named.items() if _NO_NUMBER.search(name)])] = (
-        np.nan
-    )
+    named = (signal.choices or {}).items()
+    none = [value for value, name in named if _NO_NUMBER.search(str(name).replace("_", " "))]
+    values[np.isin(raw, none)] = np.nan
     return values
 
 
@@ -568,10 +534,9 @@ def _raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
     data : of the frames, (n, bytes).
     """
     length, little = signal.length, signal.byte_order == "little_endian"
-    first, (begin, end) = _first_bit(signal), _bytes_of(signal)
+    where, before = _place(signal)
     order: Literal["little", "big"] = "little" if little else "big"
-    bits = np.unpackbits(data[:, begin:end], axis=1, bitorder=order)
-    bits = bits[:, first - 8 * begin : first - 8 * begin + length]
+    bits = np.unpackbits(data[:, where], axis=1, bitorder=order)[:, before : before + length]
     empty = np.zeros((len(bits), 64 - length), np.uint8)
     joined = np.concatenate([bits, empty] if little else [empty, bits], axis=1)
     packed = np.packbits(joined, axis=1, bitorder=order).reshape(-1)
