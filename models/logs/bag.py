@@ -102,7 +102,7 @@ def open_(path: Path) -> GroupedLog[_Place]:
             )
             found.append((topic.kind, listed, (topic, field)))
     received = [topic.name for topic in topics if topic.stamp is None]
-    return GroupedLog.of(
+    return GroupedLog(
         path,
         "ROS 2 bag" if _plugin(path) != ".mcap" else "MCAP",
         "a ROS 2 bag",
@@ -113,7 +113,7 @@ def open_(path: Path) -> GroupedLog[_Place]:
             *noted("not read", [f"{name} ({why})" for name, why in (undefined | skipped).items()]),
         ),
         partial(_samples, path, definitions, zero),
-        missing="message with numbers",
+        "message with numbers",
     )
 
 

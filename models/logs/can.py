@@ -405,7 +405,7 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
             group = f"bus {bus}" + f" from {identifier & 0xFF:02X}" * several
             found += [(group, *one) for one in _channels(given, message, frames)]
     said = tuple(f"{count} {what} frames are not read" for what, count in others.items() if count)
-    return GroupedLog.of(
+    return GroupedLog(
         path,
         f"CAN {kind}",
         "a CAN log",
@@ -413,7 +413,7 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
         found,
         said,
         _samples,
-        missing=f"frame that {dbc} knows",
+        f"frame that {dbc} knows",
     )
 
 

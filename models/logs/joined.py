@@ -41,9 +41,7 @@ def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> 
     ]
     bad = [one.name for one, log in opened.items() if isinstance(log, RecordingError)]
     said = (f"joined by time: {some([one.name for one in logs])}", *noted("not read", bad))
-    return GroupedLog.of(
-        path, "a log a message", "a log", "row", found, said, _of_files, missing="channel"
-    )
+    return GroupedLog(path, "a log a message", "a log", "row", found, said, _of_files, "channel")
 
 
 def _of_files(requested: Sequence[tuple[Listed, Any]]) -> list[Samples]:
@@ -112,6 +110,6 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
     def read(requested: Sequence[tuple[Listed, Any]]) -> list[Samples]:
         return [Samples(one.name, t[rows], {one.name: values[rows]}) for one, rows in requested]
 
-    return GroupedLog.of(
-        table.path, f"{table.format} of values", "a table", "row", found, said, read, missing="name"
+    return GroupedLog(
+        table.path, f"{table.format} of values", "a table", "row", found, said, read, "name"
     )

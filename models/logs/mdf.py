@@ -125,7 +125,7 @@ def open_(path: Path) -> GroupedLog[_Place]:
                 unit = str(file.get_channel_unit(group=number, index=index) or "").strip()
                 listed = Listed(name=str(channel.name), unit=unit, samples=samples, rate=rate)
                 found.append((name, listed, _Place(number, index)))
-        return GroupedLog.of(
+        return GroupedLog(
             path,
             "MDF4" if is_4 else "MDF3",
             "an MDF file",
@@ -133,7 +133,7 @@ def open_(path: Path) -> GroupedLog[_Place]:
             found,
             tuple(note for kind, why in _REASONS.items() for note in noted(why, others[kind])),
             partial(_samples, path),
-            missing="numeric channel with a time",
+            "numeric channel with a time",
         )
 
 

@@ -23,6 +23,7 @@ from models.logs.log import (
     few,
     one_run,
     some,
+    unique,
 )
 from models.logs.spelling import unit_in_name, without_unit
 from models.logs.stamps import (
@@ -233,14 +234,9 @@ class TableLog:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of all columns, each once: the second "v" is "v (2)"."""
-        seen: dict[str, int] = {}
-        unique: list[str] = []
-        for k, name in enumerate(self._columns.names):
-            name = name or f"column {k + 1}"
-            seen[name] = seen.get(name, 0) + 1
-            unique.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
-        return tuple(unique)
+        """Names of all columns, each once."""
+        columns = enumerate(self._columns.names, start=1)
+        return unique(name or f"column {k}" for k, name in columns)
 
     @cached_property
     def clock(self) -> Clock | None:
