@@ -108,9 +108,8 @@ _LAST = "beschleunigung|beschl|geschwindigkeit|geschw|rate|winkel|moment|kraft"
 _COMPOUND = re.compile(f"(?:{_FIRST})+(?:{_LAST})+")
 _PARTS = re.compile(f"{_FIRST}|{_LAST}")
 # CarSim says left or right and the number of the axle: "Steer_L1", "Fy_R2".
-_SIDE_AND_AXLE = re.compile(r"(?<![A-Za-z0-9])[LR][12](?![A-Za-z0-9])")
+_SIDE_AND_AXLE = re.compile(r"(?<![A-Za-z0-9])([LR])([12])(?![A-Za-z0-9])")
 _SPIN = re.compile(r"(?<![A-Za-z])AV[xyz](?![A-Za-z])")  # and "AVy_L1" of the spin of a wheel
-_CORNER_OF_AXLE = {"L1": " fl ", "R1": " fr ", "L2": " rl ", "R2": " rr "}
 _GENERIC = ("data", "value")  # a field that says nothing, as of std_msgs: its topic is its name
 _UMLAUTS = str.maketrans(_TABLES["letters"])
 
@@ -207,7 +206,7 @@ def _words_of(name: str) -> tuple[str, ...]:
     plain = re.sub(r"\(([xyzXYZ])\)", r" \1 ", plain)  # "G(x)"
     plain = re.sub(r"\[[^]]*\]|\([^)]*\)", " ", plain)  # a unit in brackets
     plain = _SPIN.sub(lambda found: f" {found[0].lower()} ", plain)
-    plain = _SIDE_AND_AXLE.sub(lambda found: _CORNER_OF_AXLE[found[0]], plain)
+    plain = _SIDE_AND_AXLE.sub(lambda found: f" {' fr'[int(found[2])]}{found[1].lower()} ", plain)
     plain = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", plain)
     plain = re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1 \2", plain)
     return tuple(re.findall(r"[a-z]+|\d+", plain.lower().translate(_UMLAUTS)))
@@ -305,8 +304,7 @@ def propose(
             continue
         hand, least = _rank(ranked[0])[0], ranked[0].confidence - _APART
         equal = [one for one in ranked if one.confidence > least and _rank(one)[0] == hand]
-        if len(equal) > 1:
-            equal.sort(key=lambda one: -_rate(seen[one.channel[0]]))
+        equal.sort(key=lambda one: -_rate(seen[one.channel[0]]))
         guesses[name] = equal[0]
         others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
         if others:
@@ -370,18 +368,19 @@ def _pose(
     why = why or ("" if sign else "seen from above or, *-1, from below?")
     sure = HINT if why else _KNOWN
     lost = _NO_UNIT_LOSS if measured[0] and not is_given(some["x"].unit) else 0.0
-    turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
-    turned = [some["h"].name] if "h" in some else turned[-2:] if len(turned) < 4 else turned
-    angle = some["h"].unit if "h" in some else ""
+    turned = [
+        some[key] for key in (("h",) if "h" in some else ("qx", "qy", "qz", "qw")) if key in some
+    ]
+    turned = turned if len(turned) == 4 else turned[-2:]
     return {
         name: Guess(
-            channel=tuple(listed), confidence=sure - lost, unit=unit.strip(), factor=factor, why=why
+            channel=tuple(one.name for one in listed),
+            confidence=sure - lost,
+            unit=listed[0].unit.strip() * (len(listed) == 1),
+            factor=(sign or 1.0) if name == "y" else 1.0,
+            why=why,
         )
-        for name, listed, unit, factor in (
-            ("x", [some["x"].name], some["x"].unit, 1.0),
-            ("y", [some["y"].name], some["y"].unit, sign or 1.0),
-            ("heading", turned, angle, 1.0),
-        )
+        for name, listed in (("x", [some["x"]]), ("y", [some["y"]]), ("heading", turned))
     }
 
 
@@ -389,11 +388,11 @@ def _with_signs(
     candidates: Mapping[str, list[Guess]], headings: Sequence[Heading], seen: Mapping[str, Channel]
 ) -> dict[str, list[Guess]]:
     """Return the guesses; amounts with the channel of their sign, which is called as they are."""
-    signs: dict[frozenset[str], str] = {}
-    for one in headings:
-        words = frozenset(_words_of(one.name))
-        if words & _SIGN and not is_given(one.unit):
-            signs[words - _SIGN] = one.name
+    signs = {
+        words - _SIGN: one.name
+        for one in headings
+        if (words := frozenset(_words_of(one.name))) & _SIGN and not is_given(one.unit)
+    }
 
     def completed(guess: Guess) -> Guess:
         sign = signs.get(frozenset(_words_of(guess.channel[0])), "")
@@ -440,10 +439,15 @@ def _along_axes(
     return mended
 
 
+def _surest(found: Sequence[Guess]) -> list[Guess]:
+    """Return the surest guess; none where there is hardly any."""
+    best = sorted(found, key=lambda one: -one.confidence)[:1]
+    return [one for one in best if one.confidence > STILL]
+
+
 def _likeliest(found: Sequence[Guess]) -> str:
     """Return the channel of the surest guess; "" where there is none."""
-    likely = max(found, key=lambda one: one.confidence, default=None)
-    return likely.channel[0] if likely and likely.confidence > STILL else ""
+    return next((one.channel[0] for one in _surest(found)), "")
 
 
 def _rank(guess: Guess) -> tuple[bool, float]:
@@ -501,8 +505,7 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
         if signal == "v_x" and quantities(one.name) == (SPEED,) and one.name.lower() != "fps":
             by_name = max(by_name, _VAGUE)  # its unit is its name
         by_hand = max(_name_confidence(_HAND, name) for name in names) * (signal == "delta_f")
-        best = max(by_name, by_hand)
-        if best > 0.0:
+        if best := max(by_name, by_hand):
             guess = Guess(channel=(one.name,), confidence=best, hand=by_hand > by_name)
             guess = _with_unit(signal, one, guess)
             if other and max(_name_confidence(key, bare) for key in (signal, _HAND)):
@@ -585,8 +588,7 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
         finite = values[np.isfinite(values)]
         finite = finite[:: max(1, finite.size // _LOOKED_AT)]
         if not finite.size or (signal != "delta_r" and np.ptp(finite) == 0.0):
-            left = STILL if guess.confidence < _STANDARD else 1.0
-            left *= guess.confidence
+            left = guess.confidence * (STILL if guess.confidence < _STANDARD else 1.0)
             return replace(_said(guess, "it never changes"), confidence=left)
         size = max(size, float(np.abs(finite).max()))
         usual = max(usual, _usual(finite))
@@ -637,17 +639,10 @@ def _beside_turning(
 
     Where they cannot be set beside each other, how far a_y goes tells whether it is in g.
     """
-    best = {
-        name: max(likely, key=lambda one: one.confidence)
-        for name in ("v_x", "r", "a_y")
-        if (likely := [one for one in candidates[name] if one.confidence > STILL])
-    }
+    best = {name: one for name in ("v_x", "r", "a_y") for one in _surest(candidates[name])}
     mended = dict(candidates)
     if {"v_x", "r"} <= set(best):
-        mended["delta_f"] = [
-            _levered(one, best, seen) if one.confidence > STILL else one
-            for one in candidates["delta_f"]
-        ]
+        mended["delta_f"] = [_levered(one, best, seen) for one in candidates["delta_f"]]
     for name in _ASSUMED:
         mended[name] = [
             guess
@@ -671,12 +666,14 @@ def _levered(guess: Guess, best: Mapping[str, Guess], seen: Mapping[str, Channel
 
     v_x δ / r is the wheelbase, and more of a car that understeers.
     """
+    if guess.hand or guess.confidence <= STILL:
+        return guess
     there = {"v_x": best["v_x"], "r": best["r"], "delta_f": guess}
     v, r, delta = (
         _root_mean_square(seen[one.channel[0]].values) * to_si(one.unit, QUANTITIES[name], name)
         for name, one in there.items()
     )
-    if guess.hand or not v * delta > _LONGEST * r > 0.0:
+    if not v * delta > _LONGEST * r > 0.0:
         return guess
     return replace(_said(guess, "too far for how the car turns"), hand=True)
 
