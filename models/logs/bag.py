@@ -7,6 +7,7 @@ counts from the first message that is read of any topic.
 
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -216,14 +217,13 @@ def _topics(
 ) -> tuple[list[_Topic], dict[str, float], dict[str, str]]:
     """Return the topics with numbers, by name their rates [Hz], and why others have none."""
     rates: dict[str, float] = {}
-    counts: dict[tuple[str, str], int] = {}
+    counts: Counter[tuple[str, str]] = Counter()
     skipped: dict[str, str] = {}
     for connection in bag.connections:
-        if connection.ext.serialization_format != "cdr":
-            skipped[connection.topic] = f"is not CDR but {connection.ext.serialization_format}"
-            continue
-        key = connection.topic, connection.msgtype
-        counts[key] = counts.get(key, 0) + int(connection.msgcount)
+        if (form := connection.ext.serialization_format) != "cdr":
+            skipped[connection.topic] = f"is not CDR but {form}"
+        else:
+            counts[connection.topic, connection.msgtype] += int(connection.msgcount)
     found: list[tuple[_Topic, int]] = []
     for (name, kind), count in counts.items():
         if count < 1:

@@ -232,8 +232,7 @@ def _of_table(path: Path) -> Iterator[_Frame]:
             what: next((header.index(one) for one in names.split() if one in header), -1)
             for what, names in _COLUMNS.items()
         }
-        if min(at["time"], at["id"], at["data"]) < 0:
-            lacking = ", ".join(what for what in ("time", "id", "data") if at[what] < 0)
+        if lacking := ", ".join(what for what in ("time", "id", "data") if at[what] < 0):
             raise RecordingError(f"{path}: a table of frames must have a column for {lacking}")
         many = header[at["data"]] in ("d0", "d1")  # a byte a column
         decimal = header[at["id"]] in ("addr", "address")
