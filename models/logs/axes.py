@@ -15,7 +15,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.logs.log import Channel
-from models.logs.units import ACCELERATION, FACTORS, RATE, SPEED, is_given, quantities
+from models.logs.units import ACCELERATION, FACTORS, RATE, SPEED, TABLES, is_given, quantities
 
 _STEP = 0.1  # [s] between instants
 _WINDOW = 0.3  # [s] over which means are taken there
@@ -29,11 +29,7 @@ _TILT = 0.4  # share of it along another axis from which a box lies oblique
 
 _LETTERS = "xyz"
 _GRAVITY = FACTORS[ACCELERATION]["g"]
-_STEMS = {  # what stands before a letter in one word, or beside it, by quantity
-    SPEED: "v vel velocity speed",
-    ACCELERATION: "a acc accel acceleration accelerometer g gforce",
-    RATE: "w gyro gyr gyroscope omega rot rotation rate angular angularvelocity av angrate ang",
-}
+_STEMS = {quantity: set(some.split()) for quantity, some in TABLES["stems"].items()}
 
 
 class Triad(NamedTuple):
@@ -76,7 +72,7 @@ def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list
         letter, rest = split
         likely = quantities(units[name])
         if not is_given(units[name]):
-            likely = tuple(one for one, some in _STEMS.items() if set(rest) & set(some.split()))
+            likely = tuple(one for one, some in _STEMS.items() if some & set(rest))
         quantity = next((one for one in (RATE, ACCELERATION, SPEED) if one in likely), "")
         if quantity:
             found.setdefault(rest, {}).setdefault(letter, name)
@@ -92,7 +88,7 @@ def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list
 
 def _letter(listed: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
     """Return the letter of an axis in a name, and its words without; None where it has none."""
-    stems = {word for some in _STEMS.values() for word in some.split()}
+    stems = set[str]().union(*_STEMS.values())
     for k in range(len(listed) - 1, -1, -1):
         word = listed[k]
         if word in _LETTERS or (word[-1] in _LETTERS and word[:-1] in stems):

@@ -422,9 +422,9 @@ def _channels(given: _Dbc, message: Any, frames: _Frames) -> Iterator[tuple[List
     for signal in message.signals:
         selectors = _selectors(message, signal)
         key = tuple((one.name, ids) for one, ids in selectors)
-        faults = [given.faults.get((message.name, one.name), "") for one, _ in selectors]
-        if any(faults):
-            raise RecordingError(next(filter(None, faults)))
+        for one, _ in selectors:
+            if fault := given.faults.get((message.name, one.name)):
+                raise RecordingError(fault)
         if key not in groups:
             sent = _sent(frames, selectors)
             t = frames.t if sent is None else frames.t[sent]

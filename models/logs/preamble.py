@@ -499,7 +499,7 @@ def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
 
 # Racelogic VBOX: [header], [channel units], [column names], [data], each a section.
 
-_OF_THE_BOX = TABLES["header"]["box"].split()
+_OF_THE_BOX = TABLES["header"]["box"]  # columns, with the units that they have there
 
 
 def _sections(lines: list[str]) -> dict[str, int] | None:
@@ -527,11 +527,8 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
             units = [word if is_unit(word) else "" for word in last]
     if "channel units" in at:
         units = _with_channel_units(lines, at, names, units)
-    known = {"time": "hhmmss", "velocity": "km/h", "lat": "min", "long": "min", "heading": "deg"}
-    units = [
-        known[name.lower()] if name.lower() == "time" else unit or known.get(name.lower(), "")
-        for name, unit in zip(names, units, strict=True)
-    ]
+    told = (_OF_THE_BOX.get(name.lower(), "") for name in names)
+    units = [one if one == "hhmmss" else unit or one for one, unit in zip(told, units, strict=True)]
     first = at["data"] + 1
     data = [cells for line in lines[first:] if len(cells := cells_of(line, BLANKS)) == len(names)]
     way = _way([line for line in lines[first:] if line.strip()][-_TAIL:])

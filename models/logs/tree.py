@@ -136,17 +136,12 @@ class _Walk:
             label = _text(node, _NAME) or path
             self.leaf(data, label, _unit(node), clocks, columns)
             return
-        units = _pick(node, _UNIT)
-        known = units if isinstance(units, dict) else {}
         for key, child in node.items():
             name = f"{path}.{key}" if path else key
-            if isinstance(child, Leaf):
-                if not any(child is leaf for leaf in clock_leaves):
-                    unit = known.get(key)
-                    unit = unit if isinstance(unit, str) else ""
-                    self.leaf(child, name, unit, clocks, columns)
-            else:
+            if not isinstance(child, Leaf):
                 self.other(child, name, clocks)
+            elif not any(child is leaf for leaf in clock_leaves):
+                self.leaf(child, name, _unit_of_field(node, key), clocks, columns)
 
     def other(self, node: Tree, path: str, clocks: tuple[Clock, ...]) -> None:
         if isinstance(node, Leaf):
@@ -219,17 +214,13 @@ def line_of(values: Array, signal: Signal) -> Array:
 
 def _clocks_of(node: dict[str, Tree], path: str) -> Iterator[Clock]:
     for key, child in node.items():
-        unit = _unit_of_clock(key)
-        name = f"{path}.{key}" if path else key
-        if unit is not None and isinstance(child, dict):
-            inner = _pick(child, _DATA)
-            unit, child = _unit(child) or unit, inner if inner is not None else child
-        if unit is not None and isinstance(child, Leaf) and 1 in child.shape:
-            units = _pick(node, _UNIT)
-            if isinstance(units, dict) and isinstance(given := units.get(key), str):
-                unit = given
-            if max(child.shape) > 1:
-                yield Clock(name, child, None, unit)
+        if (unit := _unit_of_clock(key)) is None:
+            continue
+        if isinstance(child, dict):
+            unit, child = _unit(child) or unit, _pick(child, _DATA) or child
+        if isinstance(child, Leaf) and 1 in child.shape and max(child.shape) > 1:
+            name = f"{path}.{key}" if path else key
+            yield Clock(name, child, None, _unit_of_field(node, key) or unit)
     x, y = node.get("X"), node.get("Y")  # of dSPACE: the clock is X, the signals are Y(k)
     if isinstance(x, dict) and isinstance(y, dict | list):
         data = _pick(x, _DATA)
@@ -282,6 +273,12 @@ def _unit(node: dict[str, Tree]) -> str:
     """Return the unit of a struct that is a signal; a timeseries has it in DataInfo."""
     about = _pick(node, ("datainfo",))
     return _text(node, _UNIT) or (_text(about, _UNIT) if isinstance(about, dict) else "")
+
+
+def _unit_of_field(node: dict[str, Tree], key: str) -> str:
+    """Return the unit of a field of a struct that holds those of its fields."""
+    units = _pick(node, _UNIT)
+    return _text(units, (key.lower(),)) if isinstance(units, dict) else ""
 
 
 def _columns(node: dict[str, Tree]) -> _Columns:
