@@ -33,6 +33,7 @@ from models.logs.log import Listed, RecordingError, few
 from models.logs.magic import HEAD, frames_in
 from models.logs.mdf import is_bus, opened
 from models.logs.stamps import nanoseconds, since, typical_rate
+from models.logs.units import TABLES
 from models.schema import LONGEST_NAME, read_bytes
 
 _FRAMES_AT_ONCE = 1 << 16  # frames that are gathered at a time
@@ -213,15 +214,6 @@ def _of_lines(path: Path) -> Iterator[_Frame]:
             yield _Frame(time, int(word, 16), data, found["bus"], len(word) > 3, False, remote)
 
 
-_COLUMNS = {  # of tables of frames, by what each is
-    "time": "timestamp time timestampus timestamps t",
-    "id": "id addr address messageid arbitrationid canid identifier",
-    "bus": "bus channel interface",
-    "long": "extended ext ide isextended",
-    "data": "data message payload d0 d1",
-}
-
-
 def _of_table(path: Path) -> Iterator[_Frame]:
     """Yield the frames of a table in text; identifiers and bytes are hexadecimal."""
     with path.open("r", encoding="utf-8-sig", errors="replace", newline="") as text:
@@ -230,7 +222,7 @@ def _of_table(path: Path) -> Iterator[_Frame]:
         header = [re.sub("[^a-z0-9]", "", one.lower()) for one in next(rows, [])]
         at = {
             what: next((header.index(one) for one in names.split() if one in header), -1)
-            for what, names in _COLUMNS.items()
+            for what, names in TABLES["frames"].items()
         }
         if lacking := ", ".join(what for what in ("time", "id", "data") if at[what] < 0):
             raise RecordingError(f"{path}: a table of frames must have a column for {lacking}")

@@ -24,9 +24,9 @@ _SEQUENCE = 4  # likewise: of any length
 ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
 # numpy's kind and bytes of what has a fixed size; no signals are what is given by a bool, or words.
 _NUMBERS = {
-    **{f"int{8 * size}": f"i{size}" for size in (1, 2, 4, 8)},
-    **{f"uint{8 * size}": f"u{size}" for size in (1, 2, 4, 8)},
-    **{"float32": "f4", "float64": "f8"},
+    f"{word}{8 * size}": f"{word[0]}{size}"
+    for word, sizes in (("int", (1, 2, 4, 8)), ("uint", (1, 2, 4, 8)), ("float", (4, 8)))
+    for size in sizes
 }
 _SIZES = {name: int(kind[1]) for name, kind in _NUMBERS.items()} | {"bool": 1, "byte": 1, "char": 1}
 

@@ -395,9 +395,9 @@ def _with_signs(
     }
 
     def completed(guess: Guess) -> Guess:
-        sign = signs.get(frozenset(_words_of(guess.channel[0])), "")
-        values = seen[guess.channel[0]].values if sign and guess.channel[0] in seen else np.zeros(0)
-        if not values.size or np.nanmin(values) < 0.0:
+        name = guess.channel[0]
+        sign = signs.get(frozenset(_words_of(name)), "")
+        if not sign or name not in seen or np.nanmin(seen[name].values, initial=0.0) < 0.0:
             return guess
         return replace(_said(guess, f"its sign is in {sign!r}"), sign=sign)
 

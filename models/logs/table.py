@@ -390,21 +390,18 @@ class TableLog:
             )
             said = "channels have times of their own, each the one before it: "
             self._noted.append(said + ", ".join(titles))
-        channels = []
-        for name, k in zip(names, places, strict=True):
-            stamps = found[clocks[k]]
-            is_clock = k == column and not timed
-            channels.append(
-                Channel(
-                    name=name,
-                    unit=self._columns.units[k],
-                    t=stamps.t,
-                    values=stamps.t if is_clock else stamps.of(cells.columns[k]),
-                    place=self.table.place,
-                    rows=stamps.of(cells.rows),
-                )
+        return tuple(
+            Channel(
+                name=name,
+                unit=self._columns.units[k],
+                t=stamps.t,
+                values=stamps.of(cells.columns[k]) if timed or k != column else stamps.t,
+                place=self.table.place,
+                rows=stamps.of(cells.rows),
             )
-        return tuple(channels)
+            for name, k in zip(names, places, strict=True)
+            for stamps in [found[clocks[k]]]
+        )
 
     @cached_property
     def _places(self) -> dict[str, int]:

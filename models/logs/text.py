@@ -89,11 +89,9 @@ class TextTable:
         column : from 0.
         """
         layout = self.layout
-        cells = [row[column].replace(layout.thousands or "\0", "") for row in layout.rows]
-        cells = list(map(of_fortran, cells))
-        if layout.decimal == ",":
-            cells = [cell.replace(",", ".") for cell in cells]
-        return ["" if cell.lower() in MISSING else cell for cell in cells]
+        apart, comma = layout.thousands or "\0", layout.decimal.replace(".", "\0")
+        cells = (row[column].replace(apart, "").replace(comma, ".") for row in layout.rows)
+        return ["" if cell.lower() in MISSING else of_fortran(cell) for cell in cells]
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns.
