@@ -57,6 +57,8 @@ _LONGEST = 17.5  # [m]: wheelbase, with understeer at speed, that v_x δ / r can
 _FASTEST = 430.0  # [km/h]
 _SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
+_Seen = Mapping[str, Channel]  # channels as they were read, by name
+
 _HAND = "steering wheel"  # an angle that wants a ratio
 # Units that are met where none is given, "" SI.
 _ASSUMED = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
@@ -119,6 +121,7 @@ _PLACES = {
     name: [frozenset(way.split()) for way in _WHEELS[name].split(",")] for name in WHEELS[:-1]
 }
 _ANYWHERE = frozenset(word for ways in _PLACES.values() for way in ways for word in way)
+_PLACES[WHEELS[-1]] = [frozenset()]
 _WHEEL, _TURNING, _SPEEDS, _BOTH, _ENCODER, _OTHERS = (
     frozenset(_WHEELS[name].split())
     for name in ("wheel", "turns", "speeds", "both", "encoder", "others")
@@ -134,17 +137,12 @@ def _wheel_words(signal: str, words: Sequence[str]) -> bool:
     listed = frozenset(parts)
     if listed & _OTHERS:
         return False
-    if signal == WHEELS[-1]:
-        turns = listed & _ENCODER or (listed & _WHEEL and listed & _TURNING) or listed == {signal}
-        return bool(turns and not listed & _ANYWHERE)
     for place in _PLACES[signal]:
         rest = listed - place
         if listed >= place and not rest & _ANYWHERE:
-            return bool(
-                rest & _BOTH
-                or (rest & _WHEEL and (rest & _TURNING or rest <= _WHEEL))
-                or (rest <= _SPEEDS and rest)
-            )
+            alone = (rest <= _WHEEL or rest <= _SPEEDS) if place else rest == {signal}
+            turns = rest & (_BOTH if place else _ENCODER) or (rest & _WHEEL and rest & _TURNING)
+            return bool(turns or (rest and alone))
     return False
 
 
@@ -337,9 +335,7 @@ def poses(headings: Sequence[Heading]) -> dict[str, dict[str, list[Heading]]]:
     return groups
 
 
-def _pose(
-    headings: Sequence[Heading], seen: Mapping[str, Channel], steering: str
-) -> dict[str, Guess]:
+def _pose(headings: Sequence[Heading], seen: _Seen, steering: str) -> dict[str, Guess]:
     """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure.
 
     Of a world with y up z is y, turned as the steering does.
@@ -385,7 +381,7 @@ def _pose(
 
 
 def _with_signs(
-    candidates: Mapping[str, list[Guess]], headings: Sequence[Heading], seen: Mapping[str, Channel]
+    candidates: Mapping[str, list[Guess]], headings: Sequence[Heading], seen: _Seen
 ) -> dict[str, list[Guess]]:
     """Return the guesses; amounts with the channel of their sign, which is called as they are."""
     signs = {
@@ -408,7 +404,7 @@ def _along_axes(
     candidates: Mapping[str, list[Guess]],
     boxes: Sequence[Triad],
     units: Mapping[str, str],
-    seen: Mapping[str, Channel],
+    seen: _Seen,
 ) -> dict[str, list[Guess]]:
     """Return the guesses; of boxes whose letters mislead those that their numbers tell."""
     if not boxes:
@@ -455,7 +451,7 @@ def _rank(guess: Guess) -> tuple[bool, float]:
     return guess.hand or guess.confidence < _NAMES_WORDS, -guess.confidence
 
 
-def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -> bool:
+def _are_one(name: str, one: Guess, other: Guess, seen: _Seen) -> bool:
     """Return whether two guesses are one channel, as SPEED_KPH and SPEED_MPH: name and numbers."""
     if len(one.channel) + len(other.channel) > 2 or _is_given(one) != _is_given(other):
         return False
@@ -579,7 +575,7 @@ def _said(guess: Guess, why: str) -> Guess:
     return replace(guess, why="; ".join(part for part in (why, guess.why) if part))
 
 
-def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
+def _looked(signal: str, guess: Guess, seen: _Seen) -> Guess:
     size = usual = 0.0
     for name in guess.channel:
         if name not in seen:
@@ -632,9 +628,7 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
     return _said(replace(guess, unit=unit), f"{far} {unit}")
 
 
-def _beside_turning(
-    candidates: Mapping[str, list[Guess]], seen: Mapping[str, Channel]
-) -> dict[str, list[Guess]]:
+def _beside_turning(candidates: Mapping[str, list[Guess]], seen: _Seen) -> dict[str, list[Guess]]:
     """Return the guesses; those without a unit in the one with which a_y is nearest to v_x r.
 
     Where they cannot be set beside each other, how far a_y goes tells whether it is in g.
@@ -661,7 +655,7 @@ def _beside_turning(
     return mended
 
 
-def _levered(guess: Guess, best: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
+def _levered(guess: Guess, best: Mapping[str, Guess], seen: _Seen) -> Guess:
     """Return a guess of the steering, of the hand wheel where it turns too far for the car's bend.
 
     v_x δ / r is the wheelbase, and more of a car that understeers.
@@ -683,7 +677,7 @@ def _is_given(guess: Guess) -> bool:
     return bool(guess.unit) or guess.confidence == _STANDARD
 
 
-def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
+def _in_turning(name: str, there: Mapping[str, Guess], seen: _Seen) -> Guess:
     """Return the guess of one of them in the unit that v_x, r and a_y together have."""
     guess = there[name]
     sizes = {one: _root_mean_square(seen[there[one].channel[0]].values) for one in there}

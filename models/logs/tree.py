@@ -45,6 +45,7 @@ class Unread:
 
 
 Tree = Leaf | Unread | str | list["Tree"] | dict[str, "Tree"]
+_Struct = dict[str, Tree]
 
 
 class Clock(NamedTuple):
@@ -124,7 +125,7 @@ class _Walk:
         self.unread: list[str] = []
         self.rate = 0.0
 
-    def struct(self, node: dict[str, Tree], path: str, clocks: tuple[Clock, ...]) -> None:
+    def struct(self, node: _Struct, path: str, clocks: tuple[Clock, ...]) -> None:
         """Collect the channels of a struct; clocks: of the structs around it, the nearest first."""
         clocks = (*_clocks_of(node, path), *clocks)
         clock_leaves = [clock.leaf for clock in clocks]
@@ -212,7 +213,7 @@ def line_of(values: Array, signal: Signal) -> Array:
     return np.array(line, dtype=np.float64)
 
 
-def _clocks_of(node: dict[str, Tree], path: str) -> Iterator[Clock]:
+def _clocks_of(node: _Struct, path: str) -> Iterator[Clock]:
     for key, child in node.items():
         if (unit := _unit_of_clock(key)) is None:
             continue
@@ -247,13 +248,13 @@ def _clock_inside(leaf: Leaf, name: str) -> Clock | None:
     return clock if bool(np.all(steps > 0.0)) and not counts else None
 
 
-def _pick(node: dict[str, Tree], names: Sequence[str]) -> Tree | None:
+def _pick(node: _Struct, names: Sequence[str]) -> Tree | None:
     """Return the first of a struct's fields that has one of these names, whatever its case."""
     lower = {key.lower(): child for key, child in reversed(list(node.items()))}
     return next((lower[name] for name in names if name in lower), None)
 
 
-def _several(node: dict[str, Tree]) -> bool:
+def _several(node: _Struct) -> bool:
     """Whether a struct holds other vectors than one signal and its time."""
     return any(
         isinstance(child, Leaf)
@@ -264,24 +265,24 @@ def _several(node: dict[str, Tree]) -> bool:
     )
 
 
-def _text(node: dict[str, Tree], names: Sequence[str]) -> str:
+def _text(node: _Struct, names: Sequence[str]) -> str:
     found = _pick(node, names)
     return found.strip() if isinstance(found, str) else ""
 
 
-def _unit(node: dict[str, Tree]) -> str:
+def _unit(node: _Struct) -> str:
     """Return the unit of a struct that is a signal; a timeseries has it in DataInfo."""
     about = _pick(node, ("datainfo",))
     return _text(node, _UNIT) or (_text(about, _UNIT) if isinstance(about, dict) else "")
 
 
-def _unit_of_field(node: dict[str, Tree], key: str) -> str:
+def _unit_of_field(node: _Struct, key: str) -> str:
     """Return the unit of a field of a struct that holds those of its fields."""
     units = _pick(node, _UNIT)
     return _text(units, (key.lower(),)) if isinstance(units, dict) else ""
 
 
-def _columns(node: dict[str, Tree]) -> _Columns:
+def _columns(node: _Struct) -> _Columns:
     """Return the names and units that a struct tells of the columns of its matrix."""
 
     def words(names: Sequence[str]) -> list[str]:

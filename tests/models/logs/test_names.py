@@ -346,7 +346,7 @@ def test_a_filtered_duplicate_stands_back_for_what_was_filtered():
 def test_a_word_and_a_unit_of_what_no_rule_knows_are_named_and_never_taken():
     named = {"v_y": ("Seitwärts", "km/h"), "beta": ("Slip", "deg"), "r": ("Yaw", "deg/s"),
              "delta_f": ("SteerXyz", "deg")}  # fmt: skip
-    found = proposed(*((*one, 20 * WAVE) for one in named.values()))
+    found = proposed(*((*one, 90 * WAVE) for one in named.values()))
     for signal, (name, _) in named.items():
         assert found.guesses[signal].channel == (name,) and not found.is_sure(signal)
         assert found.guesses[signal].confidence < SURE
