@@ -90,17 +90,15 @@ def open_(path: Path) -> GroupedLog[_Place]:
     first = min((int(one.t[0]) for one in moving), default=0)
     zero = min((topic.zero for topic in topics if topic.stamp), default=first)
     found: list[tuple[str, Listed, _Place]] = [
-        (_TF, Listed(name=f"{one.name}/{field}", unit="m" * (k < 3), samples=one.t.size,
-                    rate=typical_rate((one.t - one.t[0]) / _NS)), (one, k))
+        (_TF, Listed(f"{one.name}/{field}", "m" * (k < 3), one.t.size,
+                    typical_rate((one.t - one.t[0]) / _NS)), (one, k))
         for one in moving
         for k, field in enumerate(_OF_TF)
     ]  # fmt: skip
     for topic in topics:
         for field in topic.fields:
             name = f"{topic.name}/{field.path}"
-            listed = Listed(
-                name=name, unit=_unit(field), samples=topic.messages, rate=rates[topic.name]
-            )
+            listed = Listed(name, _unit(field), topic.messages, rates[topic.name])
             found.append((topic.kind, listed, (topic, field)))
     received = [topic.name for topic in topics if topic.stamp is None]
     return GroupedLog(

@@ -424,10 +424,10 @@ def _channels(given: _Dbc, message: Any, frames: _Frames) -> Iterator[tuple[List
         group = groups[key]
         if group.t.size:
             listed = Listed(
-                name=f"{message.name}.{signal.name}",
-                unit=(signal.unit or "").strip()[:LONGEST_NAME],
-                samples=group.t.size,
-                rate=typical_rate(group.t),
+                f"{message.name}.{signal.name}",
+                (signal.unit or "").strip()[:LONGEST_NAME],
+                group.t.size,
+                typical_rate(group.t),
             )
             yield listed, (group, signal, given.faults.get((message.name, signal.name), ""))
 

@@ -96,7 +96,7 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
                 "export it in one"
             )
         rate = typical_rate(t[rows])
-        found.append(("", Listed(name=word, unit=given[0], samples=rows.size, rate=rate), rows))
+        found.append(("", Listed(word, given[0], rows.size, rate), rows))
     said = (f"a row for each value: {names[name]} names it; time is {clock.words}",)
     values = cells.columns[value]
 

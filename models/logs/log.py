@@ -58,7 +58,7 @@ class Clock(NamedTuple):
     words: str
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Listed:
     """A channel as a file lists it.
     name : as in the file, unique in it; a message's field has its topic before it.

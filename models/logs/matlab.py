@@ -53,7 +53,7 @@ def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
     channels = []
     for one in found.signals:
         struct, rate = one.clock.name.rpartition(".")[0] or "top", rates[one.clock]
-        listed = Listed(name=one.name, unit=one.unit, samples=one.samples, rate=rate)
+        listed = Listed(one.name, one.unit, one.samples, rate)
         channels.append((struct, listed, one))
     return GroupedLog(
         path,

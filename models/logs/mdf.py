@@ -123,7 +123,7 @@ def open_(path: Path) -> GroupedLog[_Place]:
                     others[kind].append(str(channel.name))
                     continue
                 unit = str(file.get_channel_unit(group=number, index=index) or "").strip()
-                listed = Listed(name=str(channel.name), unit=unit, samples=samples, rate=rate)
+                listed = Listed(str(channel.name), unit, samples, rate)
                 found.append((name, listed, _Place(number, index)))
         return GroupedLog(
             path,

@@ -334,10 +334,10 @@ class TableLog:
             clock = self._channel_clocks.get(k, self.clock)
             listed.append(
                 Listed(
-                    name=heading.name,
-                    unit=heading.unit,
-                    samples=stamps[clock.column].size if clock and self._channel_clocks else size,
-                    rate=(rates[clock.column] if clock else self._even or math.nan) * filled,
+                    heading.name,
+                    heading.unit,
+                    stamps[clock.column].size if clock and self._channel_clocks else size,
+                    (rates[clock.column] if clock else self._even or math.nan) * filled,
                 )
             )
         return tuple(listed)
