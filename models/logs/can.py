@@ -41,7 +41,8 @@ _SHORT = 0x7FF  # largest identifier of 11 bits
 _IDENTIFIER = (1 << 29) - 1  # mask of the 29 bits of the longest identifier
 _INFLATION = 1032  # most bytes that deflate makes of one
 _CONTAINER = 10  # kind of an object of a BLF that holds others
-_DEFLATED = 2  # way in which one is packed that is read: by zlib
+_DEFLATED = b"\2\0"  # begins one that is packed by zlib
+_METHOD = 16  # bytes of a container that say how it is packed, before its data
 _FROM_ALL = 0xFE  # address that a database of J1939 gives where any may send
 _FLOATS = (16, 32, 64)  # bits of a signal that is a float
 _LONGEST_SIGNAL = 64  # bits
@@ -52,7 +53,6 @@ _FRAME = "CAN_DataFrame"  # of MDF
 _NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
 _EXTENDED = 1 << 31  # marks an identifier of 29 bits
 _OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
-_METHOD = struct.Struct("<H14x")  # of a container, before its data
 _FILE_SIZE = struct.Struct("<Q")  # of BLF, at byte 16 of its header
 
 _Key = tuple[str, int]  # bus, identifier with _EXTENDED
@@ -266,11 +266,10 @@ def _require_whole_blf(path: Path) -> None:
             body = length - _OBJECT.size
             if kind == _CONTAINER and body * _INFLATION > most:
                 data = file.read(body)
-                size_of = len(data) - _METHOD.size
-                if size_of > 0 and _METHOD.unpack_from(data)[0] == _DEFLATED:
-                    unpacked = zlib.decompressobj().decompress(data[_METHOD.size :], int(most) + 1)
-                    size_of = len(unpacked)
-                few(path, size_of / 1e6, "block", "megabytes of a block")
+                unpacked = data[_METHOD:]
+                if data.startswith(_DEFLATED):
+                    unpacked = zlib.decompressobj().decompress(unpacked, int(most) + 1)
+                few(path, len(unpacked) / 1e6, "block", "megabytes of a block")
                 body = 0
             file.seek(body + length % 4, 1)
 

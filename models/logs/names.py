@@ -193,7 +193,8 @@ class Proposal:
             kept = [name for name in kept if name not in forces]
         return {
             name: Signal(channel=one.channel, unit=one.unit, sign=one.sign, factor=one.factor)
-            for name, one in ((name, self.guesses[name]) for name in kept)
+            for name in kept
+            for one in [self.guesses[name]]
         }
 
 
@@ -462,11 +463,9 @@ def _are_one(name: str, one: Guess, other: Guess, seen: _Seen) -> bool:
     good, there = np.isfinite(first.values), np.isfinite(second.values)
     if not good.any() or not there.any():
         return False
-    scales = (to_si(guess.unit, quantity_of(name, guess.unit), name) for guess in (one, other))
-    beside = np.interp(first.t[good], second.t[there], second.values[there])
-    here, beside = (
-        x * scale for x, scale in zip((first.values[good], beside), scales, strict=True)
-    )
+    scales = [to_si(guess.unit, quantity_of(name, guess.unit), name) for guess in (one, other)]
+    here = scales[0] * first.values[good]
+    beside = scales[1] * np.interp(first.t[good], second.t[there], second.values[there])
     return _root_mean_square(here - beside) <= _SAME * _root_mean_square(here)
 
 
@@ -534,8 +533,8 @@ def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
     near = quantity == RATE and ANGLE in plausible  # as some databases have it
     return replace(
         guess,
-        unit=f"{unit}/s" if near else "",
-        confidence=0.5 * guess.confidence if near else 0.0,
+        unit=f"{unit}/s" * near,
+        confidence=0.5 * guess.confidence * near,
         why=f"its unit {unit} is none of a {quantity}",
     )
 
@@ -596,12 +595,11 @@ def _looked(signal: str, guess: Guess, seen: _Seen) -> Guess:
         usual *= to_si(guess.unit, RATE, signal)  # wheels and shafts turn faster than any car
         if unit_of_range(RATE, usual):
             return replace(_said(guess, f"goes to {usual:.3g} rad/s"), confidence=0.0)
-    if QUANTITIES[signal] != ANGLE:
-        return guess
-    largest = size * to_si(guess.unit, ANGLE, signal)
-    if signal != BETA and largest > _LARGEST_ROAD and not guess.hand:
-        why = f"goes to {math.degrees(largest):.0f} deg, as a hand wheel does"
-        return replace(_said(guess, why), hand=True)
+    if QUANTITIES[signal] == ANGLE and signal != BETA and not guess.hand:
+        largest = size * to_si(guess.unit, ANGLE, signal)
+        if largest > _LARGEST_ROAD:
+            why = f"goes to {math.degrees(largest):.0f} deg, as a hand wheel does"
+            return replace(_said(guess, why), hand=True)
     return guess
 
 
@@ -620,8 +618,7 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
     if unit == "km/h" and usual > _FASTEST:
         guess = replace(_said(guess, "in tenths, as no car is so fast"), factor=0.1)
     if unit and quantity == ANGLE and signal != BETA and not guess.hand:
-        hand = usual * to_si(unit, quantity, signal) > _LARGEST_ROAD
-        guess = replace(guess, hand=hand)
+        guess = replace(guess, hand=usual * to_si(unit, quantity, signal) > _LARGEST_ROAD)
     if not unit:
         return _said(guess, f"goes to {size:.3g}") if quantity in (ANGLE, SPEED) else guess
     far = f"goes to {size:.3g}, " + ("as a hand wheel does in" if guess.hand else "so in")
