@@ -201,9 +201,7 @@ def _definitions(path: Path, bag: Any) -> tuple[Definitions, dict[str, str]]:
                 result.update(typesys.get_types_from_msg(text, connection.msgtype))
             elif form == "IDL":
                 for part in text.split("=" * 80 + "\n"):
-                    _, _, body = (
-                        part.partition("\n") if part.startswith("IDL: ") else ("", "", part)
-                    )
+                    body = part.partition("\n")[2] if part.startswith("IDL: ") else part
                     result.update(typesys.get_types_from_idl(body) if body.strip() else {})
         except Exception:  # a grammar that fails on what anybody wrote
             bad[connection.topic] = "its definition cannot be parsed"

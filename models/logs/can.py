@@ -104,7 +104,7 @@ _Log = tuple[dict[_Key, _Frames], Counter[str]]  # and how many others it has, b
 
 def _gather(path: Path, kind: str, given: _Dbc) -> _Log:
     found: dict[_Key, tuple[Growing, Growing]] = {}
-    others: Counter[str] = Counter()
+    others: Counter[str] = Counter({"unknown": 0, "cut short": 0})
     count = 0
     for bus, identifier, t, sizes, data in (
         _of_mdf(path, others) if kind == "MDF4" else _of_messages(path, kind, others)

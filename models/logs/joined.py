@@ -52,12 +52,10 @@ def _of_files(requested: Sequence[tuple[Listed, Any]]) -> list[Samples]:
     for some_ in files.values():
         log, start = some_[0][1][0], some_[0][1][2]
         channels = log.read([name for _, (_, name, _) in some_])
-        by_clock: dict[int, dict[str, Any]] = {}
+        by_clock: dict[int, tuple[Any, dict[str, Any]]] = {}
         for (name, _), channel in zip(some_, channels, strict=True):
-            by_clock.setdefault(id(channel.t), {})[name] = channel
-        for group in by_clock.values():
-            t = next(iter(group.values())).t + start
-            found.append(Samples(log.path.name, t, {k: one.values for k, one in group.items()}))
+            by_clock.setdefault(id(channel.t), (channel.t, {}))[1][name] = channel.values
+        found += [Samples(log.path.name, t + start, values) for t, values in by_clock.values()]
     return found
 
 

@@ -342,8 +342,7 @@ def _table(
     data = tuple(islice((row for row in rows if len(row) == len(names)), _ROWS))
     start = " ".join(line.text for line in lines[:first][:8]).lower()
     made_by = next((maker for words, maker in _MAKERS.items() if words in start), "")
-    share = way.share
-    sure = "sure" if share > _CLEAR else "likely" if share > 0.6 else "a guess"
+    sure = "sure" if way.share > _CLEAR else "likely" if way.share > 0.6 else "a guess"
     words = [
         _encoding_word(encoding),
         f"cells apart by {_DELIMITERS[way.delimiter]} ({sure})",
@@ -352,8 +351,10 @@ def _table(
     words += [f"thousands apart by {displayed(way.thousands)}"] * bool(way.thousands)
     words += [f"{made_by} export"] * bool(made_by)
     words += [f"names in line {names_line.number}"]
-    words += [f"units in line {units_line.number}"] if units_line is not None else []
-    words += [] if units_line is not None or not any(units) else ["units in the names"]
+    if units_line is not None:
+        words.append(f"units in line {units_line.number}")
+    elif any(units):
+        words.append("units in the names")
     rate = _given_rate([line.text for line in lines[: names_line.number - 1]])
     numeric = _numeric(data, names, way)
     return Layout(

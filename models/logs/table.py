@@ -37,7 +37,7 @@ from models.logs.stamps import (
     started,
     typical_rate,
 )
-from models.schema import LONGEST_NAME, limits
+from models.schema import LONGEST_NAME
 
 _LONG = 8  # columns at most of a table with a row for each value
 _MOST_WORDS = 10_000  # names of runs in one log
@@ -142,7 +142,6 @@ class Gathered:
         self._codes: dict[int, dict[str, int]] = {
             column: {} for column, kind in self.kinds.items() if kind is Kind.WORD
         }
-        self._most = limits().samples
         self._seen = 0
 
     def __len__(self) -> int:
@@ -154,8 +153,7 @@ class Gathered:
         rows : (n,) where they are in the file.   columns : column -> (n,) values, or `Words`.
         """
         self._seen += rows.size
-        if self._seen > self._most:
-            few(self._path, self._seen, "samples", "rows")
+        few(self._path, self._seen, "samples", "rows")
         coded = {c: self._coded(c, columns[c], rows) for c in self._codes}
         keep: Any = slice(None)
         if self._run is not None:
