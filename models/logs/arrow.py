@@ -1,7 +1,7 @@
 """What pyarrow does for us: blocks of text to columns, its arrays to arrays of NumPy.
 
-It is an extra, imported where it is worth the time. Its arrays are read by their buffers: its own
-way from them to NumPy imports pandas.
+It is an extra, imported where it is worth the time. Its arrays are read by DLPack: its own way from
+them to NumPy imports pandas.
 """
 
 import importlib
@@ -122,7 +122,7 @@ def doubles(cells: Any) -> NDArray[np.float64]:
     if pyarrow.types.is_duration(cells.type):
         cells = cells.cast(pyarrow.int64())
     whole = cells.cast(pyarrow.float64(), safe=False)
-    return _buffer(whole, np.float64, math.nan)
+    return _filled(whole, math.nan)
 
 
 def whole_numbers(cells: Any, missing: int) -> NDArray[np.int64]:
@@ -132,17 +132,13 @@ def whole_numbers(cells: Any, missing: int) -> NDArray[np.int64]:
     if pyarrow.types.is_timestamp(cells.type):
         cells = cells.cast(pyarrow.timestamp("ns", cells.type.tz))
     whole = cells.cast(pyarrow.int64())
-    return _buffer(whole, np.int64, missing)
+    return _filled(whole, missing)
 
 
-def _buffer(cells: Any, dtype: Any, missing: float) -> NDArray[Any]:
-    """Return the numbers of an array, and another where its bitmap says that one is missing."""
-    if len(cells) == 0:
-        return np.empty(0, dtype)
-    there, numbers = cells.buffers()
-    part = slice(cells.offset, cells.offset + len(cells))
-    values = np.frombuffer(numbers, dtype)[part]
-    if cells.null_count == 0:
-        return values
-    bits = np.unpackbits(np.frombuffer(there, np.uint8), bitorder="little")
-    return np.where(bits[part] == 1, values, np.array(missing, dtype))
+def _filled(cells: Any, missing: float) -> NDArray[Any]:
+    """Return the numbers of an array, and another where one is missing."""
+    import pyarrow
+
+    buffer = pyarrow.py_buffer(np.array([missing], cells.type.to_pandas_dtype()))
+    other = pyarrow.Array.from_buffers(cells.type, 1, [None, buffer])  # others import pandas, too
+    return np.from_dlpack(cells.fill_null(other[0]))

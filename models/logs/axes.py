@@ -15,11 +15,11 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.logs.log import Channel
-from models.logs.units import ACCELERATION, FACTORS, RATE, SPEED, is_given, quantities
+from models.logs.units import ACCELERATION, FACTORS, RATE, SPEED, TABLES, is_given, quantities
 
 _STEP = 0.1  # [s] between instants
 _WINDOW = 0.3  # [s] over which means are taken there
-_MOST = 20_000  # instants
+_MOST, _FEWEST = 20_000, 50  # instants
 _SLOW = 3.0  # [m/s]: slower samples tell nothing
 _CLEAR = 3.0  # times that the speed is larger than what is measured across it
 _SURE = 0.7  # correlation from which axes are known
@@ -29,11 +29,7 @@ _TILT = 0.4  # share of it along another axis from which a box lies oblique
 
 _LETTERS = "xyz"
 _GRAVITY = FACTORS[ACCELERATION]["g"]
-_STEMS = {  # what stands before a letter in one word, or beside it, by quantity
-    SPEED: "v vel velocity speed",
-    ACCELERATION: "a acc accel acceleration accelerometer g gforce",
-    RATE: "w gyro gyr gyroscope omega rot rotation rate angular angularvelocity av angrate ang",
-}
+_STEMS = {quantity: set(some.split()) for quantity, some in TABLES["stems"].items()}
 
 
 class Triad(NamedTuple):
@@ -76,7 +72,7 @@ def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list
         letter, rest = split
         likely = quantities(units[name])
         if not is_given(units[name]):
-            likely = tuple(one for one, some in _STEMS.items() if set(rest) & set(some.split()))
+            likely = tuple(one for one, some in _STEMS.items() if some & set(rest))
         quantity = next((one for one in (RATE, ACCELERATION, SPEED) if one in likely), "")
         if quantity:
             found.setdefault(rest, {}).setdefault(letter, name)
@@ -92,7 +88,7 @@ def triads(words: Mapping[str, Sequence[str]], units: Mapping[str, str]) -> list
 
 def _letter(listed: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
     """Return the letter of an axis in a name, and its words without; None where it has none."""
-    stems = {word for some in _STEMS.values() for word in some.split()}
+    stems = set[str]().union(*_STEMS.values())
     for k in range(len(listed) - 1, -1, -1):
         word = listed[k]
         if word in _LETTERS or (word[-1] in _LETTERS and word[:-1] in stems):
@@ -101,35 +97,24 @@ def _letter(listed: Sequence[str]) -> tuple[str, tuple[str, ...]] | None:
     return None
 
 
-class _Grid:
-    """Channels at the same instants, smoothed."""
-
-    def __init__(self, seen: Mapping[str, Channel], names: Sequence[str]) -> None:
-        there = [seen[name].t for name in names if name in seen and seen[name].t.size > 1]
-        begin = max((float(t[0]) for t in there), default=0.0)
-        end = min((float(t[-1]) for t in there), default=0.0)
-        count = int(max(min((end - begin) / _STEP, _MOST), 0.0))
-        self.t = begin + _STEP * np.arange(count)
-        self._seen, self._means = seen, dict[str, Array]()
-
-    def __getitem__(self, name: str) -> Array:
-        """Return a channel at the instants, (n,); means over `_WINDOW`."""
-        if name not in self._means:
-            self._means[name] = self._mean(name)
-        return self._means[name]
-
-    def _mean(self, name: str) -> Array:
-        channel = self._seen[name]
-        good = np.isfinite(channel.values)
-        t, values = channel.t[good], channel.values[good]
-        if t.size < 2:
-            return np.full(self.t.size, np.nan)
-        steps = np.diff(t) * (values[1:] + values[:-1]) / 2.0
-        total = np.concatenate([[0.0], np.cumsum(steps)])
-        half = _WINDOW / 2.0
-        low, high = (np.clip(self.t + side, t[0], t[-1]) for side in (-half, half))
-        mean = np.interp(high, t, total) - np.interp(low, t, total)
-        return np.asarray(mean / np.maximum(high - low, 1e-9))
+def _gridded(seen: Mapping[str, Channel], names: Sequence[str]) -> dict[str, Array]:
+    """Return channels at the same instants, (n,), means over `_WINDOW`; none of a few instants."""
+    there = [seen[name].t for name in names if seen[name].t.size > 1]
+    begin = max((float(t[0]) for t in there), default=0.0)
+    end = min((float(t[-1]) for t in there), default=0.0)
+    at = begin + _STEP * np.arange(max(min((end - begin) // _STEP, _MOST), 0.0))
+    found: dict[str, Array] = {}
+    for name in names if at.size >= _FEWEST else ():
+        good = np.isfinite(seen[name].values)
+        t, values = seen[name].t[good], seen[name].values[good]
+        found[name] = np.full(at.size, np.nan)
+        if t.size > 1:
+            steps = np.diff(t) * (values[1:] + values[:-1]) / 2.0
+            total = np.concatenate([[0.0], np.cumsum(steps)])
+            low, high = (np.clip(at + side * _WINDOW / 2.0, t[0], t[-1]) for side in (-1, 1))
+            mean = np.interp(high, t, total) - np.interp(low, t, total)
+            found[name] = mean / np.maximum(high - low, 1e-9)
+    return found
 
 
 def _alike(one: Array, other: Array) -> float:
@@ -154,7 +139,7 @@ def ground(
     place : channels of a position by letter.   heading, steering : "" where there is none.
     """
     t = seen[place["x"]].t
-    if t.size < 50 or ("y" in place and not heading):
+    if t.size < _FEWEST or ("y" in place and not heading):
         return "y", 1.0
     lag = max(1, int(_WINDOW / float(np.median(np.diff(t)))))
 
@@ -191,8 +176,8 @@ def along_axes(
     usable = [one for one in found if there.issuperset(one.names.values())]
     in_triads = [name for one in usable for name in one.names.values()]
     named = [one for one in (speed, yaw_rate, lateral, steering) if one]
-    grid = _Grid(seen, [*in_triads, *named])
-    if grid.t.size < 50:
+    grid = _gridded(seen, [*in_triads, *named])
+    if not grid:
         return _Found(frozenset(), ())
     misled, oblique = set[str](), set[str]()
     axes, across = list[_Axis](), list[str]()
@@ -220,22 +205,22 @@ def along_axes(
                 oblique |= channels
                 continue
             given = _of_a_box(grid, one, gyro, up, v, yaw_rate, steering)
-            misled |= channels if given is not None else set()
-            misled |= {axis.name for axis in given or ()}
-            axes += given or []
+            if given is not None:
+                misled |= channels | {axis.name for axis in given}
+                axes += given
     known = {"r": grid[yaw_rate]} if yaw_rate else {}
     known |= {one.signal: one.factor * grid[one.name] for one in axes}
     known |= {"a_y": grid[lateral]} if lateral else {}
     if across and {"r", "a_y"} <= set(known):
-        axes += _sideways(grid, across, v, known["r"], known["a_y"])
+        axes += _sideways(grid, across, v * known["r"], known["a_y"])
     return _Found(frozenset(misled), tuple(axes), frozenset(oblique))
 
 
-def _forward(grid: _Grid, triad: Triad, v: Array | None) -> tuple[str, float] | None:
+def _forward(grid: Mapping[str, Array], triad: Triad, v: Array | None) -> tuple[str, float] | None:
     """Return the axis of a velocity that is forward, and its sign; None of x, or if unclear."""
     values = {letter: grid[name] for letter, name in triad.names.items()}
     sizes = {letter: math.sqrt(float(np.nanmean(one**2))) for letter, one in values.items()}
-    best = max(sizes, key=lambda letter: sizes[letter])
+    best = max(sizes, key=sizes.__getitem__)
     second = sorted(sizes.values())[-2]
     if best == "x" or sizes[best] < _CLEAR * second or not sizes[best] > 0.0:
         return None
@@ -244,20 +229,19 @@ def _forward(grid: _Grid, triad: Triad, v: Array | None) -> tuple[str, float] | 
     return best, math.copysign(1.0, float(np.nanmean(values[best])))
 
 
-def _sideways(grid: _Grid, names: Sequence[str], v: Array, r: Array, a_y: Array) -> list[_Axis]:
+def _sideways(
+    grid: Mapping[str, Array], names: Sequence[str], turning: Array, lateral: Array
+) -> list[_Axis]:
     """Return which velocity is v_y: its change is what a_y has beside v_x r."""
-    turning, lateral = v * r, a_y
-    size = float(np.nanstd(turning))
     slope = float(np.nanmean(turning * lateral) / max(float(np.nanmean(turning**2)), 1e-12))
-    if not size or not slope:
+    if not np.nanstd(turning) or not slope:
         return []
     residual = lateral / slope - turning  # in the units of v r, which may be no SI: signs are asked
     alike = {name: _alike(np.gradient(grid[name], _STEP), residual) for name in names}
     best = max(alike, key=lambda name: abs(alike[name]))
-    if abs(alike[best]) < _SURE:
-        return []
     why = "its change is what ay has beside vx r"
-    return [_Axis(best, "v_y", math.copysign(1.0, alike[best]), why)]
+    axis = _Axis(best, "v_y", math.copysign(1.0, alike[best]), why)
+    return [axis] if abs(alike[best]) >= _SURE else []
 
 
 def _up(means: Mapping[str, float]) -> tuple[str, float]:
@@ -274,7 +258,7 @@ def _up(means: Mapping[str, float]) -> tuple[str, float]:
 
 
 def _of_a_box(
-    grid: _Grid,
+    grid: Mapping[str, Array],
     box: Triad,
     gyro: Triad | None,
     up: tuple[str, float],
@@ -283,16 +267,13 @@ def _of_a_box(
     steering: str,
 ) -> list[_Axis] | None:
     """Return what the channels of a box are; None where they are what their letters say."""
-    moving = v > _SLOW / 2.0 if np.nanmax(v) > _SLOW else np.ones(v.size, dtype=bool)
+    moving = v > (_SLOW / 2.0 if np.nanmax(v) > _SLOW else -1.0)
     values = {letter: grid[name] for letter, name in box.names.items()}
-    turns = {} if gyro is None else {letter: grid[name] for letter, name in gyro.names.items()}
-    if yaw_rate:
-        turns = {"": grid[yaw_rate]}
-    elif up[0]:
-        turns = {up[0]: turns[up[0]]} if turns else {}
+    turns = {"": yaw_rate} if yaw_rate else gyro.names if gyro else {}
     pairs = {
-        (about, along): _alike((v * turn)[moving], one[moving])
+        (about, along): _alike((v * grid[turn])[moving], one[moving])
         for about, turn in turns.items()
+        if yaw_rate or up[0] in ("", about)
         for along, one in values.items()
         if along not in (about, up[0])
     }
@@ -302,13 +283,12 @@ def _of_a_box(
     as_lettered = along == "y" and "z" in (about or "z", up[0] or "z")
     if as_lettered and (not up[1] or (up[1] > 0.0 and pairs[about, along] > 0.0)):
         return None
-    r = turns[about]
-    sign = (up[1] or 1.0) if about else 1.0
-    asked = steering and (about or "y" not in values)
-    steers = _alike((v * grid[steering])[moving], r[moving]) if asked else 0.0
-    sign = _sign(steers) or sign
-    if not _sign(steers) and "y" not in values:  # the plane may be seen from above or from below
+    sign = 0.0
+    if steering and (about or "y" not in values):
+        sign = _sign(_alike((v * grid[steering])[moving], grid[turns[about]][moving]))
+    if not sign and "y" not in values:  # the plane may be seen from above or from below
         return []
+    sign = sign or (about and up[1]) or 1.0
     axes = []
     if about and gyro is not None:
         axes.append(_Axis(gyro.names[about], "r", sign, f"about {about}, which is up"))

@@ -6,12 +6,13 @@ counts from the first message that is read of any topic.
 """
 
 import re
-import struct
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from itertools import islice
+from operator import attrgetter
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -22,8 +23,6 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from models.limits import limits
 from models.logs.cdr import (
-    ORDERS,
-    PREFIX,
     CdrError,
     Definitions,
     Field,
@@ -91,20 +90,18 @@ def open_(path: Path) -> GroupedLog[_Place]:
     first = min((int(one.t[0]) for one in moving), default=0)
     zero = min((topic.zero for topic in topics if topic.stamp), default=first)
     found: list[tuple[str, Listed, _Place]] = [
-        (_TF, Listed(name=f"{one.name}/{field}", unit="m" * (k < 3), samples=one.t.size,
-                    rate=typical_rate((one.t - one.t[0]) / _NS)), (one, k))
+        (_TF, Listed(f"{one.name}/{field}", "m" * (k < 3), one.t.size,
+                    typical_rate((one.t - one.t[0]) / _NS)), (one, k))
         for one in moving
         for k, field in enumerate(_OF_TF)
     ]  # fmt: skip
     for topic in topics:
         for field in topic.fields:
             name = f"{topic.name}/{field.path}"
-            listed = Listed(
-                name=name, unit=_unit(field), samples=topic.messages, rate=rates[topic.name]
-            )
+            listed = Listed(name, _unit(field), topic.messages, rates[topic.name])
             found.append((topic.kind, listed, (topic, field)))
     received = [topic.name for topic in topics if topic.stamp is None]
-    return GroupedLog.of(
+    return GroupedLog(
         path,
         "ROS 2 bag" if _plugin(path) != ".mcap" else "MCAP",
         "a ROS 2 bag",
@@ -115,7 +112,7 @@ def open_(path: Path) -> GroupedLog[_Place]:
             *noted("not read", [f"{name} ({why})" for name, why in (undefined | skipped).items()]),
         ),
         partial(_samples, path, definitions, zero),
-        missing="message with numbers",
+        "message with numbers",
     )
 
 
@@ -143,49 +140,24 @@ def _samples(
 
 def _moving(path: Path, bag: Any) -> list[_Moving]:
     """Return the frames of /tf that move."""
-    found: dict[str, tuple[list[int], list[tuple[float, ...]]]] = {}
+    typesys = need(path, "rosbags.typesys", "ROS 2 bags", "ros")
+    store = typesys.get_typestore(typesys.Stores.LATEST)
+    found: dict[str, list[tuple[float, ...]]] = {}
     count = 0
     for connection, _, raw in bag.messages([c for c in bag.connections if c.msgtype == _TF]):
-        for name, ns, values in _transforms(raw):
-            times, rows = found.setdefault(f"{connection.topic}/{name}", ([], []))
-            times.append(ns)
-            rows.append(values)
+        for one in store.deserialize_cdr(raw, _TF).transforms:
+            parent, child = (x.strip("/") for x in (one.header.frame_id, one.child_frame_id))
+            stamp, get = one.header.stamp, attrgetter(*_OF_TF)
+            ns = stamp.sec * 1_000_000_000 + stamp.nanosec
+            name = f"{connection.topic}/{parent}->{child}"
+            found.setdefault(name, []).append((ns, *get(one.transform)))
             count += 1
         few(path, count, "samples", "transforms")
     return [
-        _Moving(name, np.array(times), np.array(rows))
-        for name, (times, rows) in found.items()
-        if len(set(rows)) > 1
+        _Moving(name, np.array([row[0] for row in rows]), np.array([row[1:] for row in rows]))
+        for name, rows in found.items()
+        if len({row[1:] for row in rows}) > 1
     ]
-
-
-def _transforms(raw: bytes) -> Iterator[tuple[str, int, tuple[float, ...]]]:
-    """Yield the transforms of a message: parent to child, stamp [ns], translation and rotation.
-    It is a sequence of: seconds, nanoseconds, name of the parent, name of the child, 7 doubles.
-    """
-    order, place = ORDERS.get(bytes(raw[:2])), PREFIX
-    if order is None:
-        raise CdrError("a message is not plain CDR")
-
-    def read(form: str, size: int) -> tuple[Any, ...]:
-        nonlocal place
-        place += -(place - PREFIX) % size
-        values = struct.unpack_from(order + form, raw, place)
-        place += struct.calcsize(order + form)
-        return values
-
-    def text() -> str:
-        nonlocal place
-        (length,) = read("I", 4)
-        place += length
-        return (
-            bytes(raw[place - length : place]).rstrip(b"\0").decode("utf-8", "replace").strip("/")
-        )
-
-    for _ in range(read("I", 4)[0]):
-        seconds, nanoseconds = read("iI", 4)
-        name = f"{text()}->{text()}"
-        yield name, seconds * 1_000_000_000 + nanoseconds, read("7d", 8)
 
 
 def _plugin(path: Path) -> str:
@@ -229,9 +201,7 @@ def _definitions(path: Path, bag: Any) -> tuple[Definitions, dict[str, str]]:
                 result.update(typesys.get_types_from_msg(text, connection.msgtype))
             elif form == "IDL":
                 for part in text.split("=" * 80 + "\n"):
-                    _, _, body = (
-                        part.partition("\n") if part.startswith("IDL: ") else ("", "", part)
-                    )
+                    body = part.partition("\n")[2] if part.startswith("IDL: ") else part
                     result.update(typesys.get_types_from_idl(body) if body.strip() else {})
         except Exception:  # a grammar that fails on what anybody wrote
             bad[connection.topic] = "its definition cannot be parsed"
@@ -243,14 +213,13 @@ def _topics(
 ) -> tuple[list[_Topic], dict[str, float], dict[str, str]]:
     """Return the topics with numbers, by name their rates [Hz], and why others have none."""
     rates: dict[str, float] = {}
-    counts: dict[tuple[str, str], int] = {}
+    counts: Counter[tuple[str, str]] = Counter()
     skipped: dict[str, str] = {}
     for connection in bag.connections:
-        if connection.ext.serialization_format != "cdr":
-            skipped[connection.topic] = f"is not CDR but {connection.ext.serialization_format}"
-            continue
-        key = connection.topic, connection.msgtype
-        counts[key] = counts.get(key, 0) + int(connection.msgcount)
+        if (form := connection.ext.serialization_format) != "cdr":
+            skipped[connection.topic] = f"is not CDR but {form}"
+        else:
+            counts[connection.topic, connection.msgtype] += int(connection.msgcount)
     found: list[tuple[_Topic, int]] = []
     for (name, kind), count in counts.items():
         if count < 1:

@@ -13,10 +13,10 @@ import math
 import re
 import struct
 import zlib
-from array import array
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -33,24 +33,26 @@ from models.logs.log import Listed, RecordingError, few
 from models.logs.magic import HEAD, frames_in
 from models.logs.mdf import is_bus, opened
 from models.logs.stamps import nanoseconds, since, typical_rate
+from models.logs.units import TABLES
 from models.schema import LONGEST_NAME, read_bytes
 
-_FRAMES_AT_ONCE = 1 << 16  # frames that are stored at a time
+_FRAMES_AT_ONCE = 1 << 16  # frames that are gathered at a time
 _SHORT = 0x7FF  # largest identifier of 11 bits
 _IDENTIFIER = (1 << 29) - 1  # mask of the 29 bits of the longest identifier
 _INFLATION = 1032  # most bytes that deflate makes of one
 _CONTAINER = 10  # kind of an object of a BLF that holds others
-_DEFLATED = 2  # way in which one is packed that is read: by zlib
+_DEFLATED = b"\2\0"  # begins one that is packed by zlib
+_METHOD = 16  # bytes of a container that say how it is packed, before its data
 _FROM_ALL = 0xFE  # address that a database of J1939 gives where any may send
 _FLOATS = (16, 32, 64)  # bits of a signal that is a float
 _LONGEST_SIGNAL = 64  # bits
+_LONGEST_FRAME = 1785  # bytes, of J1939 in several packets
 CALENDAR = 1e8  # [s]: times above count from 1970
 
 _FRAME = "CAN_DataFrame"  # of MDF
 _NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
 _EXTENDED = 1 << 31  # marks an identifier of 29 bits
 _OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
-_METHOD = struct.Struct("<H14x")  # of a container, before its data
 _FILE_SIZE = struct.Struct("<Q")  # of BLF, at byte 16 of its header
 
 _Key = tuple[str, int]  # bus, identifier with _EXTENDED
@@ -87,68 +89,65 @@ class _Frames(NamedTuple):
     data: NDArray[np.uint8]
 
 
-class _Gathered:
-    """Frames of one identifier as they come, all of the same bytes."""
+class _Part(NamedTuple):
+    """Some frames of one identifier on one bus: t (n,) [s], sizes (n,) and data (n, bytes)."""
 
-    def __init__(self, width: int) -> None:
-        self.width = width
-        self._times = array("d")
-        self._bytes = bytearray()
-        self._t, self._data = Growing(), Growing(np.uint8)
-
-    def add(self, time: float, data: bytes) -> None:
-        self._times.append(time)
-        self._bytes += data[: self.width]
-        if len(self._times) == _FRAMES_AT_ONCE:
-            self._store()
-
-    def extend(self, times: Array, data: NDArray[np.uint8]) -> None:
-        """Take the next frames.   times : (n,) [s].   data : (n, bytes)."""
-        self._t.extend(times)
-        self._data.extend(data[:, : self.width].reshape(-1))
-
-    def _store(self) -> None:
-        if self._times:
-            times, data = np.frombuffer(self._times), np.frombuffer(self._bytes, np.uint8)
-            self.extend(times, data.reshape(-1, self.width))
-            self._times, self._bytes = array("d"), bytearray()
-
-    def finished(self) -> _Frames:
-        self._store()
-        return _Frames(self._t.finished(), self._data.finished().reshape(-1, self.width))
+    bus: str
+    identifier: int
+    t: Array
+    sizes: NDArray[np.int64]
+    data: NDArray[np.uint8]
 
 
 _Log = tuple[dict[_Key, _Frames], Counter[str]]  # and how many others it has, by what they are
 
 
 def _gather(path: Path, kind: str, given: _Dbc) -> _Log:
-    if kind == "MDF4":
-        return _of_mdf(path, given)
-    found: dict[_Key, _Gathered] = {}
-    others: Counter[str] = Counter()
+    found: dict[_Key, tuple[Growing, Growing]] = {}
+    others: Counter[str] = Counter({"unknown": 0, "cut short": 0})
     count = 0
-    for message in _messages(path, kind):
-        identifier = message.arbitration_id | (_EXTENDED if message.is_extended_id else 0)
-        if message.is_error_frame or message.is_remote_frame:
-            others["error and remote"] += 1
-        elif (known := given.message(identifier)) is None:
-            others["unknown"] += 1
-        elif len(message.data) < known.length:
-            others["cut short"] += 1
-        else:
-            key = str(message.channel), identifier
-            if key not in found:
-                found[key] = _Gathered(known.length)
-            found[key].add(message.timestamp, message.data)
-            count += 1
-            if count % _FRAMES_AT_ONCE == 0:
-                few(path, count, "samples", "frames")
-    frames = {key: one.finished() for key, one in found.items()}
+    for bus, identifier, t, sizes, data in (
+        _of_mdf(path, others) if kind == "MDF4" else _of_messages(path, kind, others)
+    ):
+        if (message := given.message(identifier)) is None:
+            others["unknown"] += t.size
+            continue
+        whole = sizes >= message.length
+        others["cut short"] += int(np.sum(~whole))
+        if whole.any():
+            times, rows = found.setdefault((bus, identifier), (Growing(), Growing(np.uint8)))
+            times.extend(t[whole])
+            rows.extend(data[whole, : message.length].reshape(-1))
+            count += int(np.sum(whole))
+            few(path, count, "samples", "frames")
+    frames = {}
+    for key, (times, rows) in found.items():
+        t, data = times.finished(), rows.finished().reshape(len(times), -1)
+        if kind == "MDF4" and np.any(t[1:] < t[:-1]):  # groups of a file follow one another
+            order = np.argsort(t, kind="stable")
+            t, data = t[order], data[order]
+        frames[key] = _Frames(t, data)
     first = min((float(kept.t.min()) for kept in frames.values()), default=0.0)
     if first > CALENDAR:
-        for key, kept in frames.items():
-            frames[key] = kept._replace(t=since(kept.t, first))
+        frames = {key: kept._replace(t=since(kept.t, first)) for key, kept in frames.items()}
     return frames, others
+
+
+def _of_messages(path: Path, kind: str, others: Counter[str]) -> Iterator[_Part]:
+    messages = _messages(path, kind)
+    while some := list(islice(messages, _FRAMES_AT_ONCE)):
+        found: dict[_Key, list[Any]] = {}
+        for one in some:
+            if one.is_error_frame or one.is_remote_frame:
+                others["error and remote"] += 1
+            else:
+                identifier = one.arbitration_id | _EXTENDED * one.is_extended_id
+                found.setdefault((str(one.channel), identifier), []).append(one)
+        for key, frames in found.items():
+            t, sizes = np.array([(one.timestamp, len(one.data)) for one in frames]).T
+            # Shorter ones are filled up by zeros.
+            data = np.array([bytes(one.data[:_LONGEST_FRAME]) for one in frames])
+            yield _Part(*key, t, sizes, data.view(np.uint8).reshape(t.size, -1))
 
 
 def _messages(path: Path, kind: str) -> Iterator[Any]:
@@ -215,15 +214,6 @@ def _of_lines(path: Path) -> Iterator[_Frame]:
             yield _Frame(time, int(word, 16), data, found["bus"], len(word) > 3, False, remote)
 
 
-_COLUMNS = {  # of tables of frames, by what each is
-    "time": "timestamp time timestampus timestamps t",
-    "id": "id addr address messageid arbitrationid canid identifier",
-    "bus": "bus channel interface",
-    "long": "extended ext ide isextended",
-    "data": "data message payload d0 d1",
-}
-
-
 def _of_table(path: Path) -> Iterator[_Frame]:
     """Yield the frames of a table in text; identifiers and bytes are hexadecimal."""
     with path.open("r", encoding="utf-8-sig", errors="replace", newline="") as text:
@@ -232,10 +222,9 @@ def _of_table(path: Path) -> Iterator[_Frame]:
         header = [re.sub("[^a-z0-9]", "", one.lower()) for one in next(rows, [])]
         at = {
             what: next((header.index(one) for one in names.split() if one in header), -1)
-            for what, names in _COLUMNS.items()
+            for what, names in TABLES["frames"].items()
         }
-        if min(at["time"], at["id"], at["data"]) < 0:
-            lacking = ", ".join(what for what in ("time", "id", "data") if at[what] < 0)
+        if lacking := ", ".join(what for what in ("time", "id", "data") if at[what] < 0):
             raise RecordingError(f"{path}: a table of frames must have a column for {lacking}")
         many = header[at["data"]] in ("d0", "d1")  # a byte a column
         decimal = header[at["id"]] in ("addr", "address")
@@ -277,19 +266,16 @@ def _require_whole_blf(path: Path) -> None:
             body = length - _OBJECT.size
             if kind == _CONTAINER and body * _INFLATION > most:
                 data = file.read(body)
-                size_of = len(data) - _METHOD.size
-                if size_of > 0 and _METHOD.unpack_from(data)[0] == _DEFLATED:
-                    unpacked = zlib.decompressobj().decompress(data[_METHOD.size :], int(most) + 1)
-                    size_of = len(unpacked)
-                few(path, size_of / 1e6, "block", "megabytes of a block")
+                unpacked = data[_METHOD:]
+                if data.startswith(_DEFLATED):
+                    unpacked = zlib.decompressobj().decompress(unpacked, int(most) + 1)
+                few(path, len(unpacked) / 1e6, "block", "megabytes of a block")
                 body = 0
             file.seek(body + length % 4, 1)
 
 
-def _of_mdf(path: Path, given: _Dbc) -> _Log:
-    """Read the frames of the buses that an MDF4 file logs."""
-    found: dict[_Key, _Gathered] = {}
-    others: Counter[str] = Counter()
+def _of_mdf(path: Path, others: Counter[str]) -> Iterator[_Part]:
+    """Yield the frames of the buses that an MDF4 file logs."""
     with opened(path, "CAN frames of MDF") as file:
         if str(file.version) < "4":
             raise RecordingError(f"{path}: an MDF3 file holds no frames; leave the DBC out")
@@ -305,39 +291,21 @@ def _of_mdf(path: Path, given: _Dbc) -> _Log:
                 continue
             for first in range(0, samples, _FRAMES_AT_ONCE):
                 count = min(_FRAMES_AT_ONCE, samples - first)
-                _add_part(file, names, number, slice(first, first + count), given, found, others)
-    frames = {key: one.finished() for key, one in found.items()}
-    for key, (t, data) in frames.items():
-        if np.any(t[1:] < t[:-1]):  # groups of a file follow one another
-            order = np.argsort(t, kind="stable")
-            frames[key] = _Frames(t[order], data[order])
-    return frames, others
+                yield from _of_group(file, names, number, first, count)
 
 
-def _add_part(
-    file: Any,
-    names: set[str],
-    number: int,
-    part: slice,
-    given: _Dbc,
-    found: dict[_Key, _Gathered],
-    others: Counter[str],
-) -> None:
-    """Add some frames of a group to those of their bus and identifier."""
-    count = part.stop - part.start
+def _of_group(file: Any, names: set[str], number: int, first: int, count: int) -> Iterator[_Part]:
+    """Yield some frames of a group by their bus and identifier."""
 
     def signal(name: str) -> Any:
-        full = f"{_FRAME}.{name}"
-        if full not in names:
-            return None
         return file.get(
-            full, group=number, raw=True, ignore_invalidation_bits=True, record_offset=part.start,
-            record_count=count,
+            f"{_FRAME}.{name}", group=number, raw=True, ignore_invalidation_bits=True,
+            record_offset=first, record_count=count,
         )  # fmt: skip
 
     def whole(name: str, otherwise: Any) -> NDArray[np.int64]:
-        found = signal(name)
-        return np.broadcast_to(otherwise, count) if found is None else found.samples.astype(int)
+        there = f"{_FRAME}.{name}" in names
+        return np.broadcast_to(signal(name).samples.astype(int) if there else otherwise, count)
 
     identifiers = signal("ID")
     data = np.asarray(signal("DataBytes").samples, dtype=np.uint8).reshape(count, -1)
@@ -347,18 +315,9 @@ def _add_part(
     ids, buses = np.where(is_long, ids | _EXTENDED, ids), whole("BusChannel", 0)
     sizes = np.minimum(whole("DataLength", data.shape[1]), data.shape[1])
     t = np.asarray(identifiers.timestamps, dtype=np.float64)
-    for identifier in np.unique(ids).tolist():
-        mine = ids == identifier
-        message = given.message(identifier)
-        if message is None:
-            others["unknown"] += int(mine.sum())
-            continue
-        complete = mine & (sizes >= message.length)
-        others["cut short"] += int(mine.sum() - complete.sum())
-        for bus in np.unique(buses[complete]).tolist():
-            which = complete & (buses == bus)
-            frames = found.setdefault((str(bus), identifier), _Gathered(message.length))
-            frames.extend(t[which], data[which])
+    for identifier, bus in np.unique([ids, buses], axis=1).T.tolist():
+        which = (ids == identifier) & (buses == bus)
+        yield _Part(str(bus), identifier, t[which], sizes[which], data[which])
 
 
 # Signals of frames, by a DBC.
@@ -436,7 +395,7 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
             group = f"bus {bus}" + f" from {identifier & 0xFF:02X}" * several
             found += [(group, *one) for one in _channels(given, message, frames)]
     said = tuple(f"{count} {what} frames are not read" for what, count in others.items() if count)
-    return GroupedLog.of(
+    return GroupedLog(
         path,
         f"CAN {kind}",
         "a CAN log",
@@ -444,7 +403,7 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
         found,
         said,
         _samples,
-        missing=f"frame that {dbc} knows",
+        f"frame that {dbc} knows",
     )
 
 
@@ -454,9 +413,9 @@ def _channels(given: _Dbc, message: Any, frames: _Frames) -> Iterator[tuple[List
     for signal in message.signals:
         selectors = _selectors(message, signal)
         key = tuple((one.name, ids) for one, ids in selectors)
-        faults = [given.faults.get((message.name, one.name), "") for one, _ in selectors]
-        if any(faults):
-            raise RecordingError(next(filter(None, faults)))
+        for one, _ in selectors:
+            if fault := given.faults.get((message.name, one.name)):
+                raise RecordingError(fault)
         if key not in groups:
             sent = _sent(frames, selectors)
             t = frames.t if sent is None else frames.t[sent]
@@ -464,10 +423,10 @@ def _channels(given: _Dbc, message: Any, frames: _Frames) -> Iterator[tuple[List
         group = groups[key]
         if group.t.size:
             listed = Listed(
-                name=f"{message.name}.{signal.name}",
-                unit=(signal.unit or "").strip()[:LONGEST_NAME],
-                samples=group.t.size,
-                rate=typical_rate(group.t),
+                f"{message.name}.{signal.name}",
+                (signal.unit or "").strip()[:LONGEST_NAME],
+                group.t.size,
+                typical_rate(group.t),
             )
             yield listed, (group, signal, given.faults.get((message.name, signal.name), ""))
 
@@ -511,21 +470,19 @@ def _fault(message: Any, signal: Any) -> str:
     if signal.length not in sizes:
         allowed = "16, 32 or 64" if signal.is_float else f"1 to {_LONGEST_SIGNAL}"
         return f"must have {allowed} bits, it has {signal.length}"
-    _, end = _bytes_of(signal)
-    return "" if end <= message.length else f"lies beyond its frame of {message.length} bytes"
+    inside = _place(signal)[0].stop <= message.length
+    return "" if inside else f"lies beyond its frame of {message.length} bytes"
 
 
-def _bytes_of(signal: Any) -> tuple[int, int]:
-    """Return the first byte of a frame that a signal lies in, and the one behind its last."""
-    first = _first_bit(signal)
-    return first // 8, (first + signal.length - 1) // 8 + 1
+def _place(signal: Any) -> tuple[slice, int]:
+    """Return the bytes of a frame that a signal lies in, and how many bits of them are before it.
 
+    Motorola numbers the bits of a byte downwards, and a signal by its highest bit.
+    """
+    from cantools.database.utils import start_bit
 
-def _first_bit(signal: Any) -> int:
-    """Return the bit that a signal begins at, counted in the order of its bytes."""
-    # Motorola numbers the bits of a byte downwards, and a signal by its highest bit.
-    start = int(signal.start)
-    return start if signal.byte_order == "little_endian" else 8 * (start // 8) + 7 - start % 8
+    first = start_bit(signal)
+    return slice(first // 8, (first + signal.length - 1) // 8 + 1), first % 8
 
 
 def _selectors(message: Any, signal: Any) -> _Selectors:
@@ -556,10 +513,9 @@ def _values_of(data: NDArray[np.uint8], signal: Any) -> Array:
     """
     raw = _raw_values(data, signal)
     values = raw.astype(np.float64) * float(signal.scale) + float(signal.offset)
-    named = {value: str(name).replace("_", " ") for value, name in (signal.choices or {}).items()}
-    values[np.isin(raw, [value for value, name in named.items() if _NO_NUMBER.search(name)])] = (
-        np.nan
-    )
+    named = (signal.choices or {}).items()
+    none = [value for value, name in named if _NO_NUMBER.search(str(name).replace("_", " "))]
+    values[np.isin(raw, none)] = np.nan
     return values
 
 
@@ -568,10 +524,9 @@ def _raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
     data : of the frames, (n, bytes).
     """
     length, little = signal.length, signal.byte_order == "little_endian"
-    first, (begin, end) = _first_bit(signal), _bytes_of(signal)
+    where, before = _place(signal)
     order: Literal["little", "big"] = "little" if little else "big"
-    bits = np.unpackbits(data[:, begin:end], axis=1, bitorder=order)
-    bits = bits[:, first - 8 * begin : first - 8 * begin + length]
+    bits = np.unpackbits(data[:, where], axis=1, bitorder=order)[:, before : before + length]
     empty = np.zeros((len(bits), 64 - length), np.uint8)
     joined = np.concatenate([bits, empty] if little else [empty, bits], axis=1)
     packed = np.packbits(joined, axis=1, bitorder=order).reshape(-1)

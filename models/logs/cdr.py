@@ -24,9 +24,9 @@ _SEQUENCE = 4  # likewise: of any length
 ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
 # numpy's kind and bytes of what has a fixed size; no signals are what is given by a bool, or words.
 _NUMBERS = {
-    **{f"int{8 * size}": f"i{size}" for size in (1, 2, 4, 8)},
-    **{f"uint{8 * size}": f"u{size}" for size in (1, 2, 4, 8)},
-    **{"float32": "f4", "float64": "f8"},
+    f"{word}{8 * size}": f"{word[0]}{size}"
+    for word, sizes in (("int", (1, 2, 4, 8)), ("uint", (1, 2, 4, 8)), ("float", (4, 8)))
+    for size in sizes
 }
 _SIZES = {name: int(kind[1]) for name, kind in _NUMBERS.items()} | {"bool": 1, "byte": 1, "char": 1}
 
@@ -80,9 +80,7 @@ def layout_of(definitions: Definitions, kind: str, raw: bytes) -> Layout:
     if order is None:
         raise CdrError("a message is not plain CDR")
     walk = _Walk(definitions, order, raw)
-    walk.message(kind, "", 0)
-    if walk.place + PREFIX > len(raw):
-        raise CdrError(f"a message of {kind} is cut off")
+    walk.read((_NAME, kind), "", 0)
     return Layout(order, len(raw), tuple(walk.lengths), walk.places)
 
 
@@ -112,45 +110,32 @@ class _Walk:
         self.lengths: list[tuple[int, int]] = []
         self.places: dict[str, int] = {}
 
-    def message(self, kind: str, prefix: str | None, depth: int) -> None:
-        """Go through a message; numbers of one in an array, whose prefix is None, are not kept."""
-        for name, node in _fields(self.definitions, kind, depth):
-            path = None if prefix is None else prefix + name
-            number, value = _kind(node), node[1]
-            if number in (_BASE, _NAME):
-                self.one(node, path, depth)
-            else:
-                count = value[1] if number == _ARRAY else self.length()
-                self.many(value[0], count, depth)
-
-    def one(self, node: Any, path: str | None, depth: int) -> None:
+    def read(self, node: Any, path: str | None, depth: int) -> None:
+        """Go through a value; numbers of one in an array, whose path is None, are not kept."""
         number, value = _kind(node), node[1]
         if number == _NAME:
-            self.message(value, None if path is None else f"{path}.", depth + 1)
+            for name, inner in _fields(self.definitions, value, depth):
+                self.read(inner, None if path is None else f"{path}.{name}", depth + 1)
         elif number != _BASE:
-            raise CdrError("a definition has arrays of arrays")
+            one, count = value[0], value[1] if number == _ARRAY else self.length()
+            if count > len(self.raw):
+                raise CdrError("a message is cut off")
+            if _kind(one) != _BASE or one[1][0] == "string":
+                for _ in range(count):
+                    self.read(one, None, depth)
+            elif count:
+                size = self.align(one[1][0])  # moves the place, too
+                self.place += count * size
         elif value[0] == "string":
             length = self.length()  # moves the place, too
             self.place += length
         else:
             size = self.align(value[0])
             if path is not None:
-                self.places[path] = self.place + PREFIX
+                self.places[path.removeprefix(".")] = self.place + PREFIX
             self.place += size
         if self.place + PREFIX > len(self.raw):
             raise CdrError("a message is cut off")
-
-    def many(self, node: Any, count: int, depth: int) -> None:
-        """Go through the values of an array or a sequence."""
-        if count > len(self.raw):
-            raise CdrError("a message is cut off")
-        if _kind(node) == _BASE and node[1][0] != "string":
-            if count:
-                size = self.align(node[1][0])  # moves the place, too
-                self.place += count * size
-            return
-        for _ in range(count):
-            self.one(node, None, depth)
 
     def align(self, name: str) -> int:
         """Go to where a number begins; return its size."""

@@ -67,10 +67,11 @@ def open_log(
                 f"{path}: is packed by gzip, which only tables in text may be; unpack it first"
             )
         if format == "folder":
-            inside: dict[Path, LogFile | RecordingError] = {}
-            for one in sorted(path.iterdir()):
-                if one.is_file() and one.name.lower().endswith(ENDINGS):
-                    inside[one] = _of_folder(one, mend, clock, clock_unit, rate)
+            inside = {
+                one: _of_folder(one, mend, clock, clock_unit, rate)
+                for one in sorted(path.iterdir())
+                if one.is_file() and one.name.lower().endswith(ENDINGS)
+            }
             joined: LogFile = _function(_JOINED)(path, inside)
             return joined
         format = "can" if given else format

@@ -51,20 +51,16 @@ def one_line(path: Path, format: str) -> Iterator[None]:
         except (RecordingError, MemoryError):  # which says nothing of the file
             raise
         except Exception as error:  # libraries raise anything of a file that is not theirs
-            reason = _reason(error)
+            said = f"is not {format}, or is damaged or cut off ({_reason(error)})"
             _forget(error)
             if isinstance(error, FileNotFoundError) and not path.exists():
-                raise RecordingError(f"{path}: there is no such file") from None
-            if isinstance(error, PermissionError):
-                raise RecordingError(f"{path}: may not be read") from None
-            if isinstance(error, OSError) and error.errno in _FULL:
-                raise RecordingError(
-                    f"{path}: cannot be unpacked, there is no room in {tempfile.gettempdir()}; "
-                    "name a folder with room by TMPDIR"
-                ) from None
-            raise RecordingError(
-                f"{path}: is not {format}, or is damaged or cut off ({reason})"
-            ) from None
+                said = "there is no such file"
+            elif isinstance(error, PermissionError):
+                said = "may not be read"
+            elif isinstance(error, OSError) and error.errno in _FULL:
+                said = f"cannot be unpacked, there is no room in {tempfile.gettempdir()}; "
+                said += "name a folder with room by TMPDIR"
+            raise RecordingError(f"{path}: {said}") from None
 
 
 def _forget(error: BaseException | None) -> None:
@@ -72,18 +68,14 @@ def _forget(error: BaseException | None) -> None:
     while error is not None:
         traceback.clear_frames(error.__traceback__)
         error = error.__context__
-    gc.collect(1)  # it is young
+    gc.collect()
 
 
 def _reason(error: Exception) -> str:
-    text = " ".join(str(error).split())
-    if not text:
-        return type(error).__name__
-    return (
-        displayed(text[:_LONGEST_REASON]).strip("'\"")
-        if not text.isprintable()
-        else (text if len(text) <= _LONGEST_REASON else f"{text[:_LONGEST_REASON]}...")
-    )
+    text = " ".join(str(error).split()) or type(error).__name__
+    if not text.isprintable():
+        return displayed(text[:_LONGEST_REASON]).strip("'\"")
+    return text if len(text) <= _LONGEST_REASON else f"{text[:_LONGEST_REASON]}..."
 
 
 @contextmanager

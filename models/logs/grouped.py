@@ -5,8 +5,9 @@ group by group; the clock of a group is judged and mended once, and its channels
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -25,6 +26,7 @@ from models.logs.log import (
     one_run,
     require_small,
     some,
+    unique,
 )
 from models.logs.stamps import Stamps, seconds
 from models.logs.units import TIME, to_si
@@ -45,13 +47,14 @@ class Samples(NamedTuple):
     values: Mapping[str, Array]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class GroupedLog(Generic[_P]):
     """A log of groups of channels, as `LogFile` says.
     place : what a sample is in the file: "message" or "sample".
-    channels : as listed, each with where the format finds it.
+    found : the group of each channel, the channel, and where the format finds it; names may repeat.
     said : what is left out or taken for granted.
     samples : reads channels; a list, so that a file is not open any more when it is returned.
+    missing, remedy : what the file does not hold where there are none, and what to do.
     mend : whether stamps that do not rise are mended, and not refused; not a clock of several that
         starts again.
     clock_name, clock_unit : of the channel that is the time of all; empty leaves each its own.
@@ -65,47 +68,33 @@ class GroupedLog(Generic[_P]):
     format: str
     what: str
     place: str
-    channels: tuple[tuple[Listed, _P], ...]
+    found: Sequence[tuple[str, Listed, _P]]
     said: tuple[str, ...]
     samples: Callable[[Sequence[tuple[Listed, _P]]], list[Samples]]
+    missing: str
+    remedy: str = ""
     mend: bool = False
     clock_name: str = ""
     clock_unit: str = ""
     _mended: list[str] = field(default_factory=list, compare=False, repr=False)
 
-    @classmethod
-    def of(
-        cls,
-        path: Path,
-        format: str,
-        what: str,
-        place: str,
-        found: Sequence[tuple[str, Listed, _P]],
-        said: tuple[str, ...],
-        samples: Callable[[Sequence[tuple[Listed, _P]]], list[Samples]],
-        *,
-        missing: str,
-        remedy: str = "",
-    ) -> "GroupedLog[_P]":
-        """Return the log of channels whose names may repeat.
-        missing : what the file does not hold where there are none, for the message.
-        """
-        if not found:
-            why = "".join(f"; {one}" for one in (*said, remedy) if one)
-            raise RecordingError(f"{path}: holds no {missing}{why}")
-        few(path, len(found), "columns", "channels")
-        names = _unique((group, listed.name) for group, listed, _ in found)
-        return cls(
-            path=path,
-            format=format,
-            what=what,
-            place=place,
-            channels=tuple(
-                (replace(listed, name=name), where)
-                for name, (_, listed, where) in zip(names, found, strict=True)
-            ),
-            said=said,
-            samples=samples,
+    def __post_init__(self) -> None:
+        if not self.found:
+            why = "".join(f"; {one}" for one in (*self.said, self.remedy) if one)
+            raise RecordingError(f"{self.path}: holds no {self.missing}{why}")
+        few(self.path, len(self.found), "columns", "channels")
+
+    @cached_property
+    def channels(self) -> tuple[tuple[Listed, _P], ...]:
+        """The channels; the names that several share have that of their group before them."""
+        count = Counter(listed.name for _, listed, _ in self.found)
+        names = unique(
+            one.name if count[one.name] == 1 else f"{group}/{one.name}"
+            for group, one, _ in self.found
+        )
+        return tuple(
+            (replace(listed, name=name), where)
+            for name, (_, listed, where) in zip(names, self.found, strict=True)
         )
 
     @property
@@ -168,26 +157,6 @@ class GroupedLog(Generic[_P]):
             replace(one, t=stamps.t, values=stamps.of(one.values), rows=stamps.of(one.rows))
             for one in found
         )
-
-
-def _unique(names: Iterable[tuple[str, str]]) -> list[str]:
-    """Return names; what several share gets the name of its group before it, then a number
-    behind.
-    """
-    pairs = list(names)
-    count = Counter(name for _, name in pairs)
-    result: list[str] = []
-    taken: set[str] = set()
-    last: dict[str, int] = {}
-    for group, name in pairs:
-        full = name if count[name] == 1 else f"{group}/{name}"
-        number = last.get(full, 1)
-        while (one := full if number == 1 else f"{full} ({number})") in taken:
-            number += 1
-        last[full] = number
-        taken.add(one)
-        result.append(one)
-    return result
 
 
 def noted(what: str, names: Sequence[str]) -> tuple[str, ...]:

@@ -41,9 +41,7 @@ def open_folder(path: Path, opened: Mapping[Path, LogFile | RecordingError]) -> 
     ]
     bad = [one.name for one, log in opened.items() if isinstance(log, RecordingError)]
     said = (f"joined by time: {some([one.name for one in logs])}", *noted("not read", bad))
-    return GroupedLog.of(
-        path, "a log a message", "a log", "row", found, said, _of_files, missing="channel"
-    )
+    return GroupedLog(path, "a log a message", "a log", "row", found, said, _of_files, "channel")
 
 
 def _of_files(requested: Sequence[tuple[Listed, Any]]) -> list[Samples]:
@@ -54,12 +52,10 @@ def _of_files(requested: Sequence[tuple[Listed, Any]]) -> list[Samples]:
     for some_ in files.values():
         log, start = some_[0][1][0], some_[0][1][2]
         channels = log.read([name for _, (_, name, _) in some_])
-        by_clock: dict[int, dict[str, Any]] = {}
+        by_clock: dict[int, tuple[Any, dict[str, Any]]] = {}
         for (name, _), channel in zip(some_, channels, strict=True):
-            by_clock.setdefault(id(channel.t), {})[name] = channel
-        for group in by_clock.values():
-            t = next(iter(group.values())).t + start
-            found.append(Samples(log.path.name, t, {k: one.values for k, one in group.items()}))
+            by_clock.setdefault(id(channel.t), (channel.t, {}))[1][name] = channel.values
+        found += [Samples(log.path.name, t + start, values) for t, values in by_clock.values()]
     return found
 
 
@@ -74,44 +70,37 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
     if name is None or value is None or numeric[name] or not numeric[value]:
         return None
     words = [one for one in table.first_rows(name) if one]
-    clock = find_clock(
-        [one if k not in (name, value) else "" for k, one in enumerate(names)],
-        units,
-        table.first_rows,
-    )
+    others = [one if k not in (name, value) else "" for k, one in enumerate(names)]
+    clock = find_clock(others, units, table.first_rows)
     if clock is None or clock.column in (name, value) or len(set(words)) == len(words):
         return None
     kinds = {clock.column: kind_of(clock), name: Kind.WORD, value: Kind.NUMBER}
     cells = table.cells(kinds | ({} if unit is None else {unit: Kind.WORD}))
-    few(table.path, len(cells.words[name].names), "columns", "names")
-    stamps, codes = cells.columns[clock.column], cells.words[name].codes
+    words_of, codes = cells.words[name]
+    few(table.path, len(words_of), "columns", "names")
+    stamps = cells.columns[clock.column]
     require_times(str(table.path), clock, stamps, cells.rows, table.place)
     t = in_seconds(clock, stamps)
     order = np.argsort(codes, kind="stable")
-    edges = np.searchsorted(codes[order], np.arange(len(cells.words[name].names) + 1))
+    edges = np.searchsorted(codes[order], np.arange(1, len(words_of)))
+    told = None if unit is None else cells.words[unit]
     found = []
-    for k, word in enumerate(cells.words[name].names):
-        rows = order[edges[k] : edges[k + 1]]
-        rate = typical_rate(t[rows])
-        told = (
-            []
-            if unit is None
-            else [cells.words[unit].names[k] for k in np.unique(cells.words[unit].codes[rows])]
-        )
-        given = [one for one in told if is_given(one)] or [unit_in_name(word)]
+    for word, rows in zip(words_of, np.split(order, edges), strict=True):
+        there = [told.names[k] for k in np.unique(told.codes[rows])] if told else []
+        given = [one for one in there if is_given(one)] or [unit_in_name(word)]
         if not all(are_same(given[0], one) for one in given):
             raise RecordingError(
                 f"{table.path}: {word} must have one unit, it has {', '.join(given)}; "
                 "export it in one"
             )
-        listed = Listed(name=word, unit=given[0], samples=rows.size, rate=rate)
-        found.append(("", listed, rows))
+        rate = typical_rate(t[rows])
+        found.append(("", Listed(word, given[0], rows.size, rate), rows))
     said = (f"a row for each value: {names[name]} names it; time is {clock.words}",)
     values = cells.columns[value]
 
     def read(requested: Sequence[tuple[Listed, Any]]) -> list[Samples]:
         return [Samples(one.name, t[rows], {one.name: values[rows]}) for one, rows in requested]
 
-    return GroupedLog.of(
-        table.path, f"{table.format} of values", "a table", "row", found, said, read, missing="name"
+    return GroupedLog(
+        table.path, f"{table.format} of values", "a table", "row", found, said, read, "name"
     )

@@ -5,7 +5,8 @@ from which sensor) is given by a map, and only then a `Recording` in SI is made 
 """
 
 import difflib
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Protocol, TypeVar
@@ -68,7 +69,7 @@ class Clock(NamedTuple):
     summed: bool = False
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Listed:
     """A channel as a file lists it.
     name : as in the file, unique in it; a message's field has its topic before it.
@@ -173,3 +174,16 @@ def some(names: Sequence[str], most: int = _SOME) -> str:
     listing = visible(", ".join(names[:most]))
     cut = len(names) > most or len(listing) > _LONGEST
     return listing[:_LONGEST] + (f", ... ({len(names)})" if cut else "")
+
+
+def unique(names: Iterable[str]) -> tuple[str, ...]:
+    """Return names, each once: the second "v" is "v (2)"."""
+    found: dict[str, None] = {}
+    last: Counter[str] = Counter()
+    for name in names:
+        one = name
+        while one in found:
+            last[name] += 1
+            one = f"{name} ({last[name] + 1})"
+        found[one] = None
+    return tuple(found)

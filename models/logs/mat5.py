@@ -236,13 +236,10 @@ def _tree(path: Path, data: memoryview, order: str, depth: int) -> Tree:
 
 
 def _take(elements: Iterator[_Element], count: int) -> list[_Element]:
-    result = []
-    for _ in range(count):
-        element = next(elements, None)
-        if element is None or element.kind != _MATRIX:
-            raise _DamagedError("a cell or struct is cut off")
-        result.append(element)
-    return result
+    found = list(islice(elements, count))
+    if len(found) < count or any(one.kind != _MATRIX for one in found):
+        raise _DamagedError("a cell or struct is cut off")
+    return found
 
 
 def _words(begin: _Beginning, order: str) -> Tree:

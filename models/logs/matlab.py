@@ -53,9 +53,9 @@ def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
     channels = []
     for one in found.signals:
         struct, rate = one.clock.name.rpartition(".")[0] or "top", rates[one.clock]
-        listed = Listed(name=one.name, unit=one.unit, samples=one.samples, rate=rate)
+        listed = Listed(one.name, one.unit, one.samples, rate)
         channels.append((struct, listed, one))
-    return GroupedLog.of(
+    return GroupedLog(
         path,
         format,
         what,
@@ -63,8 +63,8 @@ def open_(path: Path, rate: float = 0.0) -> GroupedLog[Signal]:
         channels,
         said,
         partial(_samples, per_second),
-        missing="signal with a time",
-        remedy=_REMEDY if said else f"there is no vector of numbers; {_REMEDY}",
+        "signal with a time",
+        _REMEDY if said else f"there is no vector of numbers; {_REMEDY}",
     )
 
 

@@ -123,9 +123,9 @@ def open_(path: Path) -> GroupedLog[_Place]:
                     others[kind].append(str(channel.name))
                     continue
                 unit = str(file.get_channel_unit(group=number, index=index) or "").strip()
-                listed = Listed(name=str(channel.name), unit=unit, samples=samples, rate=rate)
+                listed = Listed(str(channel.name), unit, samples, rate)
                 found.append((name, listed, _Place(number, index)))
-        return GroupedLog.of(
+        return GroupedLog(
             path,
             "MDF4" if is_4 else "MDF3",
             "an MDF file",
@@ -133,7 +133,7 @@ def open_(path: Path) -> GroupedLog[_Place]:
             found,
             tuple(note for kind, why in _REASONS.items() for note in noted(why, others[kind])),
             partial(_samples, path),
-            missing="numeric channel with a time",
+            "numeric channel with a time",
         )
 
 
@@ -234,26 +234,25 @@ def _require_ends(path: Path) -> None:
             else _Form(68, 4, 8, struct.Struct(order + "I"))
         )
         seen: set[int] = set()
-        for group in _linked(path, file, form, _link(file, form.first, form), seen):
-            for records in _linked(path, file, form, _link(file, group + form.inner, form), seen):
-                first = _link(file, records + form.inner, form)
-                for _ in _linked(path, file, form, first, seen):
+        for group in _linked(path, file, form, form.first, seen):
+            for records in _linked(path, file, form, group + form.inner, seen):
+                for _ in _linked(path, file, form, records + form.inner, seen):
                     few(path, len(seen) / 3, "columns", "channels")
 
 
-def _linked(path: Path, file: BinaryIO, form: _Form, place: int, seen: set[int]) -> Iterator[int]:
-    while place:
+def _linked(path: Path, file: BinaryIO, form: _Form, link: int, seen: set[int]) -> Iterator[int]:
+    """Yield the places of blocks.   link : where that of the first is stored."""
+    while True:
+        file.seek(link)
+        raw = file.read(form.link.size)
+        place = int(form.link.unpack(raw)[0]) if len(raw) == form.link.size else 0
+        if not place:
+            return
         if place in seen:
             raise RecordingError(f"{path}: is a damaged MDF file, its blocks run in a circle")
         seen.add(place)
         yield place
-        place = _link(file, place + form.next, form)
-
-
-def _link(file: BinaryIO, place: int, form: _Form) -> int:
-    file.seek(place)
-    raw = file.read(form.link.size)
-    return int(form.link.unpack(raw)[0]) if len(raw) == form.link.size else 0
+        link = place + form.next
 
 
 def _require_fitting(path: Path, group: Any, is_4: bool) -> None:

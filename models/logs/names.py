@@ -58,6 +58,8 @@ _LONGEST = 17.5  # [m]: wheelbase, with understeer at speed, that v_x δ / r can
 _FASTEST = 430.0  # [km/h]
 _SAME = 2e-3  # of their size: by less two channels differ that are one, but for rounding
 
+_Seen = Mapping[str, Channel]  # channels as they were read, by name
+
 _HAND = "steering wheel"  # an angle that wants a ratio
 # Units that are met where none is given, "" SI.
 _ASSUMED = {"v_x": ("", "km/h"), "r": ("", "deg/s"), "a_y": ("", "g")}
@@ -109,9 +111,8 @@ _LAST = "beschleunigung|beschl|geschwindigkeit|geschw|rate|winkel|moment|kraft"
 _COMPOUND = re.compile(f"(?:{_FIRST})+(?:{_LAST})+")
 _PARTS = re.compile(f"{_FIRST}|{_LAST}")
 # CarSim says left or right and the number of the axle: "Steer_L1", "Fy_R2".
-_SIDE_AND_AXLE = re.compile(r"(?<![A-Za-z0-9])[LR][12](?![A-Za-z0-9])")
+_SIDE_AND_AXLE = re.compile(r"(?<![A-Za-z0-9])([LR])([12])(?![A-Za-z0-9])")
 _SPIN = re.compile(r"(?<![A-Za-z])AV[xyz](?![A-Za-z])")  # and "AVy_L1" of the spin of a wheel
-_CORNER_OF_AXLE = {"L1": " fl ", "R1": " fr ", "L2": " rl ", "R2": " rr "}
 _GENERIC = ("data", "value")  # a field that says nothing, as of std_msgs: its topic is its name
 _UMLAUTS = str.maketrans(_TABLES["letters"])
 
@@ -121,6 +122,7 @@ _PLACES = {
     name: [frozenset(way.split()) for way in _WHEELS[name].split(",")] for name in WHEELS[:-1]
 }
 _ANYWHERE = frozenset(word for ways in _PLACES.values() for way in ways for word in way)
+_PLACES[WHEELS[-1]] = [frozenset()]
 _WHEEL, _TURNING, _SPEEDS, _BOTH, _ENCODER, _OTHERS = (
     frozenset(_WHEELS[name].split())
     for name in ("wheel", "turns", "speeds", "both", "encoder", "others")
@@ -136,17 +138,12 @@ def _wheel_words(signal: str, words: Sequence[str]) -> bool:
     listed = frozenset(parts)
     if listed & _OTHERS:
         return False
-    if signal == WHEELS[-1]:
-        turns = listed & _ENCODER or (listed & _WHEEL and listed & _TURNING) or listed == {signal}
-        return bool(turns and not listed & _ANYWHERE)
     for place in _PLACES[signal]:
         rest = listed - place
         if listed >= place and not rest & _ANYWHERE:
-            return bool(
-                rest & _BOTH
-                or (rest & _WHEEL and (rest & _TURNING or rest <= _WHEEL))
-                or (rest <= _SPEEDS and rest)
-            )
+            alone = (rest <= _WHEEL or rest <= _SPEEDS) if place else rest == {signal}
+            turns = rest & (_BOTH if place else _ENCODER) or (rest & _WHEEL and rest & _TURNING)
+            return bool(turns or (rest and alone))
     return False
 
 
@@ -197,7 +194,8 @@ class Proposal:
             kept = [name for name in kept if name not in forces]
         return {
             name: Signal(channel=one.channel, unit=one.unit, sign=one.sign, factor=one.factor)
-            for name, one in ((name, self.guesses[name]) for name in kept)
+            for name in kept
+            for one in [self.guesses[name]]
         }
 
 
@@ -208,7 +206,7 @@ def _words_of(name: str) -> tuple[str, ...]:
     plain = re.sub(r"\(([xyzXYZ])\)", r" \1 ", plain)  # "G(x)"
     plain = re.sub(r"\[[^]]*\]|\([^)]*\)", " ", plain)  # a unit in brackets
     plain = _SPIN.sub(lambda found: f" {found[0].lower()} ", plain)
-    plain = _SIDE_AND_AXLE.sub(lambda found: _CORNER_OF_AXLE[found[0]], plain)
+    plain = _SIDE_AND_AXLE.sub(lambda found: f" {' fr'[int(found[2])]}{found[1].lower()} ", plain)
     plain = re.sub(r"([a-z0-9])([A-Z])", r"\1 \2", plain)
     plain = re.sub(r"([A-Z]+)([A-Z][a-z])", r"\1 \2", plain)
     return tuple(re.findall(r"[a-z]+|\d+", plain.lower().translate(_UMLAUTS)))
@@ -312,8 +310,7 @@ def propose(
             continue
         hand, least = _rank(ranked[0])[0], ranked[0].confidence - _APART
         equal = [one for one in ranked if one.confidence > least and _rank(one)[0] == hand]
-        if len(equal) > 1:
-            equal.sort(key=lambda one: -_rate(seen[one.channel[0]]))
+        equal.sort(key=lambda one: -_rate(seen[one.channel[0]]))
         guesses[name] = equal[0]
         others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
         if others:
@@ -346,9 +343,7 @@ def poses(headings: Sequence[Heading]) -> dict[str, dict[str, list[Heading]]]:
     return groups
 
 
-def _pose(
-    headings: Sequence[Heading], seen: Mapping[str, Channel], steering: str
-) -> dict[str, Guess]:
+def _pose(headings: Sequence[Heading], seen: _Seen, steering: str) -> dict[str, Guess]:
     """Return x, y and heading of one sensor: of a tracker before odometry; a lone one is sure.
 
     Of a world with y up z is y, turned as the steering does.
@@ -377,35 +372,36 @@ def _pose(
     why = why or ("" if sign else "seen from above or, *-1, from below?")
     sure = HINT if why else _KNOWN
     lost = _NO_UNIT_LOSS if measured[0] and not is_given(some["x"].unit) else 0.0
-    turned = [some[key].name for key in ("qx", "qy", "qz", "qw") if key in some]
-    turned = [some["h"].name] if "h" in some else turned[-2:] if len(turned) < 4 else turned
-    angle = some["h"].unit if "h" in some else ""
+    turned = [
+        some[key] for key in (("h",) if "h" in some else ("qx", "qy", "qz", "qw")) if key in some
+    ]
+    turned = turned if len(turned) == 4 else turned[-2:]
     return {
         name: Guess(
-            channel=tuple(listed), confidence=sure - lost, unit=unit.strip(), factor=factor, why=why
+            channel=tuple(one.name for one in listed),
+            confidence=sure - lost,
+            unit=listed[0].unit.strip() * (len(listed) == 1),
+            factor=(sign or 1.0) if name == "y" else 1.0,
+            why=why,
         )
-        for name, listed, unit, factor in (
-            ("x", [some["x"].name], some["x"].unit, 1.0),
-            ("y", [some["y"].name], some["y"].unit, sign or 1.0),
-            ("heading", turned, angle, 1.0),
-        )
+        for name, listed in (("x", [some["x"]]), ("y", [some["y"]]), ("heading", turned))
     }
 
 
 def _with_signs(
-    candidates: Mapping[str, list[Guess]], headings: Sequence[Heading], seen: Mapping[str, Channel]
+    candidates: Mapping[str, list[Guess]], headings: Sequence[Heading], seen: _Seen
 ) -> dict[str, list[Guess]]:
     """Return the guesses; amounts with the channel of their sign, which is called as they are."""
-    signs: dict[frozenset[str], str] = {}
-    for one in headings:
-        words = frozenset(_words_of(one.name))
-        if words & _SIGN and not is_given(one.unit):
-            signs[words - _SIGN] = one.name
+    signs = {
+        words - _SIGN: one.name
+        for one in headings
+        if (words := frozenset(_words_of(one.name))) & _SIGN and not is_given(one.unit)
+    }
 
     def completed(guess: Guess) -> Guess:
-        sign = signs.get(frozenset(_words_of(guess.channel[0])), "")
-        values = seen[guess.channel[0]].values if sign and guess.channel[0] in seen else np.zeros(0)
-        if not values.size or np.nanmin(values) < 0.0:
+        name = guess.channel[0]
+        sign = signs.get(frozenset(_words_of(name)), "")
+        if not sign or name not in seen or np.nanmin(seen[name].values, initial=0.0) < 0.0:
             return guess
         return replace(_said(guess, f"its sign is in {sign!r}"), sign=sign)
 
@@ -416,7 +412,7 @@ def _along_axes(
     candidates: Mapping[str, list[Guess]],
     boxes: Sequence[Triad],
     units: Mapping[str, str],
-    seen: Mapping[str, Channel],
+    seen: _Seen,
 ) -> dict[str, list[Guess]]:
     """Return the guesses; of boxes whose letters mislead those that their numbers tell."""
     if not boxes:
@@ -447,10 +443,15 @@ def _along_axes(
     return mended
 
 
+def _surest(found: Sequence[Guess]) -> list[Guess]:
+    """Return the surest guess; none where there is hardly any."""
+    best = sorted(found, key=lambda one: -one.confidence)[:1]
+    return [one for one in best if one.confidence > STILL]
+
+
 def _likeliest(found: Sequence[Guess]) -> str:
     """Return the channel of the surest guess; "" where there is none."""
-    likely = max(found, key=lambda one: one.confidence, default=None)
-    return likely.channel[0] if likely and likely.confidence > STILL else ""
+    return next((one.channel[0] for one in _surest(found)), "")
 
 
 def _rank(guess: Guess) -> tuple[bool, float]:
@@ -458,7 +459,7 @@ def _rank(guess: Guess) -> tuple[bool, float]:
     return guess.hand or guess.confidence < _NAMES_WORDS, -guess.confidence
 
 
-def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -> bool:
+def _are_one(name: str, one: Guess, other: Guess, seen: _Seen) -> bool:
     """Return whether two guesses are one channel, as SPEED_KPH and SPEED_MPH: name and numbers."""
     if len(one.channel) + len(other.channel) > 2 or _is_given(one) != _is_given(other):
         return False
@@ -469,11 +470,9 @@ def _are_one(name: str, one: Guess, other: Guess, seen: Mapping[str, Channel]) -
     good, there = np.isfinite(first.values), np.isfinite(second.values)
     if not good.any() or not there.any():
         return False
-    scales = (to_si(guess.unit, quantity_of(name, guess.unit), name) for guess in (one, other))
-    beside = np.interp(first.t[good], second.t[there], second.values[there])
-    here, beside = (
-        x * scale for x, scale in zip((first.values[good], beside), scales, strict=True)
-    )
+    scales = [to_si(guess.unit, quantity_of(name, guess.unit), name) for guess in (one, other)]
+    here = scales[0] * first.values[good]
+    beside = scales[1] * np.interp(first.t[good], second.t[there], second.values[there])
     return _root_mean_square(here - beside) <= _SAME * _root_mean_square(here)
 
 
@@ -509,8 +508,7 @@ def _candidates(signal: str, headings: Sequence[Heading]) -> list[Guess]:
         if signal == "v_x" and quantities(one.name) == (SPEED,) and one.name.lower() != "fps":
             by_name = max(by_name, _VAGUE)  # its unit is its name
         by_hand = max(_name_confidence(_HAND, name) for name in names) * (signal == "delta_f")
-        best = max(by_name, by_hand)
-        if best > 0.0:
+        if best := max(by_name, by_hand):
             guess = Guess(channel=(one.name,), confidence=best, hand=by_hand > by_name)
             guess = _with_unit(signal, one, guess)
             if other and max(_name_confidence(key, bare) for key in (signal, _HAND)):
@@ -543,8 +541,8 @@ def _with_unit(signal: str, one: Heading, guess: Guess) -> Guess:
     near = quantity == RATE and ANGLE in plausible  # as some databases have it
     return replace(
         guess,
-        unit=f"{unit}/s" if near else "",
-        confidence=0.5 * guess.confidence if near else 0.0,
+        unit=f"{unit}/s" * near,
+        confidence=0.5 * guess.confidence * near,
         why=f"its unit {unit} is none of a {quantity}",
     )
 
@@ -584,7 +582,7 @@ def _said(guess: Guess, why: str) -> Guess:
     return replace(guess, why="; ".join(part for part in (why, guess.why) if part))
 
 
-def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
+def _looked(signal: str, guess: Guess, seen: _Seen) -> Guess:
     size = usual = 0.0
     for name in guess.channel:
         if name not in seen:
@@ -593,8 +591,7 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
         finite = values[np.isfinite(values)]
         finite = finite[:: max(1, finite.size // _LOOKED_AT)]
         if not finite.size or (signal != "delta_r" and np.ptp(finite) == 0.0):
-            left = STILL if guess.confidence < _STANDARD else 1.0
-            left *= guess.confidence
+            left = guess.confidence * (STILL if guess.confidence < _STANDARD else 1.0)
             return replace(_said(guess, "it never changes"), confidence=left)
         size = max(size, float(np.abs(finite).max()))
         usual = max(usual, _usual(finite))
@@ -606,12 +603,11 @@ def _looked(signal: str, guess: Guess, seen: Mapping[str, Channel]) -> Guess:
         usual *= to_si(guess.unit, RATE, signal)  # wheels and shafts turn faster than any car
         if unit_of_range(RATE, usual):
             return replace(_said(guess, f"goes to {usual:.3g} rad/s"), confidence=0.0)
-    if QUANTITIES[signal] != ANGLE:
-        return guess
-    largest = size * to_si(guess.unit, ANGLE, signal)
-    if signal != BETA and largest > _LARGEST_ROAD and not guess.hand:
-        why = f"goes to {math.degrees(largest):.0f} deg, as a hand wheel does"
-        return replace(_said(guess, why), hand=True)
+    if QUANTITIES[signal] == ANGLE and signal != BETA and not guess.hand:
+        largest = size * to_si(guess.unit, ANGLE, signal)
+        if largest > _LARGEST_ROAD:
+            why = f"goes to {math.degrees(largest):.0f} deg, as a hand wheel does"
+            return replace(_said(guess, why), hand=True)
     return guess
 
 
@@ -630,32 +626,22 @@ def _by_range(signal: str, guess: Guess, size: float, usual: float) -> Guess:
     if unit == "km/h" and usual > _FASTEST:
         guess = replace(_said(guess, "in tenths, as no car is so fast"), factor=0.1)
     if unit and quantity == ANGLE and signal != BETA and not guess.hand:
-        hand = usual * to_si(unit, quantity, signal) > _LARGEST_ROAD
-        guess = replace(guess, hand=hand)
+        guess = replace(guess, hand=usual * to_si(unit, quantity, signal) > _LARGEST_ROAD)
     if not unit:
         return _said(guess, f"goes to {size:.3g}") if quantity in (ANGLE, SPEED) else guess
     far = f"goes to {size:.3g}, " + ("as a hand wheel does in" if guess.hand else "so in")
     return _said(replace(guess, unit=unit), f"{far} {unit}")
 
 
-def _beside_turning(
-    candidates: Mapping[str, list[Guess]], seen: Mapping[str, Channel]
-) -> dict[str, list[Guess]]:
+def _beside_turning(candidates: Mapping[str, list[Guess]], seen: _Seen) -> dict[str, list[Guess]]:
     """Return the guesses; those without a unit in the one with which a_y is nearest to v_x r.
 
     Where they cannot be set beside each other, how far a_y goes tells whether it is in g.
     """
-    best = {
-        name: max(likely, key=lambda one: one.confidence)
-        for name in ("v_x", "r", "a_y")
-        if (likely := [one for one in candidates[name] if one.confidence > STILL])
-    }
+    best = {name: one for name in ("v_x", "r", "a_y") for one in _surest(candidates[name])}
     mended = dict(candidates)
     if {"v_x", "r"} <= set(best):
-        mended["delta_f"] = [
-            _levered(one, best, seen) if one.confidence > STILL else one
-            for one in candidates["delta_f"]
-        ]
+        mended["delta_f"] = [_levered(one, best, seen) for one in candidates["delta_f"]]
     for name in _ASSUMED:
         mended[name] = [
             guess
@@ -674,12 +660,14 @@ def _beside_turning(
     return mended
 
 
-def _levered(guess: Guess, best: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
+def _levered(guess: Guess, best: Mapping[str, Guess], seen: _Seen) -> Guess:
     """Return a guess of the steering, of the hand wheel where it turns too far for the car's bend.
 
     v_x δ / r is the wheelbase, and more of a car that understeers; a_y, where its unit is given,
     tells v_x r whatever the unit of r.
     """
+    if guess.hand or guess.confidence <= STILL:
+        return guess
     turning = "a_y" if "a_y" in best and _is_given(best["a_y"]) else "r"
     there = {"v_x": best["v_x"], turning: best[turning], "delta_f": guess}
     v, turn, delta = (
@@ -687,7 +675,7 @@ def _levered(guess: Guess, best: Mapping[str, Guess], seen: Mapping[str, Channel
         for name, one in there.items()
     )
     turn = turn if turning == "r" else turn / max(v, 1e-9)
-    if guess.hand or not v * delta > _LONGEST * turn > 0.0:
+    if not v * delta > _LONGEST * turn > 0.0:
         return guess
     return replace(_said(guess, "too far for how the car turns"), hand=True)
 
@@ -697,7 +685,7 @@ def _is_given(guess: Guess) -> bool:
     return bool(guess.unit) or guess.confidence == _STANDARD
 
 
-def _in_turning(name: str, there: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
+def _in_turning(name: str, there: Mapping[str, Guess], seen: _Seen) -> Guess:
     """Return the guess of one of them in the unit that v_x, r and a_y together have."""
     guess = there[name]
     sizes = {one: _root_mean_square(seen[there[one].channel[0]].values) for one in there}

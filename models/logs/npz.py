@@ -18,24 +18,23 @@ _LONGEST_TEXTS = 1_000_000  # bytes of names of columns
 
 
 def read_tree(path: Path) -> dict[str, Tree]:
-    """Return the arrays of a file; numbers are read when they are asked for."""
-    if not zipfile.is_zipfile(path):
-        return _top(path, "", "data")
-    with zipfile.ZipFile(path) as file:
-        members = [one for one in file.infolist() if one.filename.endswith(".npy")]
+    """Return the arrays of a file; numbers are read when they are asked for.
+
+    The fields of a lone array are arrays themselves.
+    """
+    names = {"": "data"}
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as file:
+            members = [one for one in file.infolist() if one.filename.endswith(".npy")]
         few(path, len(members), "columns", "arrays")
+        names = {one.filename: one.filename.removesuffix(".npy") for one in members}
         for one in members:
-            dense(path, one.file_size, one.compress_size, one.filename.removesuffix(".npy"))
-        found: dict[str, Tree] = {}
-        for one in members:
-            found |= _top(path, one.filename, one.filename.removesuffix(".npy"))
+            dense(path, one.file_size, one.compress_size, names[one.filename])
+    found: dict[str, Tree] = {}
+    for member, name in names.items():
+        tree = _tree(path, member)
+        found |= tree if isinstance(tree, dict) and name == "data" else {name: tree}
     return found
-
-
-def _top(path: Path, member: str, name: str) -> dict[str, Tree]:
-    """Return an array by its name; of a lone one with fields these."""
-    tree = _tree(path, member)
-    return tree if isinstance(tree, dict) and name == "data" else {name: tree}
 
 
 def _tree(path: Path, member: str) -> Tree:
@@ -48,14 +47,14 @@ def _tree(path: Path, member: str) -> Tree:
     if dtype.names:
         return {name: _leaf(path, member, shape, dtype[name], name) for name in dtype.names}
     if dtype.kind in "US" and size * dtype.itemsize <= _LONGEST_TEXTS:
-        words = [str(one) for one in np.atleast_1d(_load(path, member)).ravel().tolist()]
-        return list(words) if shape else words[0]
+        words: list[Tree] = np.ravel(_load(path, member)).astype(str).tolist()
+        return words if shape else words[0]
     return _leaf(path, member, shape, dtype, "")
 
 
 def _leaf(path: Path, member: str, shape: tuple[int, ...], dtype: Any, field: str) -> Tree:
-    if dtype.kind not in "iufbmM" or len(shape) > 2:
-        return Unread("no numbers" if dtype.kind not in "iufbmM" else f"{len(shape)} dimensions")
+    if (other := dtype.kind not in "iufbmM") or len(shape) > 2:
+        return Unread("no numbers" if other else f"{len(shape)} dimensions")
     rows, width = (*shape, 1, 1)[:2]
     return Leaf(shape=(rows, width), load=partial(_numbers, path, member, field, (rows, width)))
 

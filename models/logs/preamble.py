@@ -65,9 +65,11 @@ _GIVEN_STEP = re.compile(
 # RaceCapture describes a channel in one cell: "Speed"|"mph"|0.0|150.0|10, its range and rate.
 _DESCRIBED = re.compile(r'"?(?P<name>[^"|]+)"?\|"?(?P<unit>[^"|]*)"?(?:\|[-+.\deE]*){1,3}')
 # A channel that is described by lines, not by its column: "Channel : Speed", "Ch 1 = Speed [km/h]".
-_KEYS = "channel|ch|signal|column|col|kanal|spalte|name|field|parameter"
-_NAME_LINE = re.compile(rf"\W*(?:{_KEYS})(?: ?name| ?\d+)?\s*[:=]\s*(.*\S)\s*", re.I)
-_UNIT_LINE = re.compile(r"\W*(?:unit|units|einheit)(?: ?\d+)?\s*[:=]\s*(.*\S)\s*", re.I)
+_TOLD = re.compile(
+    r"\W*(?:(?:channel|ch|signal|column|col|kanal|spalte|name|field|parameter)(?: ?name| ?\d+)?"
+    r"|(?P<unit>units?|einheit)(?: ?\d+)?)\s*[:=]\s*(?P<what>.*\S)\s*",
+    re.I,
+)
 _TITLE = re.compile(r"(?:channels|signals|columns|names|fields|units|header)\s*[:=]\s*", re.I)
 _CONTROLS = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 _QUOTED = re.compile(r'["\r\n\x00]')  # what a reader of CSV does more with than to split
@@ -328,10 +330,9 @@ def _table(
     if not units:
         labels = (line.cells for line in zone if line.text.startswith("Y_Unit_Label"))
         units = ["", *next(labels, ("",))[1:]]
-    if not any(units) and (described := [_DESCRIBED.fullmatch(name) for name in names]):
-        fitting = [one for one in described if one]
-        if len(fitting) == len(names):
-            names, units = [one["name"] for one in fitting], [one["unit"] for one in fitting]
+    described = [found for name in names if (found := _DESCRIBED.fullmatch(name))]
+    if not any(units) and len(described) == len(names):
+        names, units = ([one[of] for one in described] for of in ("name", "unit"))
     units = (units + [""] * len(names))[: len(names)]
     units = [
         unit.strip("[](){} ") or unit_in_name(name) for name, unit in zip(names, units, strict=True)
@@ -339,9 +340,9 @@ def _table(
     again = (names_line.text,) if units_line is None else (names_line.text, units_line.text)
     rows = (line.cells for line in lines[first:])
     data = tuple(islice((row for row in rows if len(row) == len(names)), _ROWS))
-    made_by = _maker(lines[:first])
-    share = way.share
-    sure = "sure" if share > _CLEAR else "likely" if share > 0.6 else "a guess"
+    start = " ".join(line.text for line in lines[:first][:8]).lower()
+    made_by = next((maker for words, maker in _MAKERS.items() if words in start), "")
+    sure = "sure" if way.share > _CLEAR else "likely" if way.share > 0.6 else "a guess"
     words = [
         _encoding_word(encoding),
         f"cells apart by {_DELIMITERS[way.delimiter]} ({sure})",
@@ -350,8 +351,10 @@ def _table(
     words += [f"thousands apart by {displayed(way.thousands)}"] * bool(way.thousands)
     words += [f"{made_by} export"] * bool(made_by)
     words += [f"names in line {names_line.number}"]
-    words += [f"units in line {units_line.number}"] if units_line is not None else []
-    words += [] if units_line is not None or not any(units) else ["units in the names"]
+    if units_line is not None:
+        words.append(f"units in line {units_line.number}")
+    elif any(units):
+        words.append("units in the names")
     rate = _given_rate([line.text for line in lines[: names_line.number - 1]])
     numeric = _numeric(data, names, way)
     return Layout(
@@ -389,16 +392,18 @@ def _listed(lines: list[_Line], way: _Way) -> tuple[list[_Line], int] | None:
 
     Of one name less than columns the first column is the time.
     """
-    told: list[tuple[str, str]] = []
+    told: list[list[str]] = []
     last = 0
     for line in lines:
-        if found := _NAME_LINE.fullmatch(line.text):
-            told, last = [*told, (found[1], "")], line.number
-        elif told and (found := _UNIT_LINE.fullmatch(line.text)):
-            told[-1], last = (told[-1][0], found[1]), line.number
+        if (found := _TOLD.fullmatch(line.text)) and (told or not found["unit"]):
+            last = line.number
+            if found["unit"]:
+                told[-1][1] = found["what"]
+            else:
+                told.append([found["what"], ""])
     if len(told) < 2 or way.width - len(told) not in (0, 1):
         return None
-    told = [("Time", "")] * (way.width - len(told)) + told
+    told = [["Time", ""]] * (way.width - len(told)) + told
     rows = (k for k in range(last, len(lines)) if len(lines[k].cells) == way.width)
     first = next((k for k in rows if _is_data(lines[k], way, 0)), None)
     names, units = (
@@ -464,22 +469,16 @@ def _numeric(data: Sequence[Sequence[str]], names: Sequence[str], way: _Way) -> 
         cells = [row[column] for row in data]
         filled = [cell for cell in cells if cell.lower() not in MISSING]
         right = sum(_is_number(cell, way.decimal, way.thousands) for cell in filled)
-        if filled:
-            times = (_is_instant(cell) and not _DOT.fullmatch(cell) for cell in filled)
-            marked = (":" in cell or cell.count("-") == 2 for cell in filled)
-            found.append(2 * right >= len(filled) and not (all(marked) or all(times)))
-        else:
-            found.append(names[column] != "")  # what follows the delimiter that rows end in
+        times = (_is_instant(cell) and not _DOT.fullmatch(cell) for cell in filled)
+        marked = (":" in cell or cell.count("-") == 2 for cell in filled)
+        numeric = 2 * right >= len(filled) and not (all(marked) or all(times))
+        # Without a name it is what follows the delimiter that rows end in.
+        found.append(numeric if filled else names[column] != "")
     return tuple(found)
 
 
 def _encoding_word(encoding: str) -> str:
     return f"text in {encoding.removesuffix('-sig').upper()}"
-
-
-def _maker(lines: Sequence[_Line]) -> str:
-    start = " ".join(line.text for line in lines[:8]).lower()
-    return next((maker for words, maker in _MAKERS.items() if words in start), "")
 
 
 def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
@@ -501,7 +500,7 @@ def _no_data(path: Path, lines: list[str], encoding: str) -> Layout:
 
 # Racelogic VBOX: [header], [channel units], [column names], [data], each a section.
 
-_OF_THE_BOX = TABLES["header"]["box"].split()
+_OF_THE_BOX = TABLES["header"]["box"]  # columns, with the units that they have there
 
 
 def _sections(lines: list[str]) -> dict[str, int] | None:
@@ -529,11 +528,8 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
             units = [word if is_unit(word) else "" for word in last]
     if "channel units" in at:
         units = _with_channel_units(lines, at, names, units)
-    known = {"time": "hhmmss", "velocity": "km/h", "lat": "min", "long": "min", "heading": "deg"}
-    units = [
-        known[name.lower()] if name.lower() == "time" else unit or known.get(name.lower(), "")
-        for name, unit in zip(names, units, strict=True)
-    ]
+    told = (_OF_THE_BOX.get(name.lower(), "") for name in names)
+    units = [one if one == "hhmmss" else unit or one for one, unit in zip(told, units, strict=True)]
     first = at["data"] + 1
     data = [cells for line in lines[first:] if len(cells := cells_of(line, BLANKS)) == len(names)]
     way = _way([line for line in lines[first:] if line.strip()][-_TAIL:])

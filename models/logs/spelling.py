@@ -15,7 +15,7 @@ _ENDINGS, _CAPITAL = (
     dict(pair.split("=") for pair in TABLES["endings"][kind].split())
     for kind in ("plain", "capital")
 )
-_LONGEST_FIRST = sorted(_ENDINGS.items(), key=lambda one: -len(one[0]))
+_ENDING = re.compile(f"_({'|'.join(_ENDINGS)})$")
 _CAPITAL_ENDING = re.compile(
     f"(?:(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Za-z0-9])_(?=[A-Z]))(?i:(?P<unit>{'|'.join(_CAPITAL)}))$"
 )
@@ -64,9 +64,8 @@ def _split(name: str) -> tuple[str, str]:
             return before.strip(), unit.strip()
     if _LENKRAD.search(bare):
         return name, ""
-    for ending, unit in _LONGEST_FIRST:
-        if bare.endswith("_" + ending):
-            return bare.removesuffix("_" + ending), unit
+    if found := _ENDING.search(bare):
+        return bare[: found.start()], _ENDINGS[found[1]]
     found = _CAPITAL_ENDING.search(bare)
     unit = _CAPITAL[found["unit"].lower()] if found else ""
     if found is None or (unit == "rad" and not _OF_ANGLES.search(bare)):  # "vRad" is of a wheel

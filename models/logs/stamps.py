@@ -67,25 +67,11 @@ _COUNTERS = tuple(TABLES["clock"]["counters"].split())
 _MENDING = '--mend-clock (in Python LogMap(order="mend"))'
 
 
-_DATE = re.compile(
-    r"(?:(\d{4})[-/]?(\d\d)[-/]?(\d\d)|(\d{1,2})[./](\d{1,2})[./](\d{4}|\d\d))(?:[T, ]+(.+))?"
-)
+_DATES = tuple(map(re.compile, TABLES["clock"]["dates"]))
 _TIME = re.compile(
     r"(?:(\d+):)?(\d{1,2}):(\d\d)(?:[.,](\d+))?(?: ?([AP])\.?M\.?)?"
     r"(?: ?(?:Z|UTC|GMT))?(?: ?([-+])(\d\d):?(\d\d))?",
     re.I,
-)
-_MONTH = r"(?P<month>[^\W\d_]{3,9})\.?"
-_NAMED = tuple(  # dates whose month is a word: 04-Apr-2025 18:10, 2025-Apr-04, Apr 4, 2025 6:10 PM
-    re.compile(r"(?:[^\W\d_]{2,9}[.,]? +)?" + form)
-    for form in (
-        rf"(?P<day>\d{{1,2}})[-/. ]+{_MONTH}[-/, ]+(?P<year>\d{{4}}|\d\d)(?:[T, ]+(?P<time>.+))?",
-        rf"(?P<year>\d{{4}})[-/. ]{_MONTH}[-/. ](?P<day>\d{{1,2}})(?:[T, ]+(?P<time>.+))?",
-        rf"{_MONTH} +(?P<day>\d{{1,2}}),? +(?P<year>\d{{4}})(?:[T, ]+(?P<time>.+))?",
-        # Fri Apr 04 18:10:23 GMT+02:00 2025
-        rf"{_MONTH} +(?P<day>\d{{1,2}}) +(?P<time>[\d:.,]+(?: (?:GMT|UTC)?[-+:\d]*)?)"
-        r"(?: [A-Z]{3,5})? +(?P<year>\d{4})",
-    )
 )
 _MONTHS = {
     word: 1 + k
@@ -385,39 +371,23 @@ def nanoseconds(cell: str) -> int | None:
     text = cell.strip()
     if not text:
         return MISSING
-    found = _DATE.fullmatch(text) or _DATE.fullmatch(_in_digits(text))
+    found = next(filter(None, (form.fullmatch(text) for form in _DATES)), None)
     if found is None:
         lasting = _DURATION.fullmatch(text)
         if lasting is None:
             return _of_day(text)
         lasts = float(lasting[1]) / PER_SECOND[time_unit(lasting[2])] * 1e9
         return round(lasts) if lasts < 2**62 else None
-    if found[1]:
-        year, month, day = int(found[1]), int(found[2]), int(found[3])
-    else:
-        day, month, year = int(found[4]), int(found[5]), int(found[6])
-        year += 2000 * (year < 100)
-        if month > 12:
-            day, month = month, day
+    word, year = found["month"].lower(), int(found["year"])
+    month = int(word) if word.isdigit() else _MONTHS.get(word, _MONTHS.get(word[:3], 0))
     try:
-        days = datetime.date(year, month, day).toordinal() - _FIRST
+        year += 2000 * (len(found["year"]) == 2)
+        date = datetime.date(year, month, int(found["day"]))
     except ValueError:
         return None
-    time = _of_day(found[7]) if found[7] else 0
-    total = None if time is None else days * 86_400_000_000_000 + time
+    time = _of_day(found["time"]) if found["time"] else 0
+    total = None if time is None else (date.toordinal() - _FIRST) * 86_400_000_000_000 + time
     return total if total is not None and abs(total) < 2**62 else None
-
-
-def _in_digits(text: str) -> str:
-    """Return a date whose month is a word as digits; "" of what is none."""
-    for form in _NAMED if re.search(r"[^\W\d_]{3}", text) and len(text) < 60 else ():
-        found = form.fullmatch(text)
-        word = found["month"].lower() if found else ""
-        month = _MONTHS.get(word, _MONTHS.get(word[:3]))
-        if found and month:
-            year = int(found["year"]) + 2000 * (len(found["year"]) == 2)
-            return f"{year}-{month:02d}-{int(found['day']):02d} {found['time'] or ''}".strip()
-    return ""
 
 
 _FIRST = datetime.date(1970, 1, 1).toordinal()

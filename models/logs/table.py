@@ -24,6 +24,7 @@ from models.logs.log import (
     few,
     one_run,
     some,
+    unique,
 )
 from models.logs.spelling import unit_in_name, without_unit
 from models.logs.stamps import (
@@ -38,7 +39,7 @@ from models.logs.stamps import (
     started,
     typical_rate,
 )
-from models.schema import LONGEST_NAME, limits
+from models.schema import LONGEST_NAME
 
 _LONG = 8  # columns at most of a table with a row for each value
 _MOST_WORDS = 10_000  # names of runs in one log
@@ -143,7 +144,6 @@ class Gathered:
         self._codes: dict[int, dict[str, int]] = {
             column: {} for column, kind in self.kinds.items() if kind is Kind.WORD
         }
-        self._most = limits().samples
         self._seen = 0
 
     def __len__(self) -> int:
@@ -155,8 +155,7 @@ class Gathered:
         rows : (n,) where they are in the file.   columns : column -> (n,) values, or `Words`.
         """
         self._seen += rows.size
-        if self._seen > self._most:
-            few(self._path, self._seen, "samples", "rows")
+        few(self._path, self._seen, "samples", "rows")
         coded = {c: self._coded(c, columns[c], rows) for c in self._codes}
         keep: Any = slice(None)
         if self._run is not None:
@@ -235,14 +234,9 @@ class TableLog:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of all columns, each once: the second "v" is "v (2)"."""
-        seen: dict[str, int] = {}
-        unique: list[str] = []
-        for k, name in enumerate(self._columns.names):
-            name = name or f"column {k + 1}"
-            seen[name] = seen.get(name, 0) + 1
-            unique.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
-        return tuple(unique)
+        """Names of all columns, each once."""
+        columns = enumerate(self._columns.names, start=1)
+        return unique(name or f"column {k}" for k, name in columns)
 
     @cached_property
     def clock(self) -> Clock | None:
@@ -354,10 +348,10 @@ class TableLog:
             clock = self._channel_clocks.get(k, self.clock)
             listed.append(
                 Listed(
-                    name=heading.name,
-                    unit=heading.unit,
-                    samples=stamps[clock.column].size if clock and self._channel_clocks else size,
-                    rate=(rates[clock.column] if clock else self._even or math.nan) * filled,
+                    heading.name,
+                    heading.unit,
+                    stamps[clock.column].size if clock and self._channel_clocks else size,
+                    (rates[clock.column] if clock else self._even or math.nan) * filled,
                 )
             )
         return tuple(listed)
@@ -410,21 +404,18 @@ class TableLog:
             )
             said = "channels have times of their own, each the one before it: "
             self._noted.append(said + ", ".join(titles))
-        channels = []
-        for name, k in zip(names, places, strict=True):
-            stamps = found[clocks[k]]
-            is_clock = k == column and not timed
-            channels.append(
-                Channel(
-                    name=name,
-                    unit=self._columns.units[k],
-                    t=stamps.t,
-                    values=stamps.t if is_clock else stamps.of(cells.columns[k]),
-                    place=self.table.place,
-                    rows=stamps.of(cells.rows),
-                )
+        return tuple(
+            Channel(
+                name=name,
+                unit=self._columns.units[k],
+                t=stamps.t,
+                values=stamps.of(cells.columns[k]) if timed or k != column else stamps.t,
+                place=self.table.place,
+                rows=stamps.of(cells.rows),
             )
-        return tuple(channels)
+            for name, k in zip(names, places, strict=True)
+            for stamps in [found[clocks[k]]]
+        )
 
     @cached_property
     def _places(self) -> dict[str, int]:

@@ -12,7 +12,9 @@ import math
 import re
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -87,11 +89,9 @@ class TextTable:
         column : from 0.
         """
         layout = self.layout
-        cells = [row[column].replace(layout.thousands or "\0", "") for row in layout.rows]
-        cells = list(map(of_fortran, cells))
-        if layout.decimal == ",":
-            cells = [cell.replace(",", ".") for cell in cells]
-        return ["" if cell.lower() in MISSING else cell for cell in cells]
+        apart, comma = layout.thousands or "\0", layout.decimal.replace(".", "\0")
+        cells = (row[column].replace(apart, "").replace(comma, ".") for row in layout.rows)
+        return ["" if cell.lower() in MISSING else of_fortran(cell) for cell in cells]
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns.
@@ -279,17 +279,12 @@ class _Python:
             return self._each(column, cells, lines, nanoseconds, np.int64, "a time")
         layout = self._layout
         if not marked and not layout.thousands:
-            try:
+            with suppress(ValueError):
                 if layout.decimal == ".":
                     return np.array(array("d", map(float, cells)))
                 if not any("." in cell for cell in cells):
                     return np.array(array("d", (float(c.replace(",", ".")) for c in cells)))
-            except ValueError:
-                pass
-
-        def number(cell: str) -> float | None:
-            return _float(cell, layout.decimal, layout.thousands)
-
+        number = partial(_float, decimal=layout.decimal, thousands=layout.thousands)
         return self._each(column, cells, lines, number, np.float64, "numeric")
 
     def _each(

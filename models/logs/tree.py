@@ -45,6 +45,7 @@ class Unread:
 
 
 Tree = Leaf | Unread | str | list["Tree"] | dict[str, "Tree"]
+_Struct = dict[str, Tree]
 
 
 class Clock(NamedTuple):
@@ -124,7 +125,7 @@ class _Walk:
         self.unread: list[str] = []
         self.rate = 0.0
 
-    def struct(self, node: dict[str, Tree], path: str, clocks: tuple[Clock, ...]) -> None:
+    def struct(self, node: _Struct, path: str, clocks: tuple[Clock, ...]) -> None:
         """Collect the channels of a struct; clocks: of the structs around it, the nearest first."""
         clocks = (*_clocks_of(node, path), *clocks)
         clock_leaves = [clock.leaf for clock in clocks]
@@ -136,17 +137,12 @@ class _Walk:
             label = _text(node, _NAME) or path
             self.leaf(data, label, _unit(node), clocks, columns)
             return
-        units = _pick(node, _UNIT)
-        known = units if isinstance(units, dict) else {}
         for key, child in node.items():
             name = f"{path}.{key}" if path else key
-            if isinstance(child, Leaf):
-                if not any(child is leaf for leaf in clock_leaves):
-                    unit = known.get(key)
-                    unit = unit if isinstance(unit, str) else ""
-                    self.leaf(child, name, unit, clocks, columns)
-            else:
+            if not isinstance(child, Leaf):
                 self.other(child, name, clocks)
+            elif not any(child is leaf for leaf in clock_leaves):
+                self.leaf(child, name, _unit_of_field(node, key), clocks, columns)
 
     def other(self, node: Tree, path: str, clocks: tuple[Clock, ...]) -> None:
         if isinstance(node, Leaf):
@@ -217,19 +213,15 @@ def line_of(values: Array, signal: Signal) -> Array:
     return np.array(line, dtype=np.float64)
 
 
-def _clocks_of(node: dict[str, Tree], path: str) -> Iterator[Clock]:
+def _clocks_of(node: _Struct, path: str) -> Iterator[Clock]:
     for key, child in node.items():
-        unit = _unit_of_clock(key)
-        name = f"{path}.{key}" if path else key
-        if unit is not None and isinstance(child, dict):
-            inner = _pick(child, _DATA)
-            unit, child = _unit(child) or unit, inner if inner is not None else child
-        if unit is not None and isinstance(child, Leaf) and 1 in child.shape:
-            units = _pick(node, _UNIT)
-            if isinstance(units, dict) and isinstance(given := units.get(key), str):
-                unit = given
-            if max(child.shape) > 1:
-                yield Clock(name, child, None, unit)
+        if (unit := _unit_of_clock(key)) is None:
+            continue
+        if isinstance(child, dict):
+            unit, child = _unit(child) or unit, _pick(child, _DATA) or child
+        if isinstance(child, Leaf) and 1 in child.shape and max(child.shape) > 1:
+            name = f"{path}.{key}" if path else key
+            yield Clock(name, child, None, _unit_of_field(node, key) or unit)
     x, y = node.get("X"), node.get("Y")  # of dSPACE: the clock is X, the signals are Y(k)
     if isinstance(x, dict) and isinstance(y, dict | list):
         data = _pick(x, _DATA)
@@ -252,17 +244,16 @@ def _clock_inside(leaf: Leaf, name: str) -> Clock | None:
         return None
     clock = Clock(name, leaf, 0, "")
     steps = np.diff(times_of(clock))
-    counts = bool(np.all(steps == 1.0))  # rows, not seconds
-    return clock if bool(np.all(steps > 0.0)) and not counts else None
+    return clock if (steps > 0.0).all() and (steps != 1.0).any() else None  # 1: rows, not seconds
 
 
-def _pick(node: dict[str, Tree], names: Sequence[str]) -> Tree | None:
+def _pick(node: _Struct, names: Sequence[str]) -> Tree | None:
     """Return the first of a struct's fields that has one of these names, whatever its case."""
     lower = {key.lower(): child for key, child in reversed(list(node.items()))}
     return next((lower[name] for name in names if name in lower), None)
 
 
-def _several(node: dict[str, Tree]) -> bool:
+def _several(node: _Struct) -> bool:
     """Whether a struct holds other vectors than one signal and its time."""
     return any(
         isinstance(child, Leaf)
@@ -273,18 +264,24 @@ def _several(node: dict[str, Tree]) -> bool:
     )
 
 
-def _text(node: dict[str, Tree], names: Sequence[str]) -> str:
+def _text(node: _Struct, names: Sequence[str]) -> str:
     found = _pick(node, names)
     return found.strip() if isinstance(found, str) else ""
 
 
-def _unit(node: dict[str, Tree]) -> str:
+def _unit(node: _Struct) -> str:
     """Return the unit of a struct that is a signal; a timeseries has it in DataInfo."""
     about = _pick(node, ("datainfo",))
     return _text(node, _UNIT) or (_text(about, _UNIT) if isinstance(about, dict) else "")
 
 
-def _columns(node: dict[str, Tree]) -> _Columns:
+def _unit_of_field(node: _Struct, key: str) -> str:
+    """Return the unit of a field of a struct that holds those of its fields."""
+    units = _pick(node, _UNIT)
+    return _text(units, (key.lower(),)) if isinstance(units, dict) else ""
+
+
+def _columns(node: _Struct) -> _Columns:
     """Return the names and units that a struct tells of the columns of its matrix."""
 
     def words(names: Sequence[str]) -> list[str]:

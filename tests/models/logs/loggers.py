@@ -54,54 +54,58 @@ def units_row(delimiter=";", decimal=","):
     return "\n".join(lines) + "\n" + table(zip(*drive(), strict=True), delimiter, decimal)
 
 
+_MOTEC = """\
+"Format","MoTeC CSV File",,,"Workbook","Circuit"
+"Venue","Nürburgring",,,"Worksheet","Default"
+"Vehicle","Car 7",,,"Vehicle Desc",""
+"Driver","A. Driver",,,"Engine ID",""
+"Device","M1"
+"Comment","wet, then dry"
+"Log Date","12/05/2023",,,"Origin Time","0.000","s"
+"Log Time","10:11:12",,,"Start Time","0.000","s"
+"Sample Rate","100.000","Hz",,"End Time","1.190","s"
+"Duration","1.190","s",,"Start Distance","0","m"
+"Range","entire outing",,,"End Distance","20","m"
+"Beacon Markers","61.2 122.7"
+
+
+"Time","Ground Speed","Lateral Velocity","Gyro Yaw Velocity","Steering Wheel Angle"
+"s","km/h","m/s","deg/s","deg"
+
+
+"""
+
+
 def motec():
     """MoTeC i2: every cell quoted, a preamble of pairs, names, units, a blank line."""
-    lines = [
-        '"Format","MoTeC CSV File",,,"Workbook","Circuit"',
-        '"Venue","Nürburgring",,,"Worksheet","Default"',
-        '"Vehicle","Car 7",,,"Vehicle Desc",""',
-        '"Driver","A. Driver",,,"Engine ID",""',
-        '"Device","M1"',
-        '"Comment","wet, then dry"',
-        '"Log Date","12/05/2023",,,"Origin Time","0.000","s"',
-        '"Log Time","10:11:12",,,"Start Time","0.000","s"',
-        '"Sample Rate","100.000","Hz",,"End Time","1.190","s"',
-        '"Duration","1.190","s",,"Start Distance","0","m"',
-        '"Range","entire outing",,,"End Distance","20","m"',
-        '"Beacon Markers","61.2 122.7"',
-        "",
-        "",
-        '"Time","Ground Speed","Lateral Velocity","Gyro Yaw Velocity","Steering Wheel Angle"',
-        '"s","km/h","m/s","deg/s","deg"',
-        "",
-        "",
-    ]
-    body = table(zip(*drive(), strict=True), quoted=True, end="\r\n")
-    return "\r\n".join(lines) + "\r\n" + body
+    body = table(zip(*drive(), strict=True), quoted=True)
+    return (_MOTEC + body).replace("\n", "\r\n")
+
+
+_AIM = """\
+"Format","AiM CSV File"
+"Session","Track day"
+"Vehicle","Kart"
+"Racer","B"
+"Championship","X"
+"Comment",""
+"Date","Saturday, May 20, 2023"
+"Time","2:31 PM"
+"Sample Rate","100"
+"Duration","1.190"
+"Segment","Session"
+"Beacon Markers","59.1","118.2"
+"Segment Times","0:59.100","0:59.100"
+
+"Time","GPS Speed","Lat Vel","GPS Gyro","Steering"
+"s","km/h","m/s","deg/s","deg"
+
+"""
 
 
 def aim():
     """AiM Race Studio: pairs, names, units, and each a line of its own."""
-    lines = [
-        '"Format","AiM CSV File"',
-        '"Session","Track day"',
-        '"Vehicle","Kart"',
-        '"Racer","B"',
-        '"Championship","X"',
-        '"Comment",""',
-        '"Date","Saturday, May 20, 2023"',
-        '"Time","2:31 PM"',
-        '"Sample Rate","100"',
-        '"Duration","1.190"',
-        '"Segment","Session"',
-        '"Beacon Markers","59.1","118.2"',
-        '"Segment Times","0:59.100","0:59.100"',
-        "",
-        '"Time","GPS Speed","Lat Vel","GPS Gyro","Steering"',
-        '"s","km/h","m/s","deg/s","deg"',
-        "",
-    ]
-    return "\n".join(lines) + "\n" + table(zip(*drive(), strict=True), quoted=True)
+    return _AIM + table(zip(*drive(), strict=True), quoted=True)
 
 
 def carmaker_dat():
@@ -124,37 +128,39 @@ def two_d():
     return "\r\n".join(lines) + "\r\n" + table(zip(*drive(), strict=True), "\t", ",", end="\r\n")
 
 
+_VBOX = """\
+File created on 20/05/2023 at 14:31:00
+
+[header]
+time
+velocity kmh
+vy m/s
+yaw rate deg/s
+steering deg
+
+[channel units]
+m/s
+deg/s
+deg
+
+[comments]
+VBOX 3i, 100 Hz
+
+[column names]
+time velocity Vy YawRate Steering
+
+[data]
+"""
+
+
 def vbox():
     """Racelogic VBOX: sections; time is hhmmss.ss."""
-    lines = [
-        "File created on 20/05/2023 at 14:31:00",
-        "",
-        "[header]",
-        "time",
-        "velocity kmh",
-        "vy m/s",
-        "yaw rate deg/s",
-        "steering deg",
-        "",
-        "[channel units]",
-        "m/s",
-        "deg/s",
-        "deg",
-        "",
-        "[comments]",
-        "VBOX 3i, 100 Hz",
-        "",
-        "[column names]",
-        "time velocity Vy YawRate Steering",
-        "",
-        "[data]",
-    ]
     one = drive()
     rows = [
         f"{clock(t).replace(':', '')} {v:+08.3f} {vy:+.3f} {r:+.3f} {d:+.3f}"
         for t, v, vy, r, d in zip(*one, strict=True)
     ]
-    return "\r\n".join(lines + rows) + "\r\n"
+    return (_VBOX + "\n".join([*rows, ""])).replace("\n", "\r\n")
 
 
 def clock(t, start=14 * 3600 + 31 * 60 + 59.5):

@@ -7,7 +7,7 @@ import pytest
 
 from models.logs.axes import _GRAVITY, triads
 from models.logs.names import _words_of
-from tests.models.logs.test_names import proposed
+from tests.models.logs.test_names import proposed, taken
 
 T = 0.01 * np.arange(3000)
 V = 15.0 + 3.0 * np.sin(0.4 * T)
@@ -75,14 +75,14 @@ def test_units_of_a_box_are_told_by_the_file_or_by_turning(unit, rate):
     names = ("accelerometerAccelerationX", "gyroRotationX")  # of a phone
     axes = ("-left", "up", "-forward")
     found = proposed(SPEED, STEER, *box(axes, 9.81, unit, rate or "rad/s", names=names))
-    assert found.guesses["a_y"].channel == ("accelerometerAccelerationX",)
+    assert taken(found, "a_y") == "accelerometerAccelerationX"
     assert found.guesses["a_y"].factor == -1.0 and found.guesses["a_y"].unit == "g"
-    assert found.guesses["r"].channel == ("gyroRotationY",)
+    assert taken(found, "r") == "gyroRotationY"
 
 
 def test_without_gravity_the_pair_tells():
     found = proposed(SPEED, STEER, *box(("left", "up", "forward"), gravity=0.0))
-    assert found.guesses["r"].channel == ("GyroY",) and found.guesses["a_y"].channel == ("AccX",)
+    assert taken(found, "r") == "GyroY" and taken(found, "a_y") == "AccX"
 
 
 def test_a_box_that_lies_oblique_is_not_sure():
@@ -113,8 +113,8 @@ def test_velocities_of_games_and_cameras_have_z_forward(name, right):
         ("Yaw Rate", "rad/s", R),
         ("Lateral Acceleration", "g", A_Y / _GRAVITY + noise(0.01, 4)),
     )
-    assert found.guesses["v_x"].channel == (named("Z"),) and found.is_sure("v_x")
-    assert found.guesses["v_y"].channel == (named("X"),)
+    assert taken(found, "v_x") == named("Z") and found.is_sure("v_x")
+    assert taken(found, "v_y") == named("X")
     assert found.guesses["v_y"].factor == sign and found.is_sure("v_y")
     assert found.signals()["v_y"].factor == sign
 
@@ -136,23 +136,23 @@ def test_a_game_whose_channels_all_have_letters_is_read_in_signs_that_agree(stee
     found = proposed(*(one for one in channels if one[0] not in out.split()))
     assert found.guesses["v_x"].channel[0] in ("VelocityZ", "Speed")
     for signal, name in (("v_y", "VelocityX"), ("a_y", "AccelerationX"), ("r", "AngularVelocityY")):
-        assert found.guesses[signal].channel == (name,)
+        assert taken(found, signal) == name
         assert found.guesses[signal].factor == -steering, signal
-    assert found.guesses["a_x"].channel == ("AccelerationZ",)
+    assert taken(found, "a_x") == "AccelerationZ"
 
 
 def test_velocities_of_games_without_turning_have_no_v_y():
     found = proposed(*velocities("Velocity{}".format, (V_Y, noise(0.02, 3), V)))
-    assert found.guesses["v_x"].channel == ("VelocityZ",) and "v_y" not in found.guesses
+    assert taken(found, "v_x") == "VelocityZ" and "v_y" not in found.guesses
 
 
 def test_axes_as_letters_have_them_and_velocities_of_the_world_are_left_alone():
     straight = proposed(*velocities("v{}".format, (V, V_Y, 0.01 * V_Y), "xyz"))
-    assert straight.guesses["v_x"].channel == ("vx",) and straight.guesses["v_y"].channel == ("vy",)
+    assert taken(straight, "v_x") == "vx" and taken(straight, "v_y") == "vy"
     psi = np.cumsum(R) * 0.01
     world = (V * np.cos(psi + 2.0), V * np.sin(psi + 2.0), 0.01 * V)
     there = proposed(*velocities("v{}".format, world, "xyz"))
-    assert there.guesses["v_x"].channel == ("vx",)
+    assert taken(there, "v_x") == "vx"
 
 
 def test_triads_are_channels_alike_but_for_a_letter():

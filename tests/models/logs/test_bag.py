@@ -101,25 +101,14 @@ WANTED = {
 def old(path, folder):
     """The database of a bag as distributions before Iron wrote it: without definitions."""
     one = folder / "old.db3"
-    with sqlite3.connect(next(path.glob("*.db3"))) as source, sqlite3.connect(one) as target:
-        target.execute(
-            "CREATE TABLE topics(id INTEGER PRIMARY KEY, name TEXT, type TEXT, "
-            "serialization_format TEXT, offered_qos_profiles TEXT)"
-        )
-        target.execute(
-            "CREATE TABLE messages(id INTEGER PRIMARY KEY, topic_id INTEGER, timestamp INTEGER, "
-            "data BLOB)"
-        )
-        words = "id, name, type, serialization_format, offered_qos_profiles"
-        target.executemany(
-            "INSERT INTO topics VALUES (?,?,?,?,?)", source.execute(f"SELECT {words} FROM topics")
-        )
-        target.executemany(
-            "INSERT INTO messages VALUES (?,?,?,?)",
-            source.execute("SELECT id, topic_id, timestamp, data FROM messages"),
-        )
-    source.close()
-    target.close()
+    with sqlite3.connect(one) as base:
+        base.execute("ATTACH ? AS bag", [str(next(path.glob("*.db3")))])
+        for table, words in (
+            ("topics", "id, name, type, serialization_format, offered_qos_profiles"),
+            ("messages", "id, topic_id, timestamp, data"),
+        ):
+            base.execute(f"CREATE TABLE {table} AS SELECT {words} FROM bag.{table}")
+    base.close()
     return one
 
 

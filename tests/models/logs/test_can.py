@@ -36,8 +36,8 @@ VAL_ 100 Angle 32767 "SNA" 32766 "Init_Error" 1 "one step" ;
 """
 
 
-def write(path, messages):
-    with can.Logger(str(path)) as log:
+def write(path, messages, **how):
+    with can.Logger(str(path), **how) as log:
         for time, identifier, data, more in messages:
             about = {"timestamp": time, "arbitration_id": identifier, "data": data, **more}
             log.on_message_received(can.Message(is_extended_id=identifier > 0x7FF, **about))
@@ -214,14 +214,8 @@ def test_a_blf_that_was_cut_off_is_refused(tmp_path, drive):
 
 @pytest.mark.parametrize("level", [0, 6])
 def test_containers_may_be_compressed_or_not(level, tmp_path, monkeypatch):
-    path = tmp_path / "log.blf"
-    with can.BLFWriter(path, compression_level=level) as log:
-        for k in range(2000):
-            data = steering(k % 100)
-            one = can.Message(
-                timestamp=0.01 * k, arbitration_id=100, is_extended_id=False, data=data
-            )
-            log.on_message_received(one)
+    messages = [(0.01 * k, 100, steering(k % 100), {}) for k in range(2000)]
+    path = write(tmp_path / "log.blf", messages, compression_level=level)
     monkeypatch.setenv("TIREID_LIMITS", "block=1")
     (angle,) = open_log(path, dbc(tmp_path)).read(["Steering.Angle"])
     assert angle.values.size == 2000

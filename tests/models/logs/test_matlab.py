@@ -98,15 +98,22 @@ def test_numbers_of_every_type_are_those_that_scipy_reads(kind, compressed, tmp_
         assert np.array_equal(channel.values, there[:, k])
 
 
+def element(number, data, order="<"):
+    return struct.pack(order + "II", number, len(data)) + data + b"\0" * (-len(data) % 8)
+
+
+def head_of(kind, rows, order="<"):
+    """Flags and dimensions of a variable of one column."""
+    flags, shape = struct.pack(order + "II", kind, 0), struct.pack(order + "ii", rows, 1)
+    return element(6, flags, order) + element(5, shape, order)
+
+
 def test_files_of_another_byte_order_are_read(tmp_path):
     path = tmp_path / "log.mat"
 
-    def element(kind, data):
-        return struct.pack(">II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
-
     def matrix(name, values):
-        parts = element(6, struct.pack(">II", 6, 0)) + element(5, struct.pack(">ii", 40, 1))
-        return element(14, parts + element(1, name) + element(9, values.astype(">f8").tobytes()))
+        data = element(1, name, ">") + element(9, values.astype(">f8").tobytes(), ">")
+        return element(14, head_of(6, 40, ">") + data, ">")
 
     header = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack(">H", 0x0100) + b"MI"
     path.write_bytes(header + matrix(b"t", T[:40]) + matrix(b"v", A[:40]))
@@ -152,13 +159,7 @@ def test_a_file_without_a_time_says_what_it_needs(version, tmp_path):
 
 def table():
     """A variable that is an object of MATLAB, as `save` writes a table."""
-
-    def element(number, data):
-        return struct.pack("<II", number, len(data)) + data + b"\0" * (-len(data) % 8)
-
-    inner = element(
-        14, element(6, struct.pack("<II", 13, 0)) + element(5, struct.pack("<ii", 1, 1))
-    )
+    inner = element(14, head_of(13, 1))
     words = b"".join(element(1, word) for word in (b"tab", b"MCOS", b"table"))
     return element(14, element(6, struct.pack("<II", 17, 0)) + words + inner)
 
@@ -187,16 +188,14 @@ def test_tables_and_other_objects_are_named_with_what_to_do(tmp_path):
 
 def nested(depth):
     """Cells in one another, so deep that a reader that follows them runs out of stack."""
-    begin = struct.pack("<IIII", 6, 8, 1, 0) + struct.pack("<IIii", 5, 8, 1, 1)
-    begin += struct.pack("<IBBBB", 0x00010001, 97, 0, 0, 0)
-    number = struct.pack("<IIII", 6, 8, 6, 0) + struct.pack("<IIii", 5, 8, 1, 1)
-    number += struct.pack("<II", 1, 0) + struct.pack("<IId", 9, 8, 1.0)
+    begin = head_of(1, 1) + struct.pack("<IBBBB", 0x00010001, 97, 0, 0, 0)
+    number = head_of(6, 1) + element(1, b"") + element(9, struct.pack("<d", 1.0))
     size, heads = len(number) + 8, []
     for _ in range(depth):
         size += len(begin)
         heads.append(struct.pack("<II", 14, size) + begin)
         size += 8
-    return b"".join(reversed(heads)) + struct.pack("<II", 14, len(number)) + number
+    return b"".join(reversed(heads)) + element(14, number)
 
 
 def test_cells_so_deep_that_they_break_a_stack_are_refused(tmp_path):

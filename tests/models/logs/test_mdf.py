@@ -32,6 +32,11 @@ def signal(name, values, t, unit="", **more):
     return asammdf.Signal(values, t, name=name, unit=unit, **more)
 
 
+def opened(tmp_path, *signals, **how):
+    """The log of one group."""
+    return open_log(write(tmp_path / "log.mf4", ("g", signals), **how))
+
+
 @pytest.mark.parametrize("version", ["3.30", "4.10"])
 def test_groups_have_their_own_rates_and_a_name_in_two_of_them_tells_the_group(version, tmp_path):
     gap = np.concatenate([SLOW[:100], SLOW[150:]])
@@ -74,8 +79,8 @@ def test_conversions_are_applied_as_the_file_tells_them(version, tmp_path):
 
 def test_a_formula_is_computed(tmp_path):
     formula = {"formula": "sin(X) * 2.5e-1 + X / 4"}
-    path = write(tmp_path / "log.mf4", ("g", [signal("f", A, T, conversion=formula)]))
-    assert np.allclose(open_log(path).read(["f"])[0].values, np.sin(A) * 0.25 + A / 4)
+    (f,) = opened(tmp_path, signal("f", A, T, conversion=formula)).read(["f"])
+    assert np.allclose(f.values, np.sin(A) * 0.25 + A / 4)
 
 
 @pytest.mark.parametrize(
@@ -91,10 +96,7 @@ def test_a_formula_is_computed(tmp_path):
 def test_a_formula_that_is_code_is_not_executed(text, tmp_path):
     mark = tmp_path / "executed"
     formula = {"formula": text.format(mark)}
-    path = write(
-        tmp_path / "log.mf4", ("g", [signal("f", A, T, conversion=formula), signal("a", A, T)])
-    )
-    log = open_log(path)
+    log = opened(tmp_path, signal("f", A, T, conversion=formula), signal("a", A, T))
     assert [one.name for one in log.listed()] == ["a"]
     assert (
         log.notes[0].startswith("a conversion must be a formula of numbers") and "f" in log.notes[0]
@@ -108,8 +110,7 @@ def test_enumerations_and_texts_are_left_out_and_named(version, tmp_path):
     words = {"val_0": 0, "text_0": "park", "val_1": 1, "text_1": "drive", "default": "?"}
     gear = signal("gear", (np.arange(600) % 2).astype("u1"), T, conversion=words)
     name = signal("driver", np.array([b"somebody"] * 600), T, encoding="utf-8")
-    path = write(tmp_path / "log.mf4", ("g", [gear, name, signal("a", A, T)]), version=version)
-    log = open_log(path)
+    log = opened(tmp_path, gear, name, signal("a", A, T), version=version)
     assert [one.name for one in log.listed()] == ["a"]
     assert log.notes == ("enumerations and texts are no signals: gear, driver",)
 
@@ -122,8 +123,7 @@ def test_a_state_named_among_numbers_is_nan(tmp_path):
         lower_0=89.0, upper_0=89.0, text_0=b"SNA",
     )  # fmt: skip
     conversion.referenced_blocks["default_addr"] = block(conversion_type=1, a=0.5, b=1.0)
-    path = write(tmp_path / "log.mf4", ("g", [signal("v", RAW, SLOW, conversion=conversion)]))
-    log = open_log(path)
+    log = opened(tmp_path, signal("v", RAW, SLOW, conversion=conversion))
     assert [one.name for one in log.listed()] == ["v"]
     expected = np.where(RAW == 89, np.nan, RAW * 0.5 + 1.0)
     assert np.array_equal(log.read(["v"])[0].values, expected, equal_nan=True)
@@ -131,21 +131,17 @@ def test_a_state_named_among_numbers_is_nan(tmp_path):
 
 def test_samples_that_the_logger_marked_invalid_are_nan(tmp_path):
     invalid = np.arange(600) % 7 == 0
-    path = write(
-        tmp_path / "log.mf4",
-        ("g", [signal("a", A, T, invalidation_bits=invalid), signal("b", A, T)]),
-    )
-    a, b = open_log(path).read(["a", "b"])
+    log = opened(tmp_path, signal("a", A, T, invalidation_bits=invalid), signal("b", A, T))
+    a, b = log.read(["a", "b"])
     assert np.array_equal(a.values, np.where(invalid, np.nan, A), equal_nan=True)
     assert np.array_equal(b.values, A)
     assert np.array_equal(a.t, T)
 
 
 def test_many_channels_are_read_in_portions_of_the_memory(tmp_path, monkeypatch):
-    signals = [signal(f"s{k}", A + k, T) for k in range(9)]
-    path = write(tmp_path / "log.mf4", ("g", signals))
+    log = opened(tmp_path, *(signal(f"s{k}", A + k, T) for k in range(9)))
     monkeypatch.setattr(mdf, "_NUMBERS_AT_ONCE", 1500)
-    read = open_log(path).read([f"s{k}" for k in (8, 1, 4, 0)])
+    read = log.read([f"s{k}" for k in (8, 1, 4, 0)])
     for k, channel in zip((8, 1, 4, 0), read, strict=True):
         assert np.array_equal(channel.values, A + k)
 

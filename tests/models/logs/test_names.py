@@ -10,62 +10,80 @@ from models.logs.names import _HAND, _RULES, SURE, Guess, _name_confidence, _wor
 from models.logs.signals import NEEDED
 from models.logs.spelling import unit_in_name, without_units
 
-CALLED = {
-    "v_x": ["vx", "VelForward", "Vel_Longitudinal", "Car.vx", "/odom/twist.twist.linear.x", "v_lon",
-            "Velocity_X", "WheelBasedVehicleSpeed", "carState.vEgo", "vxCG", "VelLong", "Geschw",
-            "Längsgeschw.", "Fahrzeuggeschwindigkeit", "Vitesse", "vitesse_longitudinale",
-            "Velocità longitudinale", "Velocidad", "Längsgeschwindigkeit", "Ground Speed",
-            "/vehicle/status/velocity_status/longitudinal_velocity", "Ux",
-            "chassis_velocities.longitudinal", "SpeedVeh", "ESP_v_Signal"],
-    "v_y": ["vy", "Vel Lat", "LatVel", "VelLateral", "Car.vy", "/odom/twist.twist.linear.y",
-            "Correvit.VelTrans", "VelTrans", "Quergeschw", "v_transversal", "Transverse Velocity",
-            "vyCG", "vitesse latérale", "Velocità trasversale", "velocidad_lateral",
-            "v_lat", "Quergeschwindigkeit", "Uy", "chassis_velocities.lateral", "lateral_velocity",
-            "Correvit_vQuer"],
-    "beta": ["beta", "Schwimmwinkel", "Slip_Angle", "SideSlipAngle", "Car.SideSlipAngle",
-             "sideSlip", "angle de dérive caisse", "Slip_COG"],
-    "r": ["r", "Car.YawRate", "Yaw_Rate", "Gyro Z", "AngRateZ", "Gierrate", "Giergeschwindigkeit",
-          "/imu/angular_velocity.z", "psi_dot", "YAW_RATE", "ESP_YawRate", "Gyro Yaw Velocity",
-          "AVz", "chassis_velocities.yaw", "Gyr_Z", "Gyroscope z (rad/s)", "VehYaw_W_Actl",
-          "carState.yawRate", "livePose.angularVelocityDevice.z", "Ist-Gierrate",
-          "Vitesse de lacet", "Velocità di imbardata", "velocidad_guiñada", "omega",
-          "Angular Velocity"],
-    "delta_f": ["delta_f", "RoadWheelAngle", "/ackermann_cmd/drive.steering_angle",
-                "/vehicle/status/steering_status/steering_tire_angle", "Radlenkwinkel",
-                "roadwheelAngle", "Delta_Wheel"],
-    _HAND: ["Steering Angle", "SteerAngle", "Steered Angle", "SWA", "Steering_Wheel_Angle",
-           "Lenkradwinkel", "SAS_Angle", "LWS_Angle", "Steer.WhlAng", "HandwheelAngle",
-           "handwheelAngle", "carState.steeringAngle", "/steering_angle/data", "Angle volant",
-           "Angolo volante", "ángulo_volante", "delta_h", "Steering Pos", "Steer_SW",
-           "SAS_SteerAgl", "swAngle", "StWhl_Angl"],
-    "a_y": ["ay", "G Force Lat", "LateralAcc", "GPS LatAcc", "Acc_Y", "Querbeschleunigung",
-            "Querbeschl", "ayCG", "Accélération transversale", "Accelerazione laterale",
-            "aceleración lateral", "Car.ay", "/imu/linear_acceleration.y", "AccelLateral",
-            "Accel Y", "alHori", "LATERALG", "chassis_accelerations.lateral", "ALAT"],
-    "a_x": ["ax", "Longitudinal Acceleration", "Längsbeschl", "axCG", "accélération longitudinale",
-            "G Force Long", "Acc_X", "/imu/linear_acceleration.x", "AccelForward", "LongAcc"],
-    "delta_r": ["delta_r", "RearSteerAngle"],
-    "Fyf": ["Fyf", "Fy_front"],
-    "Fyr": ["Fyr", "Fy_rear"],
-}  # fmt: skip
-NO_SIGNAL = ["Engine RPM", "Wheel Speed FL", "Brake Pressure", "Yaw Rate Target", "Roll Rate",
-             "Steering Wheel Torque", "Throttle", "/imu/orientation.z", "/odom/twist.covariance[0]",
-             "Fuel Level", "Gear", "GPS Latitude", "Steering Wheel Speed", "vy_std",
-             "carState.aEgo", "Vertikalbeschl", "Acc_Z", "Accelerator Pedal", "Soll-Längsbeschl",
-             "GPS Longitude", "Sollquerbeschl", "Querbeschl_Soll",
-             "Gierrate Sollwert", "actuators.steeringAngle",
-             "carState.cruiseState.speed", "steeringRate", "/steering_cmd/data",
-             "/target_steering_angle/data", "HA_Lenkwinkel", "Lenkradmoment",
-             "Lenkradwinkelgeschw", "Gierbeschleunigung", "Raddrehzahl VL", "vitesse_roue_FL",
-             "Lateral Wind Speed", "Yaw Rate Setpoint", "couple volant",
-             "Motordrehzahl", "engine_omega", "omega_fl", "consigne de vitesse",
-             "radar.LateralVelocity", "Obj01_vLat",
-             "lead.vRel", "DAS_setSpeed", "KBI_angez_Geschw", "SAS_Speed",
-             "Seitenwind", "local_ang_vel_y", "motor_omega", "Steer_L1", "Steer_R1",
-             "LWI_VZ_Lenkradwinkel", "ESP_VZ_Gierrate", "yaw_rate_sign"]  # fmt: skip
+
+def names_of(some):
+    """The names in a text, which stand apart by commas."""
+    return [name.strip() for name in some.split(",")]
 
 
-@pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in all_])
+CALLED = {  # names apart by commas
+    "v_x": """
+vx, VelForward, Vel_Longitudinal, Car.vx, /odom/twist.twist.linear.x, v_lon, Velocity_X,
+WheelBasedVehicleSpeed, carState.vEgo, vxCG, VelLong, Geschw, Längsgeschw.,
+Fahrzeuggeschwindigkeit, Vitesse, vitesse_longitudinale, Velocità longitudinale, Velocidad,
+Längsgeschwindigkeit, Ground Speed, /vehicle/status/velocity_status/longitudinal_velocity,
+Ux, chassis_velocities.longitudinal, SpeedVeh, ESP_v_Signal
+""",
+    "v_y": """
+vy, Vel Lat, LatVel, VelLateral, Car.vy, /odom/twist.twist.linear.y, Correvit.VelTrans,
+VelTrans, Quergeschw, v_transversal, Transverse Velocity, vyCG, vitesse latérale,
+Velocità trasversale, velocidad_lateral, v_lat, Quergeschwindigkeit, Uy,
+chassis_velocities.lateral, lateral_velocity, Correvit_vQuer
+""",
+    "beta": """
+beta, Schwimmwinkel, Slip_Angle, SideSlipAngle, Car.SideSlipAngle, sideSlip,
+angle de dérive caisse, Slip_COG
+""",
+    "r": """
+r, Car.YawRate, Yaw_Rate, Gyro Z, AngRateZ, Gierrate, Giergeschwindigkeit,
+/imu/angular_velocity.z, psi_dot, YAW_RATE, ESP_YawRate, Gyro Yaw Velocity, AVz,
+chassis_velocities.yaw, Gyr_Z, Gyroscope z (rad/s), VehYaw_W_Actl, carState.yawRate,
+livePose.angularVelocityDevice.z, Ist-Gierrate, Vitesse de lacet, Velocità di imbardata,
+velocidad_guiñada, omega, Angular Velocity
+""",
+    "delta_f": """
+delta_f, RoadWheelAngle, /ackermann_cmd/drive.steering_angle,
+/vehicle/status/steering_status/steering_tire_angle, Radlenkwinkel, roadwheelAngle,
+Delta_Wheel
+""",
+    _HAND: """
+Steering Angle, SteerAngle, Steered Angle, SWA, Steering_Wheel_Angle, Lenkradwinkel,
+SAS_Angle, LWS_Angle, Steer.WhlAng, HandwheelAngle, handwheelAngle, carState.steeringAngle,
+/steering_angle/data, Angle volant, Angolo volante, ángulo_volante, delta_h, Steering Pos,
+Steer_SW, SAS_SteerAgl, swAngle, StWhl_Angl
+""",
+    "a_y": """
+ay, G Force Lat, LateralAcc, GPS LatAcc, Acc_Y, Querbeschleunigung, Querbeschl, ayCG,
+Accélération transversale, Accelerazione laterale, aceleración lateral, Car.ay,
+/imu/linear_acceleration.y, AccelLateral, Accel Y, alHori, LATERALG,
+chassis_accelerations.lateral, ALAT
+""",
+    "a_x": """
+ax, Longitudinal Acceleration, Längsbeschl, axCG, accélération longitudinale, G Force Long,
+Acc_X, /imu/linear_acceleration.x, AccelForward, LongAcc
+""",
+    "delta_r": "delta_r, RearSteerAngle",
+    "Fyf": "Fyf, Fy_front",
+    "Fyr": "Fyr, Fy_rear",
+}
+NO_SIGNAL = names_of("""
+Engine RPM, Wheel Speed FL, Brake Pressure, Yaw Rate Target, Roll Rate,
+Steering Wheel Torque, Throttle, /imu/orientation.z, /odom/twist.covariance[0], Fuel Level,
+Gear, GPS Latitude, Steering Wheel Speed, vy_std, carState.aEgo, Vertikalbeschl, Acc_Z,
+Accelerator Pedal, Soll-Längsbeschl, GPS Longitude, Sollquerbeschl, Querbeschl_Soll,
+Gierrate Sollwert, actuators.steeringAngle, carState.cruiseState.speed, steeringRate,
+/steering_cmd/data, /target_steering_angle/data, HA_Lenkwinkel, Lenkradmoment,
+Lenkradwinkelgeschw, Gierbeschleunigung, Raddrehzahl VL, vitesse_roue_FL,
+Lateral Wind Speed, Yaw Rate Setpoint, couple volant, Motordrehzahl, engine_omega, omega_fl,
+consigne de vitesse, radar.LateralVelocity, Obj01_vLat, lead.vRel, DAS_setSpeed,
+KBI_angez_Geschw, SAS_Speed, Seitenwind, local_ang_vel_y, motor_omega, Steer_L1, Steer_R1,
+LWI_VZ_Lenkradwinkel, ESP_VZ_Gierrate, yaw_rate_sign
+""")
+
+
+@pytest.mark.parametrize(
+    ("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in names_of(all_)]
+)
 def test_a_name_of_a_logger_is_that_signal_before_any_other(signal, name):
     found = {one: _name_confidence(one, name) for one in _RULES}
     assert found[signal] >= SURE
@@ -93,8 +111,7 @@ class Log:
 
     def listed(self):
         return tuple(
-            Listed(name=name, unit=unit, samples=values.size, rate=100.0)
-            for name, (unit, values) in self.channels.items()
+            Listed(name, unit, values.size, 100.0) for name, (unit, values) in self.channels.items()
         )
 
     def runs(self):
@@ -123,6 +140,11 @@ def proposed(*channels):
     return propose(log, log.listed())
 
 
+def taken(found, signal):
+    """The channel of a guess, or its channels."""
+    return "+".join(found.guesses[signal].channel)
+
+
 def test_a_log_with_units_is_proposed_whole():
     found = proposed(
         ("Ground Speed", "km/h", 70 + WAVE),
@@ -142,7 +164,7 @@ def test_of_two_that_are_equal_none_is_taken():
     assert not found.is_sure("v_x")
     assert {one.channel[0] for one in found.rivals["v_x"]} == {"GPS Speed", "Ground Speed"}
     better = proposed(("GPS Speed", "km/h", WAVE), ("Velocity Forward", "km/h", WAVE))
-    assert better.is_sure("v_x") and better.guesses["v_x"].channel == ("Velocity Forward",)
+    assert better.is_sure("v_x") and taken(better, "v_x") == "Velocity Forward"
 
 
 def test_of_two_that_are_equal_the_one_with_more_samples_per_second_is_named_first():
@@ -157,12 +179,12 @@ def test_of_two_that_are_equal_the_one_with_more_samples_per_second_is_named_fir
         found = propose(log, log.listed())
         assert not found.is_sure("v_x")
         assert [one.channel[0] for one in found.rivals["v_x"]] == ["Ground Speed", "GPS Speed"]
-        assert found.guesses["v_x"].channel == ("Ground Speed",)
+        assert taken(found, "v_x") == "Ground Speed"
 
 
 def test_a_unit_of_something_else_takes_a_channel_out():
     found = proposed(("Yaw Rate", "bar", WAVE), ("Gyro Z", "deg/s", WAVE))
-    assert found.guesses["r"].channel == ("Gyro Z",) and found.is_sure("r")
+    assert taken(found, "r") == "Gyro Z" and found.is_sure("r")
     assert proposed(("Yaw Rate", "bar", WAVE)).guesses.get("r") is None
 
 
@@ -174,7 +196,7 @@ def test_without_a_unit_nothing_but_our_own_names_is_sure():
 
 def test_a_channel_that_never_changes_gives_way():
     found = proposed(("Yaw Rate", "deg/s", 0 * WAVE), ("ESP_YawRate", "deg/s", WAVE))
-    assert found.guesses["r"].channel == ("ESP_YawRate",)
+    assert taken(found, "r") == "ESP_YawRate"
 
 
 def test_an_angle_that_goes_farther_than_road_wheels_is_that_of_the_hand_wheel():
@@ -200,9 +222,9 @@ def test_two_wheels_of_an_axle_are_taken_together():
         ("Car.SteerAngleFL", "rad", 0.1 * WAVE), ("Car.SteerAngleFR", "rad", 0.1 * WAVE),
         ("FyFL", "N", WAVE), ("FyFR", "N", WAVE), ("FyRL", "N", WAVE), ("FyRR", "N", WAVE),
     )  # fmt: skip
-    assert found.guesses["delta_f"].channel == ("Car.SteerAngleFL", "Car.SteerAngleFR")
-    assert found.guesses["Fyf"].channel == ("FyFL", "FyFR")
-    assert found.guesses["Fyr"].channel == ("FyRL", "FyRR")
+    assert taken(found, "delta_f") == "Car.SteerAngleFL+Car.SteerAngleFR"
+    assert taken(found, "Fyf") == "FyFL+FyFR"
+    assert taken(found, "Fyr") == "FyRL+FyRR"
     assert {"Fyf", "Fyr"} <= set(found.signals())
 
 
@@ -320,19 +342,23 @@ def test_a_rate_whose_unit_is_an_angles_is_proposed_per_second():
 
 def test_a_filtered_duplicate_stands_back_for_what_was_filtered():
     found = proposed(("LatAcc_filtered", "g", WAVE), ("ESP_AccLat", "g", WAVE))
-    assert found.is_sure("a_y") and found.guesses["a_y"].channel == ("ESP_AccLat",)
+    assert found.is_sure("a_y") and taken(found, "a_y") == "ESP_AccLat"
     alone = proposed(("LatAcc_filtered", "g", WAVE))
     assert alone.is_sure("a_y")
 
 
 def test_a_word_and_a_unit_of_what_no_rule_knows_are_named_and_never_taken():
-    found = proposed(("Seitwärts", "km/h", WAVE), ("Slip", "deg", WAVE))
-    assert found.guesses["v_y"].channel == ("Seitwärts",) and not found.is_sure("v_y")
-    assert found.guesses["beta"].channel == ("Slip",) and not found.is_sure("beta")
-    none = [("Lateral", "", WAVE), ("Lateral", "bar", WAVE), ("Slip FL", "deg", WAVE),
-            ("Lateral Target", "m/s", WAVE), ("Seitenwind", "m/s", WAVE),
+    named = {"v_y": ("Seitwärts", "km/h"), "beta": ("Slip", "deg"), "r": ("Yaw", "deg/s"),
+             "delta_f": ("SteerXyz", "deg")}  # fmt: skip
+    found = proposed(*((*one, 90 * WAVE) for one in named.values()))
+    for signal, (name, _) in named.items():
+        assert taken(found, signal) == name and not found.is_sure(signal)
+        assert found.guesses[signal].confidence < SURE
+    assert found.guesses["delta_f"].hand
+    none = [("Yaw", "deg", WAVE), ("Lateral", "", WAVE), ("Lateral", "bar", WAVE),
+            ("Slip FL", "deg", WAVE), ("Lateral Target", "m/s", WAVE), ("Seitenwind", "m/s", WAVE),
             ("dérive pneu", "deg", WAVE), ("Transmission", "km/h", WAVE)]  # fmt: skip
-    assert not any({"v_y", "beta"} & set(proposed(one).guesses) for one in none)
+    assert not any(set(named) & set(proposed(one).guesses) for one in none)
 
 
 def test_a_side_and_the_number_of_an_axle_are_a_corner():
@@ -344,10 +370,10 @@ def test_a_side_and_the_number_of_an_axle_are_a_corner():
         *((f"Fy_{place}", "N", 2e3 * WAVE) for place in ("L1", "R1", "L2", "R2")),
         ("Steer_SW", "deg", 80 * WAVE),
     )
-    assert found.guesses["delta_f"].channel == ("Steer_L1", "Steer_R1")
+    assert taken(found, "delta_f") == "Steer_L1+Steer_R1"
     assert found.is_sure("delta_f") and "delta_r" not in found.guesses
-    assert found.guesses["Fyf"].channel == ("Fy_L1", "Fy_R1")
-    assert found.guesses["Fyr"].channel == ("Fy_L2", "Fy_R2")
+    assert taken(found, "Fyf") == "Fy_L1+Fy_R1"
+    assert taken(found, "Fyr") == "Fy_L2+Fy_R2"
 
 
 def test_a_channel_that_is_there_in_two_units_is_one():
@@ -376,13 +402,6 @@ def test_a_speed_without_a_unit_is_told_by_how_the_car_turns():
     assert slow.guesses["v_x"].unit == slow.guesses["v_y"].unit == ""
 
 
-def test_a_word_of_a_name_and_its_unit_are_named_and_not_taken():
-    found = proposed(("Yaw", "deg/s", 20 * WAVE), ("SteerXyz", "deg", 90 * WAVE))
-    assert found.guesses["r"].channel == ("Yaw",) and not found.is_sure("r")
-    assert found.guesses["delta_f"].hand and found.guesses["delta_f"].confidence < SURE
-    assert "r" not in proposed(("Yaw", "deg", 20 * WAVE)).guesses
-
-
 def test_a_unit_in_a_name_may_be_spelled_in_another_way_beside_it():
     assert without_units("steering_deg", "°") == ("steering", "")
     assert without_units("speed_kmh", "kph") == ("speed", "")
@@ -408,7 +427,7 @@ def test_a_unit_may_be_the_name():
     speed, turn = ("MPH", unit_in_name("MPH"), 45.0 + WAVE), ("deg/s", "deg/s", 20.0 * WAVE)
     found = proposed(speed, turn, ("fps", "", 60.0 + WAVE))
     assert found.is_sure("v_x") and found.signals()["v_x"].unit == "MPH"
-    assert found.guesses["r"].channel == ("deg/s",) and not found.is_sure("r")
+    assert taken(found, "r") == "deg/s" and not found.is_sure("r")
 
 
 def test_a_g_in_a_name_is_its_unit_where_turning_says_so():
@@ -424,25 +443,27 @@ def test_the_carriers_of_carmaker_are_road_wheels():
         *((f"Car.{place}.rz", "rad", 0.1 * WAVE) for place in places),
         ("DM.Steer.Ang", "rad", 2.0 * WAVE),
     )
-    assert found.guesses["delta_f"].channel == ("Car.CFL.rz", "Car.CFR.rz")
+    assert taken(found, "delta_f") == "Car.CFL.rz+Car.CFR.rz"
     assert found.is_sure("delta_f") and "delta_r" not in found.guesses
 
 
-PUBLIC = {  # of files that people published
-    "v_x": ["vCar", "V_GPS", "v_CG", "vel_u", "wheel_based_speed"],
-    "r": ["AngRateDown", "imu_gz_rps", "GPS Gyro", "AVz", "r_imu", "Gyro_Yaw", "yawspeed"],
-    "delta_f": ["StrgWhlAng", "StrWhAng", "StrAngle", "StrgAngl", "SteWhlAngl", "RWA"],
-    "a_y": ["LtrlAcc", "accy_can", "lat_g", "LatAc"],
-    "a_x": ["InlineAcc", "LgtlAcc", "LINEALG"],
+PUBLIC = {  # names apart by commas
+    "v_x": "vCar, V_GPS, v_CG, vel_u, wheel_based_speed",
+    "r": "AngRateDown, imu_gz_rps, GPS Gyro, AVz, r_imu, Gyro_Yaw, yawspeed",
+    "delta_f": "StrgWhlAng, StrWhAng, StrAngle, StrgAngl, SteWhlAngl, RWA",
+    "a_y": "LtrlAcc, accy_can, lat_g, LatAc",
+    "a_x": "InlineAcc, LgtlAcc, LINEALG",
 }
 UNIT = {"v_x": "m/s", "r": "deg/s", "delta_f": "deg", "a_y": "m/s^2", "a_x": "m/s^2"}
 
 
-@pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in PUBLIC.items() for n in all_])
+@pytest.mark.parametrize(
+    ("signal", "name"), [(s, n) for s, all_ in PUBLIC.items() for n in names_of(all_)]
+)
 def test_names_of_public_logs_are_proposed(signal, name):
     unit = unit_in_name(name) or UNIT[signal]
     found = proposed((name, unit, 20.0 * WAVE))
-    assert found.guesses[signal].channel == (name,)
+    assert taken(found, signal) == name
     assert found.is_sure(signal) or found.guesses[signal].hand
     assert not any(found.is_sure(one) for one in _RULES if one != signal)
 

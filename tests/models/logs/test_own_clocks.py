@@ -1,5 +1,7 @@
 """Tables whose channels stand behind times of their own; a second time that is none of theirs."""
 
+from itertools import zip_longest
+
 import numpy as np
 import pytest
 
@@ -11,13 +13,11 @@ def at(rate, begin=0.0, lasts=4.0):
     return t, np.sin(3.0 * t)
 
 
-def written(path, delimiter=",", **columns):
+def written(path, **columns):
     """A table whose shorter columns end in empty cells."""
-    longest = max(map(len, columns.values()))
-    rows = [delimiter.join(name.replace("__", " ") for name in columns)]
-    for k in range(longest):
-        rows.append(delimiter.join(repr(c[k]) if k < len(c) else "" for c in columns.values()))
-    path.write_text("\n".join([*rows, ""]).replace("np.float64(", "").replace(")", ""))
+    cells = (map(repr, one.tolist()) for one in columns.values())
+    rows = map(",".join, zip_longest(*cells, fillvalue=""))
+    path.write_text("\n".join([",".join(columns).replace("__", " "), *rows, ""]))
     return path
 
 

@@ -10,25 +10,30 @@ from models.logs.door import open_log
 from models.logs.names import _RULES, SURE, _name_confidence, propose
 from models.logs.signals import QUANTITIES, WHEELS
 from models.logs.spelling import unit_in_name
-from tests.models.logs.test_names import WAVE, proposed
+from tests.models.logs.test_names import WAVE, names_of, proposed
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
-CALLED = {
-    "wheel_fl": ["wheel_fl", "WheelSpeed_FL", "Wheel Speed FL", "WHL_SPD_FL", "ESP_VL_Radgeschw",
-                 "nWheelFL", "Vhcl.FL.rotv", "Wheel Speed Front Left", "v_Rad_VL", "omega_fl",
-                 "WheelSpeedFrontLeft", "/vehicle/wheel_speeds/lf.speed",
-                 "Speed_FL", "whlspdfl", "rpm_fl"],
-    "wheel_fr": ["WHEEL_SPEED_FR", "ws_fr", "Raddrehzahl vorne rechts", "wheelVel_RF"],
-    "wheel_rl": ["wheel_speed_rl", "omega_rl", "HL_Radgeschw", "WheelRPM_RL"],
-    "wheel_rr": ["ws_rr", "vWheelRR", "Wheel_Spd_RearRight", "WSPEED RR"],
-    "wheel": ["wheel", "wheel_speed", "encoder", "wheel_encoder", "WheelSpeed", "wheel rpm"],
-}  # fmt: skip
-NO_WHEEL = ["Engine RPM", "Steering Wheel Speed", "Wheel Slip FL", "Brake Pressure FL", "v_x",
-            "Tire Temp FL", "WheelSpeed_FL_valid", "Wheel Angle FL", "Suspension Travel FL",
-            "WheelBasedVehicleSpeed", "Ground Speed", "yaw rate", "encoder ticks"]  # fmt: skip
+CALLED = {  # names apart by commas
+    "wheel_fl": """
+wheel_fl, WheelSpeed_FL, Wheel Speed FL, WHL_SPD_FL, ESP_VL_Radgeschw, nWheelFL,
+Vhcl.FL.rotv, Wheel Speed Front Left, v_Rad_VL, omega_fl, WheelSpeedFrontLeft,
+/vehicle/wheel_speeds/lf.speed, Speed_FL, whlspdfl, rpm_fl
+""",
+    "wheel_fr": "WHEEL_SPEED_FR, ws_fr, Raddrehzahl vorne rechts, wheelVel_RF",
+    "wheel_rl": "wheel_speed_rl, omega_rl, HL_Radgeschw, WheelRPM_RL",
+    "wheel_rr": "ws_rr, vWheelRR, Wheel_Spd_RearRight, WSPEED RR",
+    "wheel": "wheel, wheel_speed, encoder, wheel_encoder, WheelSpeed, wheel rpm",
+}
+NO_WHEEL = names_of("""
+Engine RPM, Steering Wheel Speed, Wheel Slip FL, Brake Pressure FL, v_x, Tire Temp FL,
+WheelSpeed_FL_valid, Wheel Angle FL, Suspension Travel FL, WheelBasedVehicleSpeed,
+Ground Speed, yaw rate, encoder ticks
+""")
 
 
-@pytest.mark.parametrize(("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in all_])
+@pytest.mark.parametrize(
+    ("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in names_of(all_)]
+)
 def test_a_name_of_a_logger_is_that_wheel_and_nothing_else(signal, name):
     found = {one: _name_confidence(one, name) for one in (*WHEELS, *_RULES)}
     assert found[signal] >= SURE
