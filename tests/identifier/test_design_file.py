@@ -34,7 +34,7 @@ def test_a_design_comes_back_from_its_file(car, tmp_path):
         ("lead = 0.0", "lead = -1.0", "lead must not be negative"),
         ("lead = 0.0", "lead = nan", "lead must not be negative"),
         ("seed = 0", 'integrator = "rk4"', "integrator is unknown"),
-        ("A_d = [[-", "A_d = [[", "must be Hurwitz"),
+        ("A_d = [[-", "A_d = [[", "must be Hurwitz, its eigenvalues are"),
         ("hidden = 10", "hidden = true", "network.hidden must be a whole number"),
         ("dt = 0.01", "dt = [", "cannot be read as TOML"),
     ],

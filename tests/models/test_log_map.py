@@ -118,6 +118,8 @@ def test_what_is_written_reads_back_bit_for_bit(
             )
         ),
         ("[wheels]\nradius = [[0.3]]\n", "radius must be a number or a list of numbers, it is a"),
+        ("[wheels]\ndriven = 'left'\n", "driven must be one of front, rear, all, none"),
+        ("[wheels]\nradii = 0.3\n", "wheels.radii is unknown, known are radius, track, wheelbase"),
         ("[wheels]\ntrack = 'a'\n", "wheels.track must be a number or a list of numbers, it is"),
         ("[signals.v_y]\nchannel='a'\n[signals.beta]\nchannel='b'\n", "beta replaces v_y"),
         ("[signals.Fyf]\nchannel='a'\n", "Fyf needs its partner"),
