@@ -9,8 +9,8 @@ where a drive has no measured force, against what its motion shows (inverse sing
 Places: random cars of four classes with good sensors, identified from a full drive, a gentle one or
 a single step; CarMaker, either run from the other; a real race car, 100 s and the rest; a real 1:10
 car, each run from every other; a real hatchback, on two days. Beside them: several logs together,
-load transfer and friction circle against slip alone, declared stiffness, a wrong steering ratio,
-and the time that it takes.
+load transfer and friction circle against slip alone, a wrong steering ratio, and the time that it
+takes.
 Recordings are those of `recorded_cars`; without them these parts are skipped.
 """
 
@@ -65,13 +65,12 @@ FLOORS = {  # of the real 1:10 car
 PULLED = {"laps": ("mpcc1", "mpccpp"), "slippery": ("slip1", "slip2")}  # of dart_2025
 A_X = 2.0  # m/s²
 CIRCLE = ("load_transfer", "braking_f", "braking_r", "driving_f", "driving_r")
-TOLD = (0.25, 4.0)  # times the stiffness of the vehicle file
 RATIO, WRONG_RATIOS = 20.8, (16.0, 26.0, 30.0)
 BEGUN = 12.0  # s, until when the slalom slips by 1.1 degrees alone
 BEHIND = 1.1  # times the best of the other methods
 PARTS = (
     *("random", "carmaker", "ferrari", "dart", "gti"),
-    *("together", "circle", "told", "ratio", "cost"),
+    *("together", "circle", "ratio", "cost"),
 )
 
 
@@ -387,26 +386,6 @@ def judge_circle(targets: Targets) -> None:
     targets.at_most("the same, worst pair", worst, 1.1, "-", key="circle/worst")
 
 
-def judge_told(targets: Targets) -> None:
-    """Judge that the stiffness of a vehicle file does not reach the tires.
-
-    Parameters
-    ----------
-    targets : collects what is missed.
-    """
-    learn, ask = read("carmaker.csv.gz", CARMAKER_RUNS)
-    found = []
-    for factor in (1.0, *TOLD):
-        car = replace(
-            CARMAKER,
-            cornering_stiffness_front=factor * CARMAKER.cornering_stiffness_front,
-            cornering_stiffness_rear=factor * CARMAKER.cornering_stiffness_rear,
-        )
-        found.append(both(*missed(learnt(learn, car, DEFAULT), [ask])))
-    change = float(np.max(np.abs(np.diff(found))))
-    targets.at_most("told stiffness, largest change", change, 0.01, key="told/change")
-
-
 def judge_ratio(targets: Targets) -> None:
     """Judge that a wrong steering ratio reaches the doubt of the stiffness, or the verdict.
 
@@ -522,7 +501,6 @@ def main() -> int:
         "gti": judge_gti,
         "together": judge_together,
         "circle": judge_circle,
-        "told": judge_told,
         "ratio": judge_ratio,
     }
     for part, judge in recorded.items():

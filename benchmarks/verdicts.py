@@ -21,7 +21,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
 from operator import methodcaller
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,7 @@ import tireid as ti
 from benchmarks.answers import RIGHT, WRONG, Answer, answer, blind, force_error
 from benchmarks.estimate import PLACES, of_random_cars
 from benchmarks.fault_cases import Case, random_case
+from benchmarks.faults import Late, SwappedAxles, WrongNumber
 from benchmarks.random_cars import (
     BEGINNINGS,
     CLASSES,
@@ -43,6 +44,7 @@ from identifier.estimate.model import FittedModel
 from identifier.estimate.priors import Priors
 from identifier.motion.parameters import INDEX, curve_index
 from identifier.tire_model import TireModel
+from models.faults import SensorFault
 from models.recordings import Recording, Repair, read_recording
 from models.vehicle import Vehicle
 
@@ -157,31 +159,22 @@ def recorded_answer(seed: int) -> Judged:
     return Judged("recordings", seed, f"{recording.name}: {case}", result)
 
 
-def faulty(
-    log: Recording, car: Vehicle, fault: str, rng: np.random.Generator
-) -> tuple[Recording, Vehicle]:
-    """Return a log and its car with a fault of a size that is drawn.
+def blind_fault(fault: str, rng: np.random.Generator) -> Case:
+    """Return a fault of a size that is drawn.
 
     Parameters
     ----------
-    log : without.
-    car : as it was declared.
     fault : one of `FAULTS`, or empty.
     rng : source of the size.
     """
     channel, _, what = fault.partition(" ")
     if what == "scaled":
-        changed: dict[str, Any] = {channel: rng.choice(SCALES) * getattr(log, channel)}
-        return replace(log, **changed), car
+        return Case(SensorFault(channel=channel, kind="scaled", size=rng.choice(SCALES)))
     if what == "late":
-        signal, k = getattr(log, channel), round(rng.choice(LATE) / log.dt)
-        changed = {channel: np.append(np.full(k, signal[0]), signal[:-k])}
-        return replace(log, **changed), car
+        return Case(Late(channels=(channel,), delay=rng.choice(LATE)))
     if fault == "yaw inertia":
-        return log, replace(car, yaw_inertia=rng.choice(INERTIA) * car.yaw_inertia)
-    if fault:
-        return log, replace(car, l_f=car.l_r, l_r=car.l_f)
-    return log, car
+        return Case(told=WrongNumber(field="yaw_inertia", factor=rng.choice(INERTIA)))
+    return Case(told=SwappedAxles()) if fault else Case()
 
 
 def blind_answers(job: tuple[str, int]) -> list[Judged]:
@@ -197,7 +190,8 @@ def blind_answers(job: tuple[str, int]) -> list[Judged]:
     own, car = Repair(acceleration_sensor_x=drive.position[0]).apply(own, drive.told)
     found = []
     for fault in ("", str(rng.choice(FAULTS))):
-        log, known = faulty(own, car, fault, rng)
+        case = blind_fault(fault, rng)
+        log, known = case.log(own), case.car(car)
         end = float(log.t[0]) + SHARE * log.duration
         run = ti.identify(log.between(log.t[0], end), known, check=False)
         error = force_error(run.freeze(), log.between(end, log.t[-1]))

@@ -157,9 +157,6 @@ def record(targets: Targets, key: str, found: Mapping[str, Told]) -> None:
             targets.record(f"{key}/{name}/within", one.within)
         if one.force is not None:
             targets.record(f"{key}/{name}/force", one.force)
-    if OWN in found:
-        best = min(one.rms for name, one in found.items() if name != OWN)
-        targets.record(f"{key}/over_best", found[OWN].rms / best)
 
 
 def median(found: Sequence[Told]) -> Told:

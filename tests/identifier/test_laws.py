@@ -30,7 +30,7 @@ def case(rng):
     }  # fmt: skip
 
 
-def rates(case, *, drive, eta=(3.0, 2.0), rho=(0.0, 0.0), laws=weight_rates):
+def rates(case, *, drive, rho=(0.0, 0.0), laws=weight_rates):
     sigma = np.tanh(case["V"] @ case["x_bar"])
     W_dot, V_dot = laws(
         drive=ca.DM(drive),
@@ -40,8 +40,8 @@ def rates(case, *, drive, eta=(3.0, 2.0), rho=(0.0, 0.0), laws=weight_rates):
         x_bar=ca.DM(case["x_bar"]),
         sigma=ca.DM(sigma),
         A_d=ca.DM(case["A_d"]),
-        eta_W=eta[0],
-        eta_V=eta[1],
+        eta_W=3.0,
+        eta_V=2.0,
         rho_W=rho[0],
         rho_V=rho[1],
     )

@@ -8,7 +8,6 @@ import pytest
 
 from models.recordings import (
     LogMap,
-    Recording,
     RecordingError,
     Repair,
     read_recording,
@@ -16,6 +15,7 @@ from models.recordings import (
     split_log_argument,
     write_recording,
 )
+from tests.made import made
 
 HEADER = "t,vx,vy,r,delta_f"
 
@@ -216,16 +216,7 @@ def mirrored(tmp_path_factory):
     """A log whose accelerometer shows the other sign."""
     t = 0.01 * np.arange(1000)
     r = 0.3 * np.sin(2.0 * t)
-    drive = Recording(
-        name="mirrored",
-        t=t,
-        v_x=np.full(t.size, 20.0),
-        v_y=0.0 * t,
-        r=r,
-        delta_f=2.7 / 20.0 * r,
-        delta_r=0.0 * t,
-        a_y=-20.0 * r,
-    )
+    drive = made(t, name="mirrored", r=r, delta_f=2.7 / 20.0 * r, a_y=-20.0 * r)
     return write_recording(drive, tmp_path_factory.mktemp("logs") / "mirrored.csv")
 
 
