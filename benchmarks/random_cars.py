@@ -346,13 +346,15 @@ class RandomDrive:
         begin, good = self.beginning, self.car.sensors
         shown = good.apply(self.exact, rng)
         if begin.rough > 1.0:
-            rough = _noisier(good, begin.rough).apply(self.exact, rng)
+            names = ("v_x", "v_y", "r")
+            noise = {name: begin.rough * getattr(good, name).noise for name in names}
+            noisier = {name: replace(getattr(good, name), noise=noise[name]) for name in names}
+            rough = replace(good, **noisier).apply(self.exact, rng)
             before = self.exact.t < begin.rest + begin.lead
-            mixed = {
-                name: np.where(before, getattr(rough, name), getattr(shown, name))
-                for name in ("v_x", "v_y", "r")
+            mixed: dict[str, Any] = {
+                name: np.where(before, getattr(rough, name), getattr(shown, name)) for name in names
             }
-            shown = replace(shown, v_x=mixed["v_x"], v_y=mixed["v_y"], r=mixed["r"])
+            shown = replace(shown, **mixed)
         return begin.faults.apply(shown)
 
     def cornering(self, recording: Recording) -> Recording:
@@ -490,16 +492,6 @@ def _after_rest(recording: Recording, begin: Beginning) -> Recording:
     )
 
 
-def _noisier(sensors: Sensors, times: float) -> Sensors:
-    """Sensors of velocity and yaw rate with that many times the noise."""
-    return replace(
-        sensors,
-        v_x=replace(sensors.v_x, noise=times * sensors.v_x.noise),
-        v_y=replace(sensors.v_y, noise=times * sensors.v_y.noise),
-        r=replace(sensors.r, noise=times * sensors.r.noise),
-    )
-
-
 MakeBeginning = Callable[[Vehicle, np.random.Generator], Beginning]
 
 
@@ -515,12 +507,28 @@ def drawn(
     beginning : makes one from car and generator; None is a straight road.
     number : of the drive, each another.
     """
-    for attempt in count():
-        car = random_car(kind, np.random.default_rng([seed, attempt, *kind.encode()]))
+
+    def drive(car: RandomCar, attempt: int) -> RandomDrive:
         rng = np.random.default_rng([seed, attempt, number, *kind.encode()])
         begin = None if beginning is None else beginning(car.vehicle, rng)
+        return random_drive(car, rng, begin)
+
+    return first_good(kind, seed, drive)
+
+
+def first_good(kind: str, seed: int, drive: Callable[[RandomCar, int], RandomDrive]) -> RandomDrive:
+    """Return the drive of the first car of a seed that has a good one.
+
+    Parameters
+    ----------
+    kind : class of the car.
+    seed : of the car.
+    drive : of a car, and how many were drawn before.
+    """
+    for attempt in count():
+        car = random_car(kind, np.random.default_rng([seed, attempt, *kind.encode()]))
         with suppress(PlantError):
-            return random_drive(car, rng, begin)
+            return drive(car, attempt)
     raise AssertionError("it counts for ever")
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.targets import Table, Targets, Values, parse, without
+from benchmarks.targets import Table, Targets, Values, parse
 from identifier.methods import make_method
 from identifier.paper.design import VARIANTS
 from identifier.reproducibility import AxleRmse, force_rms, online_error, replay
@@ -159,7 +159,8 @@ def main() -> int:
     """Print medians over the seeds, front / rear."""
     targets, options = Targets("recorded_cars"), parse("recorded_cars", __doc__)
     if not DATA.is_dir():
-        without(f"the recordings are not there: {DATA} (set TIREID_DATA)")
+        print(f"skipped: the recordings are not there: {DATA} (set TIREID_DATA)")
+        return 0
     seeds = range(1 if options.quick else SEEDS)
     with ProcessPoolExecutor() as pool:
         for task, law in product(TASKS, VARIANTS):
