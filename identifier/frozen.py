@@ -68,7 +68,8 @@ def require_alive(
         if not here >= DEAD * said:
             play = "the steering for play, and " if axle == "front" else ""
             raise refusal(
-                f"the {axle} axle does not push: it has {here:.4g} N/rad, its vehicle {said:.4g}; "
+                f"the {axle} axle does not push: to {PROBE} rad it has {here:.4g} N/rad, its "
+                f"vehicle {said:.4g}; "
                 f"check {play}the units of force and slip"
             )
 

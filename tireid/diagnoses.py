@@ -7,6 +7,7 @@ from pathlib import Path
 
 from identifier.doctor import Diagnosis, Finding
 from identifier.doctor.diagnosis import WITHOUT_V_Y
+from identifier.doctor.samples import NOT_MEASURED
 from identifier.measured import with_doubt
 from identifier.verdict import Verdict
 from identifier.verdict.verdict import Objection
@@ -23,6 +24,7 @@ NAMES = {  # of findings by their code, where the code is not the word
     "center_of_gravity": "center of gravity stated too far back",
     "clock": "clock jumps",
     "clock_unit": "clock in ms",
+    "computed": "computed, not measured",
     "copied": "computed, not measured",
     "dropout": "drops to zero",
     "factor": "scaled",
@@ -41,7 +43,8 @@ NAMES = {  # of findings by their code, where the code is not the word
     "zero": "reads exactly 0 again and again",
 }
 
-_GROSS = ("unit", "sign", "sideslip", "steering_ratio")  # with which no answer is right
+# With which no answer is right
+_GROSS = ("unit", "sign", "sideslip", "steering_ratio", *NOT_MEASURED)
 _OF_ALL_FORCES = ("factor", "v_x")  # nor with this: it scales all forces, which no verdict sees
 
 
@@ -141,7 +144,8 @@ def with_doctor(verdict: Verdict, diagnosis: Diagnosis, repair: Repair) -> Verdi
     A unit, a sign, a ratio or a factor of v_x that is surely wrong refuses the answer; another sure
     size is noted. Nothing that `repair` took out of the log speaks against it.
     """
-    left = [] if repair else [one for one in diagnosis.findings if one.sure]
+    left = [one for one in diagnosis.findings if one.sure or one.code in NOT_MEASURED]
+    left = [] if repair else left
     said = [
         Objection(
             "doctor",

@@ -11,6 +11,7 @@ import numpy as np
 from codegen.writing import write_file
 from identifier.export.ggv import ggv_text
 from identifier.export.slipx import slipx_files
+from identifier.export.steady import steady_text
 from identifier.export.tir import tire_properties
 from identifier.export.understeer import Understeer, understeer_gradient
 from identifier.tire_model import AXLES, TireModel
@@ -18,7 +19,7 @@ from models.files import resolved, write_atomically
 from tireid.output import OutputError, output_folder, require_free
 from tireid.run import Run
 
-WANTED = "--tir FILE, --slipx DIR, --ggv FILE, --understeer"
+WANTED = "--tir FILE, --slipx DIR, --ggv FILE, --steady FILE, --understeer"
 
 
 class Emitted(NamedTuple):
@@ -34,6 +35,7 @@ def emit(
     tir: str | PathLike[str] | None = None,
     slipx: str | PathLike[str] | None = None,
     ggv: str | PathLike[str] | None = None,
+    steady: str | PathLike[str] | None = None,
     understeer: bool | str | PathLike[str] = False,
     overwrite: bool = False,
 ) -> Emitted:
@@ -46,6 +48,7 @@ def emit(
         `car_front.tir` and `car_rear.tir`.
     slipx : folder of a car for slipx 0.2.0.
     ggv : table of speed and largest a_x and a_y, at the lower end of the band of 90 %.
+    steady : table of a_y of steady turning over steering angle and speed.
     understeer : whether to compute the gradient; a path also writes it as CSV.
     overwrite : replace what is there.
 
@@ -56,14 +59,16 @@ def emit(
     OutputError, OSError
         Where a file is there and not to be replaced, two have one name, or one cannot be written.
     """
-    if understeer is False and tir is slipx is ggv is None:
-        raise ValueError("nothing is asked for: give one or more of tir, slipx, ggv, understeer")
+    if understeer is False and tir is slipx is ggv is steady is None:
+        raise ValueError(
+            "nothing is asked for: give one or more of tir, slipx, ggv, steady, understeer"
+        )
     model = source.tire if isinstance(source, Run) else source
     if tir is not None and not Path(tir).name:
         raise OutputError(f"tir must name a file, it is {str(tir)!r}")
     table = None if isinstance(understeer, bool) else Path(understeer)
     files = [] if tir is None else [Path(tir).with_stem(f"{Path(tir).stem}_{a}") for a in AXLES]
-    files += [Path(one) for one in (ggv, table) if one is not None]
+    files += [Path(one) for one in (ggv, steady, table) if one is not None]
     for path in files:
         if not path.parent.is_dir() or (path.exists() and not path.is_file()):
             raise OutputError(f"{path} cannot be a file: name one in a folder that is there")
@@ -80,6 +85,7 @@ def emit(
                 write_file(folder / name, text)
         texts = [] if tir is None else [tire_properties(model, axle) for axle in AXLES]
         texts += [] if ggv is None else [ggv_text(model)]
+        texts += [] if steady is None else [steady_text(model)]
         found = understeer_gradient(model, rng) if understeer is not False else None
         texts += [] if table is None or found is None else [found.csv]
         try:

@@ -131,7 +131,11 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     elif any(one.code == "straight" for one in found):  # by a yaw rate that may be the fault
         broken = _contradictions(recording, vehicle)
         found = [one for one in found if one.code != "straight" or not broken] + broken
-    sizes = doubted(fine.findings, found)
+    coarse = {one.channel for one in found if one.code == "quantized"}
+    sizes = [
+        replace(one, note=True, sure=False) if one.channel in coarse else one
+        for one in doubted(fine.findings, found)
+    ]
     ranked = sorted([*found, *sizes], key=lambda one: not one.matters)
     return Diagnosis(
         name=recording.name,

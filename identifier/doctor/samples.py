@@ -16,18 +16,21 @@ from identifier.doctor.finding import Finding, first_of_each
 from identifier.doctor.pieces import SLOWEST, driven_pieces, usual_speed
 from models.recordings import Recording
 from models.recordings import samples as facts
+from models.recordings.evidence import computed_v_y
 from models.recordings.record import CHANNELS
 from models.recordings.repair import Repair
 
 _FREEZE = 0.3  # [s] that a noisy channel repeats one number
 _MOVES = 0.15  # of the range of v_x r, by which a car must move meanwhile, in any unit
+_NOISY = 2.0  # steps of a rounded channel, of noise that never lets it repeat one number so long
 _REPEATED = 0.01  # of a noisy channel: share of repeated samples
 _FEW = 5  # of a noisy channel: how often it repeats
 _CAUGHT_UP = 0.025  # of a rounded channel: share of samples after which it catches up
 _ALIKE_DELAYS = math.log(1.6)  # of the times by which samples of two channels are late
-_COARSE = 0.05  # quantum over the rms of a channel
+_COARSE = 0.2  # steps over the standard deviation of a channel, from which models get worse
 CERTAIN = 0.99  # confidence in what samples show by themselves
 
+NOT_MEASURED = ("computed", "copied")  # codes of what no sensor showed
 LATERAL = ("v_y", "r", "delta_f", "a_y")
 UNITS = {"v_x": "m/s", "v_y": "m/s", "r": "rad/s", "delta_f": "rad", "delta_r": "rad",
          "a_y": "m/s^2"}  # fmt: skip
@@ -36,6 +39,8 @@ _ESTIMATED, _SWITCHED = ("v_y", "r"), 2  # channels that may be, how often they 
 
 def sample_findings(recording: Recording) -> list[Finding]:
     pieces = driven_pieces(recording)
+    if computed := _computed(pieces):
+        return [computed]
     listed = [*_missing(pieces), *(one for piece in pieces for one in _piece_findings(piece))]
     late = {one.channel: one.size for one in listed if one.code == "jitter"}
     return [
@@ -77,6 +82,14 @@ def _piece_findings(recording: Recording) -> list[Finding]:
     return found
 
 
+def _computed(pieces: tuple[Recording, ...]) -> Finding | None:
+    """Return a v_y that follows a formula in most pieces, with which nothing else can be told."""
+    told = [one for one in map(computed_v_y, pieces) if one is not None]
+    if 2 * len(told) <= len(pieces):
+        return None
+    return _found("computed", "v_y", math.nan, CERTAIN, told[0])
+
+
 def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:
     """Channels that stand still throughout, or in whole pieces of a long drive, as others move."""
     for name in LATERAL:
@@ -88,7 +101,8 @@ def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:
             continue
         value = f"{float(getattr(there[0], name)[0]):g} {UNITS[name]}"
         text = (
-            f"{name} is {value} throughout while the car moves: no sensor, or it was not connected"
+            f"{name} is {value} throughout while the car moves: no sensor, not connected, or too "
+            "few digits"
             if len(there) == len(pieces)
             else _stopped(name, float(there[0].t[0]), there[0].duration)
         )
@@ -124,13 +138,14 @@ def _copies(moving: Mapping[str, Array]) -> Iterator[Finding]:
 def _channel(name: str, recording: Recording, jumps: bool) -> Iterator[Finding]:
     signal, dt = getattr(recording, name), recording.dt
     noise, step, runs = facts.noise(signal), facts.resolution(signal), facts.Runs.of(signal)
-    if step is not None and step > _COARSE * float(np.std(signal)):
+    share = step / max(float(np.std(signal)), 1e-300)
+    if name in LATERAL and share > _COARSE:
         text = (
-            f"{name} comes in steps of {step:.3g} {UNITS[name]}: a coarse sensor, or too few "
-            "digits were written"
+            f"{name} comes in steps of {step:.3g} {UNITS[name]}, {share:.2g} of its standard "
+            "deviation: write more digits, or the tires are less exact"
         )
         coarse = _found("quantized", name, step, CERTAIN, text)
-        yield replace(coarse, unit=UNITS[name])
+        yield replace(coarse, unit=UNITS[name], note=True)
     lost = facts.dropouts(signal, noise)
     if lost.size:
         text = (
@@ -139,7 +154,7 @@ def _channel(name: str, recording: Recording, jumps: bool) -> Iterator[Finding]:
         )
         yield _found("dropout", name, float(lost.size), CERTAIN, text)
         return
-    stairs = runs.stairs(rounded=step is not None)
+    stairs = runs.stairs(signal, step)
     if stairs is not None:
         delay = 0.5 * (stairs - 1) * dt
         text = (
@@ -148,14 +163,15 @@ def _channel(name: str, recording: Recording, jumps: bool) -> Iterator[Finding]:
         )
         slow = _found("held", name, stairs * dt, CERTAIN, text)
         yield replace(slow, repair=Repair(delay={name: delay}), sure=True)
-    elif step is None:
-        yield from _repeats(name, runs, noise > 0.0, recording)
+    else:
+        step = max(step, runs.resolution(signal))
+        yield from _repeats(name, runs, step, noise > _NOISY * step, recording)
     spikes = facts.spikes(signal, noise)
     if not jumps and 3 <= spikes.size <= 0.1 * signal.size:
         first = f"first at {recording.t[int(spikes[0])]:.4g} s"
         text = f"{name} has {spikes.size} samples far off their neighbors, {first}"
         yield _found("spikes", name, float(spikes.size), 0.9, text)
-    late = None if stairs is not None else facts.lateness(signal, dt)
+    late = None if stairs is not None else facts.lateness(signal, dt, step)
     if late is not None:
         size, z = late
         text = (
@@ -165,26 +181,29 @@ def _channel(name: str, recording: Recording, jumps: bool) -> Iterator[Finding]:
         yield replace(_found("jitter", name, size, 0.9, text), deviation=size / z)
 
 
-def _repeats(name: str, runs: facts.Runs, noisy: bool, recording: Recording) -> Iterator[Finding]:
+def _repeats(
+    name: str, runs: facts.Runs, step: float, noisy: bool, recording: Recording
+) -> Iterator[Finding]:
     """A channel that repeats one number: for long, or again and again, as noise never does."""
     signal, dt = getattr(recording, name), recording.dt
-    zero = _zero(name, runs, recording) if name in _ESTIMATED else None
+    zero = _zero(name, runs, step, recording) if name in _ESTIMATED else None
     if zero is not None:
         yield zero
         return
-    longest = int(np.argmax(runs.length))
+    lost, chance = runs.lost(signal, step)
+    ends = lost.copy()
+    ends[-1] |= noisy or not step
+    lost &= noisy | (runs.length * dt < _FREEZE)  # what is steered in steps rests between them
+    again = int(np.count_nonzero(lost))
+    longest = int(np.argmax(runs.length * ends))
     length, at = int(runs.length[longest]), int(runs.first[longest])
-    step = runs.resolution(signal)
-    lost = runs.lost(signal, step)
-    ends = lost[longest] or at + length == signal.size
-    frozen = length * dt >= _FREEZE and ends and (noisy or name in ("v_y", "r", "a_y"))
+    frozen = length * dt >= _FREEZE and ends[longest] and (noisy or name in ("v_y", "r", "a_y"))
     frozen = frozen and _runs_on(name, noisy, recording, slice(at, at + length))
     first = float(recording.t[at])
-    of_all, again = float(np.sum(runs.length[lost] - 1)), int(np.count_nonzero(lost))
+    of_all = float(np.sum(runs.length[lost] - 1))
     of_others = of_all - (length - 1) * bool(frozen and lost[longest])
-    enough = _REPEATED + facts.alike_by_rounding(signal) if step is None else _CAUGHT_UP
-    known = noisy or step is not None
-    if known and of_others / len(recording) > enough and again >= _FEW:
+    enough = (_CAUGHT_UP if step else _REPEATED) * len(recording)
+    if (noisy or step) and of_others * (again - chance) > enough * again and again >= _FEW:
         typical = float(np.median(runs.length[lost])) * dt
         most = f", the longest for {length * dt:.3g} s from {first:.4g} s on" if frozen else ""
         text = (
@@ -197,7 +216,7 @@ def _repeats(name: str, runs: facts.Runs, noisy: bool, recording: Recording) -> 
         yield _found("frozen", name, length * dt, 0.95, _stopped(name, first, length * dt))
 
 
-def _zero(name: str, runs: facts.Runs, recording: Recording) -> Finding | None:
+def _zero(name: str, runs: facts.Runs, step: float, recording: Recording) -> Finding | None:
     """A channel that is exactly 0 for long, again and again, while the car turns.
 
     No sensor does that: an estimate does, which is switched off there.
@@ -205,6 +224,8 @@ def _zero(name: str, runs: facts.Runs, recording: Recording) -> Finding | None:
     signal, dt = getattr(recording, name), recording.dt
     usual = facts.swing(_turning(name, recording))
     long = (runs.length * dt >= _FREEZE) & (signal[runs.first] == 0.0)
+    far = np.concatenate([[False], runs.far(signal, step), [False]])
+    long &= far[:-1] | far[1:]
     places = [
         slice(first, first + n)
         for first, n in zip(runs.first[long].tolist(), runs.length[long].tolist(), strict=True)

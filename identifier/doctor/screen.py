@@ -13,7 +13,7 @@ import numpy as np
 from identifier.doctor.finding import Finding
 from identifier.doctor.pieces import SLOWEST, driven_pieces, driven_windows, looked_at, usual_speed
 from identifier.doctor.readings import ARM, DEGREE, Change, Motion, Read, read
-from identifier.doctor.samples import sample_findings
+from identifier.doctor.samples import NOT_MEASURED, sample_findings
 from identifier.doctor.suspects import similar_inertia, usual_inertia
 from identifier.measured import with_doubt
 from models.recordings import Recording, RecordingError
@@ -56,8 +56,12 @@ def screen(recording: Recording, vehicle: Vehicle) -> Screened:
         return Screened(findings=clock, repair=Repair(), blind="the clock is not in s")
     samples, given = sample_findings(recording), _unlike(vehicle)
     driven = sum(one.duration for one in driven_pieces(recording))
-    lasts = {"copied": -math.inf, "frozen": _PERFECT * driven, "zero": _OFTEN * driven}
-    missing = [one.channel for one in samples if one.size >= lasts.get(one.code, math.inf)]
+    lasts = {"frozen": _PERFECT * driven, "zero": _OFTEN * driven}
+    missing = [
+        one.channel
+        for one in samples
+        if one.code in NOT_MEASURED or one.size >= lasts.get(one.code, math.inf)
+    ]
     blind = f"{' and '.join(missing)} was not measured" if missing else ""
     quiet = None if missing else _quiet_finding(recording)
     if quiet is not None:

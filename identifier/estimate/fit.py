@@ -16,7 +16,7 @@ from identifier.day import ENOUGH as ENOUGH_DRIVEN
 from identifier.estimate.day import days_apart
 from identifier.estimate.drive import FASTEST, Drive, hardest
 from identifier.estimate.information import CHANGES, Information
-from identifier.estimate.latent import Learnt, lateness, latent_priors, learn_latent
+from identifier.estimate.latent import Learnt, accelerometer_off, latent_priors, learn_latent
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes, TooShortError
 from identifier.estimate.posterior import Posterior, Reach, Segment
@@ -144,21 +144,21 @@ def fit(
     beliefs = before if found is None else _after(before, found)
     for blind in (one for one in recordings if one.logged_v_y is None):
         try:
-            late = lateness(blind, vehicle, latent_priors(vehicle, beliefs))
+            off = accelerometer_off(blind, vehicle, latent_priors(vehicle, beliefs))
             nodes = Nodes.of(
                 blind,
                 vehicle,
                 hardest(blind, _BLIND),
-                a_y_late=max(late.seconds, 0.0),
+                a_y_late=max(off.late, 0.0),
                 ln_sway=float(beliefs.mean[INDEX["ln_sway"]]),
             )
         except TooShortError:
             if len(recordings) == 1:
                 raise
             continue
-        reach = reach.with_(Reach(a_y_late=late.seconds))
+        reach = reach.with_(Reach(a_y_late=off.late, a_y_place=off.place, a_y_instead=off.instead))
         if nodes.counts.any():
-            learnt = learn_latent(nodes, vehicle, beliefs, late)
+            learnt = learn_latent(nodes, vehicle, beliefs, off)
             found, reach = learnt.posterior, reach.with_(_reach_of_states(learnt))
             beliefs = _after(beliefs, found)
         went_on(blind.duration)
@@ -166,18 +166,21 @@ def fit(
         name = recordings[0].name
         raise ValueError(f"{name}: no sample is fast enough to learn from")
     model = FittedModel(vehicle=vehicle, p=found.p, covariance=found.covariance, reach=reach)
-    if softness(found.p)[0][0] < -_SOFT and not before.moves[_PLAY]:
-        loose = fit(recordings, vehicle, before.with_play(), block=block, coarse=coarse, days=days)
-        if loose.posterior.p[_PLAY] > _SURELY * loose.posterior.sd(NAMES[_PLAY]):
-            return loose
+    soft = softness(found.p)[0][0] < -_SOFT  # as of wheels with play, or of zeros that differ
     if days == "found" and sum(len(_alone(one)) for one in measured) > 1:
         apart = len({one.dt for one in measured}) == 1
         apart = apart and bool(days_apart(joined(measured), vehicle, model.p, model.covariance))
         share = 0.0 if apart else _missed(measured, model)
-        if apart or share > _NOTHING_FITS:  # then tires tell no zeros apart
+        if apart or soft or share > _NOTHING_FITS:  # then tires tell no zeros apart
             each = fit(recordings, vehicle, priors, block=block, coarse=coarse, days="each")
             if apart or _missed(measured, each.model) < _MUCH_LESS * share:
                 return each
+            if soft and days_apart(joined(measured), vehicle, each.model.p, each.model.covariance):
+                return each
+    if soft and not before.moves[_PLAY]:
+        loose = fit(recordings, vehicle, before.with_play(), block=block, coarse=coarse, days=days)
+        if loose.posterior.p[_PLAY] > _SURELY * loose.posterior.sd(NAMES[_PLAY]):
+            return loose
     return _Fit(model, found, parts)
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from codegen import Scan
 from codegen.arrays import Array, one_thread
 from identifier.estimate.drive import hardest
-from identifier.estimate.nodes import JERKS, Nodes, low_passed
+from identifier.estimate.nodes import JERKS, Nodes, earlier, low_passed
 from identifier.estimate.posterior import Posterior
 from identifier.estimate.priors import OF_AXLES, OF_CAR, SEDAN, Priors
 from identifier.estimate.solve import around_beliefs, beliefs_cost, bounded_step, car_numbers
@@ -40,8 +40,12 @@ _MOST_LATE = 0.3  # [s] of a sedan, the largest delay
 _SMALL_DELAY = 0.003  # [s] of a sedan, a delay that does not matter
 _LOOKS = 4  # at a delay
 _LEFT_LATE = 0.01  # [s] of a sedan, sd of what is left of a delay that was taken out
-_SURELY_LATE = 3.0  # sd of a delay, above which it is taken out; a single step tells none
-_GAINED = 8.0  # nats that a delay gains, more where more is left (`Trust.usual`)
+_ANY_PLACE = 0.3  # [L], sd of a place of the accelerometer that is looked for
+_MOST_PLACE = 1.0  # [L], the farthest: it is in the car
+_LEFT_PLACE = 0.05  # [L], sd of what is left of a place that was found
+_SURELY = 3.0  # sd of a delay or a place, above which it is taken out; a single step tells none
+_GAINED = 8.0  # nats that a delay or a place gains, more where more is left (`Trust.usual`)
+_SAME = 4.0  # nats within which the one is as likely as the other, more as above
 _ALIKE = 1e-4  # probability from which another start's end counts
 _STARTS = (-0.4, 0.4)  # of ln C: soft and stiff
 _FIRM = 50.0  # times that beliefs hold parameters at first, where the states are far off
@@ -61,6 +65,7 @@ _SHORTEST = 50  # nodes from which noise is learnt
 N, P = len(STATES), len(NAMES)
 OF_V_Y = ("v_y_bias", "v_y_angle", "v_y_lever")
 FELT = {"a_y_bias": 0.015, "roll": 0.04, "a_y_delay": 0.0007, "a_y_lever": 0.01}  # sd; lever in L
+_DELAY, _PLACE = (LATENT_NAMES.index(name) for name in ("a_y_delay", "a_y_lever"))
 AGAIN = ("steering_zero", "r_bias", "a_y_bias", "roll", "a_y_delay", "a_y_lever")  # of each log
 
 
@@ -148,10 +153,10 @@ class _Smoothed:
     slopes: Array
 
 
-def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Priors:
+def latent_priors(vehicle: Vehicle, beliefs: Priors, off: "Off | None" = None) -> Priors:
     """Return beliefs with those of the accelerometer behind, and of yaw rate and inertia.
     beliefs : of the car, of one of these, or of a log that came before.
-    late : whether a delay of a_y was found and taken out, so that more of it may be left.
+    off : what was found of the accelerometer, so that more of it may be left.
     """
     scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
     information, moves = beliefs.information.copy(), beliefs.moves.copy()
@@ -166,15 +171,18 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, late: bool = False) -> Prio
     if not moves[inertia]:
         information[inertia, inertia], moves[inertia] = _INERTIA**-2, True
     felt = np.array(list(FELT.values())) * [1.0, 1.0, 1.0, vehicle.wheelbase]
-    if late:
-        felt[list(FELT).index("a_y_delay")] = _LEFT_LATE * scale
+    if off is not None and (off.late > 0.0 or off.instead):
+        felt[2] = (_ANY_DELAY if off.instead else _LEFT_LATE) * scale
+    if off is not None and (off.place or off.instead):
+        felt[3] = (_ANY_PLACE if off.instead else _LEFT_PLACE) * vehicle.wheelbase
+    place = 0.0 if off is None else off.place
     whole = np.zeros((P + len(felt),) * 2)
     whole[:P, :P] = information
     whole[range(P, len(whole)), range(P, len(whole))] = felt**-2
     far = np.full(len(felt), np.inf)
     return replace(
         beliefs,
-        mean=np.concatenate([mean, [0.0, _ROLL, 0.0, 0.0]]),
+        mean=np.concatenate([mean, [0.0, _ROLL, 0.0, place]]),
         low=np.concatenate([beliefs.low, -far]),
         high=np.concatenate([beliefs.high, far]),
         information=whole,
@@ -342,16 +350,14 @@ class _Latent:
 
     # The optimum.
 
-    def begin(
-        self, stiffer: float = 0.0, late: "_Lateness | None" = None
-    ) -> tuple[Array, Array, float]:
+    def begin(self, stiffer: float = 0.0, off: "Off | None" = None) -> tuple[Array, Array, float]:
         """Return states whose rear axle does not slip, the parameters that are believed, and how
         firmly.
         stiffer : by which ln C of both axles is larger.
-        late : whose parameters are taken in their place, and its states if they are of these nodes.
+        off : whose parameters are taken in their place, and its states if they are of these nodes.
         """
-        if late is not None and np.array_equal(late.t, self.nodes.t):
-            return late.z, late.p, _NEAR
+        if off is not None and np.array_equal(off.t, self.nodes.t):
+            return off.z, off.p, _NEAR
         v_x, delta = self.nodes.given[:, 0], self.nodes.given[:, 1]
         r = low_passed(self.nodes.measured[:, 0], 3.0 / self.scale, self.nodes.dt)
         l_f, l_r = self.vehicle.bicycle.l_f, self.vehicle.bicycle.l_r
@@ -362,7 +368,7 @@ class _Latent:
         for axle in "fr":
             k = INDEX[f"ln_stiffness_{axle}"]
             p[k] += stiffer if self.priors.moves[k] else 0.0
-        return z, p if late is None else late.p, _FIRM
+        return z, p if off is None else off.p, _FIRM
 
     def descend(
         self,
@@ -490,18 +496,17 @@ class Learnt(NamedTuple):
 
 
 def learn_latent(
-    nodes: Nodes, vehicle: Vehicle, beliefs: Priors, late: "_Lateness | None" = None
+    nodes: Nodes, vehicle: Vehicle, beliefs: Priors, off: "Off | None" = None
 ) -> Learnt:
     """Return what the nodes of a drive teach.
 
     It begins with soft and with stiff tires. Where they end elsewhere, the covariance has the
     distance between both, by how probable they are.
     beliefs : of the car, or what other drives of it left.
-    late : of the drive, from whose end the soft start goes on; None begins afresh.
+    off : of the drive, from whose end the soft start goes on; None begins afresh.
     """
-    taken_out = late is not None and late.seconds > 0.0
-    problem = _Latent(nodes, vehicle, latent_priors(vehicle, beliefs, taken_out))
-    first = problem.smoothed(*problem.begin(_STARTS[0], late))
+    problem = _Latent(nodes, vehicle, latent_priors(vehicle, beliefs, off))
+    first = problem.smoothed(*problem.begin(_STARTS[0], off))
     z, p, cost = problem.descend(*problem.begin(_STARTS[1]), first.R, enough=_NEARLY)
     best, other = first, (z, p, cost)
     if cost < first.cost - _NEARLY:
@@ -538,66 +543,87 @@ def learn_latent(
     )
 
 
-class _Lateness(NamedTuple):
-    """By how much a_y is later than the yaw rate [s], and what was found with it: states z (n, 8)
-    at times t (n,), and all parameters p.
+class Off(NamedTuple):
+    """What is off with an accelerometer: by how much a_y is later than the yaw rate [s], and how
+    far ahead of the center of gravity it is measured [m]; instead of the one the other where the
+    drive cannot tell, else 0. With it were found states z (n, 8) at times t (n,), and all
+    parameters p.
     """
 
-    seconds: float
+    late: float
+    place: float
+    instead: float
     t: Array
     z: Array
     p: Array
 
 
-def lateness(recording: Recording, vehicle: Vehicle, priors: Priors) -> _Lateness:
-    """Return by how much a_y is later than the yaw rate, where that is no small matter.
+def accelerometer_off(recording: Recording, vehicle: Vehicle, priors: Priors) -> Off:
+    """Return what is off with the accelerometer of a log, where that is no small matter.
 
-    It is the delay with which the minute of hardest cornering is explained best, found as a
-    parameter that is hardly believed, and taken out until nothing is left of it. 0 where it gains
-    too little or is hardly known. Negative where a_y would have to be earlier, which no filter
-    makes it: that is an error of the model, to be noted and never taken out.
+    A late a_y and one that is measured behind the center of gravity look much alike. The minute of
+    hardest cornering is explained with either as a parameter that is hardly believed, and with
+    both: what explains it best is taken, one of them where it does. A delay is taken out until
+    nothing is left of it. Nothing is taken that gains too little or is hardly known. A delay is
+    negative where a_y would have to be earlier, which no filter makes it: that is an error of the
+    model, to be noted and never taken out.
     priors : as of `_Latent`.
     """
     part = hardest(recording, _LATE_SPAN)
-    scale, dt = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt
+    scale, dt, L = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt, vehicle.wheelbase
     # Interpolation averages noise: what is smooth is not changed by it.
     smooth = low_passed(recording.needed("a_y"), JERKS / scale, dt)
-    piece = replace(recording, a_y=smooth)
-    delay = LATENT_NAMES.index("a_y_delay")
-    information = priors.information.copy()
-    information[delay, delay] = (_ANY_DELAY * scale) ** -2
-    open_ = replace(priors, information=information)
+    piece, small = replace(recording, a_y=smooth), _SMALL_DELAY * scale
+    wide = {_DELAY: _ANY_DELAY * scale, _PLACE: _ANY_PLACE * L}
 
-    def problem(late: float, beliefs: Priors) -> _Latent:
-        sway = float(priors.mean[INDEX["ln_sway"]])
+    def problem(late: float, mean: Array, *wanted: int) -> _Latent:
+        sway, information = float(priors.mean[INDEX["ln_sway"]]), priors.information.copy()
+        for k in wanted:
+            information[k, k] = wide[k] ** -2
         nodes = Nodes.of(piece, vehicle, part, a_y_late=late, ln_sway=sway)
-        return _Latent(nodes, vehicle, beliefs)
+        return _Latent(nodes, vehicle, replace(priors, mean=mean, information=information))
 
-    on_time = problem(0.0, priors)
-    t, R, small = on_time.nodes.t, on_time.R, _SMALL_DELAY * scale
+    on_time = problem(0.0, priors.mean)
+    t, R = on_time.nodes.t, on_time.R
     z, p, least = on_time.descend(*on_time.begin(_STARTS[0]), R, enough=_NEARLY)
-    none, late = _Lateness(0.0, t, z, p), 0.0
-    for k in range(_LOOKS):
-        most = _ITERATIONS if k else _FEW
-        z, p, reached = problem(late, open_).descend(z, p, _NEAR, R, enough=_NEARLY, most=most)
-        if k == 0 and least - reached < _PROMISED:
-            return none
-        more, p[delay] = float(p[delay]), 0.0
-        late = min(max(late + more, -_MOST_LATE * scale), _MOST_LATE * scale)
-        if abs(more) < small:
-            break
-    if abs(late) < small:
+    none = Off(0.0, 0.0, 0.0, t, z, p)
+    _, _, promised = problem(0.0, priors.mean, *wide).descend(
+        z, p, _NEAR, R, enough=_NEARLY, most=_FEW
+    )
+    if least - promised < _PROMISED:
         return none
-    z, p, found = problem(late, priors).descend(z, p, _NEAR, R, enough=_NEARLY)
-    count = max(on_time.nodes.counts.sum(), 1)
-    enough = _GAINED * max(1.0, 2.0 * found / count / TRUST.usual)
-    if least - found < enough:
+
+    def explained(*wanted: int) -> tuple[float, Off]:
+        """Return what is left with some of both, and what they are; 0 that is hardly known."""
+        late, z, p = 0.0, none.z, none.p
+        for _ in range(_LOOKS):
+            z, p, _ = problem(late, priors.mean, *wanted).descend(z, p, _NEAR, R, enough=_NEARLY)
+            more = float(p[_DELAY]) if _DELAY in wanted else 0.0
+            p[_DELAY] -= more
+            late = min(max(late + more, -_MOST_LATE * scale), _MOST_LATE * scale)
+            if abs(more) < small:
+                break
+        then, mean = problem(late, priors.mean, *wanted), priors.mean.copy()
+        sd = dict(zip(then.moves, np.sqrt(np.diag(then.spread(z, p, R)[1])), strict=True))
+        mean[_PLACE] = p[_PLACE] if _PLACE in wanted else 0.0
+        z, p, left = problem(late, mean).descend(z, p, _NEAR, R, enough=_NEARLY)
+        known = abs(late) > max(small, _SURELY * sd[_DELAY] * (late > 0.0))
+        placed = _SURELY * sd[_PLACE] < abs(mean[_PLACE]) < _MOST_PLACE * L
+        surely = known >= (_DELAY in wanted) and placed >= (_PLACE in wanted)
+        return left if surely else np.inf, Off(late, float(mean[_PLACE]), 0.0, t, z, p)
+
+    more = max(1.0, 2.0 * promised / max(on_time.nodes.counts.sum(), 1) / TRUST.usual)
+    either = [explained(_DELAY), explained(_PLACE)]
+    (left, best), (other, second) = sorted(either, key=lambda one: one[0])
+    if least - left < _GAINED * more:
         return none
-    then = problem(late, open_)
-    variance = np.diag(then.spread(z, p, R)[1])[then.moves == delay]
-    if late < 0.0:
-        return none._replace(seconds=late)
-    return _Lateness(late, t, z, p) if late > _SURELY_LATE * np.sqrt(variance[0]) else none
+    both, off = explained(_DELAY, _PLACE)
+    if left - both > _GAINED * more and off.late > 0.0:
+        return off
+    if other - left < _SAME * more:
+        best, second = (best, second) if best.late >= 0.0 else (second, best)
+        return best._replace(instead=second.late or second.place)
+    return best if best.late >= 0.0 else none._replace(late=best.late)
 
 
 @one_thread
@@ -611,8 +637,8 @@ def estimate_v_y(
     moves = np.isin(np.arange(len(LATENT_NAMES)), again)
     mean = np.where(moves[:P], 0.0, p)
 
-    def fixed(late: bool) -> Priors:
-        believed = latent_priors(vehicle, replace(Priors.of(vehicle), mean=mean), late)
+    def fixed(off: Off | None = None) -> Priors:
+        believed = latent_priors(vehicle, replace(Priors.of(vehicle), mean=mean), off)
         information = np.zeros_like(believed.information)
         information[again, again] = believed.information[again, again]
         return replace(believed, moves=moves, information=information)
@@ -626,14 +652,14 @@ def estimate_v_y(
         np.array([0.0, OF_CAR["steering_zero"].sd]),
     )
     longest, zero = 0, INDEX["steering_zero"]
-    late = lateness(recording, vehicle, fixed(late=False))
+    off = accelerometer_off(recording, vehicle, fixed())
     for outer, inner in _blocks(recording):
         sway = float(p[INDEX["ln_sway"]])
-        nodes = Nodes.of(recording, vehicle, outer, a_y_late=max(late.seconds, 0.0), ln_sway=sway)
+        nodes = Nodes.of(recording, vehicle, outer, a_y_late=max(off.late, 0.0), ln_sway=sway)
         if not nodes.counts.any():
             continue
-        problem = _Latent(nodes, vehicle, fixed(late.seconds > 0.0), columns)
-        found = problem.smoothed(*problem.begin(late=late), rounds=1)
+        problem = _Latent(nodes, vehicle, fixed(off), columns)
+        found = problem.smoothed(*problem.begin(off=off), rounds=1)
         known = np.flatnonzero(~moves[columns])
         tires, free = found.slopes[:, known], found.slopes[:, problem.free]
         index = columns[known]
@@ -647,8 +673,12 @@ def estimate_v_y(
             )
             found_v_y.steering_zero[:] = found.p[zero], np.sqrt(found.P[k, k])
         bias, roll = (found.p[LATENT_NAMES.index(name)] for name in ("a_y_bias", "roll"))
-        beside = bias + roll / GRAVITY * nodes.given[:, 5]
+        turning = np.gradient(found.z[:, 1], nodes.dt)
+        beside = bias + (roll * nodes.given[:, 5] + found.p[_PLACE] * turning) / GRAVITY
         _fill(found_v_y, recording, inner, nodes, found.z[:, 0], np.sqrt(variance), beside)
+    for one in recording.segments if off.late > 0.0 else ():
+        felt = recording.needed("a_y")[one]
+        found_v_y.beside[one] += (felt - earlier(felt, off.late / recording.dt)) / GRAVITY
     for values in found_v_y:
         values.setflags(write=False)
     return found_v_y

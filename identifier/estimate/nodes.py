@@ -82,7 +82,7 @@ class Nodes:
             count = (last - first) // every
             if count >= _FEWEST_NODES:
                 some = slice(first, first + count * every)
-                felt = _earlier(a_y[first:last], a_y_late / recording.dt)[: count * every]
+                felt = earlier(a_y[first:last], a_y_late / recording.dt)[: count * every]
                 pieces.append(_piece(recording, some, vehicle, every, felt, ln_sway))
         if not pieces:
             raise TooShortError(f"{recording.name}: too short to learn from without v_y")
@@ -100,7 +100,7 @@ class Nodes:
         return first
 
 
-def _earlier(signal: Array, samples: float) -> Array:
+def earlier(signal: Array, samples: float) -> Array:
     if samples == 0.0:
         return signal
     at = np.arange(len(signal))

@@ -17,7 +17,7 @@ from codegen.arrays import Array
 from identifier.estimate.drive import SMOOTHED, hardest
 from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
-from models.recordings.samples import white_noise
+from models.recordings.samples import FAR, resolution, white_noise
 from models.vehicle import Vehicle
 
 _RARE = 0.03  # [s] of a sedan between new values, more of which are too few
@@ -31,6 +31,7 @@ _ROLL = 0.05  # ρ, mean of its prior: by which a_y is larger in a car whose bod
 _ROLL_SD = 0.04  # of ρ, standard deviation of its prior
 _OFF = 0.15  # [m/s²], b at first
 _WANDERS = 5e-3  # [(m/s²)²/s], variance of b' of a banked road
+_BENT = (0.55, 0.3)  # share of samples that move, at which straight lines bend; of rounded ones
 _EQUAL = 1e-9  # of the largest change, below which two are one
 _CLIP = 3.0  # deviations from which a sample counts less
 _ASKED = 32  # instants of a log at which the doubt of v_y is asked for
@@ -105,17 +106,21 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
 def _new_values(signal: Array) -> NDArray[np.intp]:
     """Return which samples are new: not the last one held, nor on a straight line, (m,).
 
-    All are new where neither is the rule.
+    All are new where neither is the rule, or where rounding makes it so.
     """
-    step = np.diff(signal)
+    step, rounded = np.diff(signal), resolution(signal)
     most = _EQUAL * max(float(np.abs(step).max(initial=0.0)), 1e-12)
     changes = 1 + np.flatnonzero(np.abs(step) > most)
-    if changes.size > 3 and np.median(np.diff(changes)) > 1.0:
+    apart, far = np.diff(changes), np.abs(step[changes - 1]) > FAR * rounded
+    apart = apart[far[1:] & far[:-1]]
+    if apart.size > 2 and np.median(apart) > 1.0:
         return np.concatenate([[0], changes])
-    bends = 1 + np.flatnonzero(np.abs(np.diff(step)) > most)
+    bend = np.abs(np.diff(step)) > most
+    bends = 1 + np.flatnonzero(bend)
     ends = bends[np.append(np.diff(bends) > 1, True)] if bends.size else bends
     ends = ends[ends < len(signal) - 2]  # what bends at the last one nobody sees
-    few = 2 * bends.size < 1.1 * len(signal)
+    moves = np.abs(step[1:]) > max(most, FAR * rounded)
+    few = np.count_nonzero(bend & moves) < _BENT[rounded > 0.0] * np.count_nonzero(moves)
     if ends.size > 3 and few and np.median(np.diff(ends)) > 2.0:
         return np.concatenate([[0], ends])
     return np.arange(len(signal))

@@ -64,6 +64,8 @@ class Reach(NamedTuple):
         part, rms [rad].
     a_y_late : of such drives, by which a_y was later than the yaw rate [s]; negative where it
         would have to be earlier, which is not believed.
+    a_y_place : of such drives, how far ahead of the center of gravity a_y was measured [m].
+    a_y_instead : the other one in place of that of both which is not 0, where no drive tells.
     """
 
     slip: Array = np.zeros(2)
@@ -74,6 +76,8 @@ class Reach(NamedTuple):
     segments: tuple[Segment, ...] = ()
     parted: float = 0.0
     a_y_late: float = 0.0
+    a_y_place: float = 0.0
+    a_y_instead: float = 0.0
 
     def with_(self, other: "Reach") -> "Reach":
         """Return what both reached."""
@@ -89,7 +93,7 @@ class Reach(NamedTuple):
             self.pairs + other.pairs,
             self.segments + other.segments,
             max(self.parted, other.parted),
-            max(self.a_y_late, other.a_y_late, key=abs),
+            *(max(pair, key=abs) for pair in zip(self[-3:], other[-3:], strict=True)),
         )
 
     @property

@@ -24,6 +24,7 @@ _SURELY = 3.0  # standard deviations of an error of the steering that is noted
 _NOTED_GAIN = 0.08  # least error of the steering that is noted [-]
 _NOTED_PLAY = 0.25  # [deg] of the steering, least play that is noted
 _ADDED = ("steering_play",)  # parameters that older files do not hold, 0 in them
+_LAST = ("parted_rad", "a_y_late_s", "a_y_place_m", "a_y_instead")  # of a reach, where not 0
 _LARGEST = 1e6  # of the numbers in a file
 
 BOUNDED = (("ln_stiffness", "cornering stiffness"), ("ln_grip", "grip"))
@@ -131,12 +132,22 @@ def notes(reach: Reach, p: Array, covariance: Array) -> tuple[tuple[str, str], .
                 "those of the tires without it, forces allow for it",
             )
         )
-    if reach.a_y_late > 0.0:
+    late, place = (one or reach.a_y_instead for one in (reach.a_y_late, reach.a_y_place))
+    when = "late" if late > 0.0 else "early"
+    delay = f"a_y is {1e3 * abs(late):.0f} ms {when} against the yaw rate"
+    side = "behind" if place < 0.0 else "ahead of"
+    arm = f"measured {abs(place):.2g} m {side} the center of gravity"
+    if reach.a_y_instead:
+        text = f"{delay}, or {arm}: this drive cannot tell; measure the place, or log v_y"
+        listed.append(("a_y_place", text))
+    elif reach.a_y_place:
+        listed.append(("a_y_place", f"a_y is {arm}: the estimate allows for it"))
+    if reach.a_y_late > 0.0 and not reach.a_y_instead:
         listed.append(
             (
                 "a_y_late",
-                f"a_y is {1e3 * reach.a_y_late:.0f} ms late against the yaw rate, as behind a "
-                "filter: it is read so much earlier; log it without the filter",
+                f"{delay}, as behind a filter: it is read so much earlier; log it without the "
+                "filter",
             )
         )
     if reach.a_y_late < 0.0:
@@ -199,8 +210,7 @@ def to_dict(model: Any) -> dict[str, Any]:
         "unexplained": reach.unexplained.tolist(),
         **({} if error is None else {"force_missed": error.tolist()}),
         "segments": [one._asdict() for one in reach.segments],
-        **({"parted_rad": reach.parted} if reach.parted else {}),
-        **({"a_y_late_s": reach.a_y_late} if reach.a_y_late else {}),
+        **{key: value for key, value in zip(_LAST, reach[-len(_LAST) :], strict=True) if value},
         "cornering_stiffness_N_rad": model.stiffness.tolist(),
         "relaxation_length_m": model.relaxation_length.tolist(),
         "known_slip_rad": model.known_slip.tolist(),
@@ -219,9 +229,7 @@ def read(table: Table) -> dict[str, Any]:
             table.refuse(key, f"must hold numbers below {_LARGEST:g}")
         return value
 
-    parted, late = (
-        table.number(key) if key in table else 0.0 for key in ("parted_rad", "a_y_late_s")
-    )
+    last = (table.number(key) if key in table else 0.0 for key in _LAST)
     segments = table.tables("segments") if "segments" in table else []
     held = [k for k, name in enumerate(NAMES) if name in parameters or name not in _ADDED]
     p, covariance = np.zeros(len(NAMES)), np.zeros((len(NAMES), len(NAMES)))
@@ -232,16 +240,13 @@ def read(table: Table) -> dict[str, Any]:
         "p": p,
         "covariance": covariance,
         "reach": Reach(
-            slip=array("driven_slip_rad"),
-            speeds=array("speeds_m_s"),
-            a_x=array("a_x_m_s2"),
-            alike=array("unexplained") ** 2,
-            pairs=1.0,
-            segments=tuple(
-                Segment(*(one.number(name) for name in Segment._fields)) for one in segments
-            ),
-            parted=parted,
-            a_y_late=late,
+            array("driven_slip_rad"),
+            array("speeds_m_s"),
+            array("a_x_m_s2"),
+            array("unexplained") ** 2,
+            1.0,
+            tuple(Segment(*(one.number(name) for name in Segment._fields)) for one in segments),
+            *last,
         ),
         "model_error": array("force_missed") if "force_missed" in table else None,
     }

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from codegen.arrays import Array
 from codegen.escape import visible
-from identifier.tire_model import AXLES, Axle, TireModel
+from identifier.tire_model import AXLES, RELAXATION, Axle, TireModel
 
 _WIDEST = 0.6  # rad, slip up to which curves are compared
 _BEYOND = 0.02  # weight of slip past what is known
@@ -24,6 +24,7 @@ _LOW = (0.0, -4.0, 1.0001, -5.0)  # of ln K, ln μ, C, E, at least
 _HIGH = (6.0, 2.0, 2.4, 0.95)  # of ln K, ln μ, C, E, at most
 _WORST = 5.0  # power of the errors whose squares are summed at last: near to the largest one
 _LARGEST_MISFIT = 0.1  # of the peak: past that a curve is no Magic Formula
+_RADIUS = 0.12  # of a wheel, in wheelbases: of a sedan, and within a quarter of a car of 1:10
 _PROPORTIONAL = 100.0  # PKY2: stiffness goes with load, within 0.1 % up to twice the nominal one
 
 
@@ -93,12 +94,19 @@ def tire_properties(model: TireModel, axle: Axle) -> str:
     """Return the tire property file of one tire of an axle: lateral force in pure slip.
 
     D_y = PDY1 F_z (4.E22) and K_y = PKY1 F_z0 sin(2 atan(F_z/(PKY2 F_z0))) (4.E25), PKY2 being
-    large, go with the load, as they do in the model.
+    large, go with the load, as they do in the model. The relaxation length of PAC2002,
+    σ = PTY1 sin(2 atan(F_z/(PTY2 F_z0))) R_0, is the model's at F_z0 and, PTY2 being 1, hardly
+    another around it.
     """
     found, i = magic_curve(model, axle), AXLES.index(axle)
     K, mu, C, E = (float(one) for one in found.numbers)
     load, u = 0.5 * model.vehicle.axle_loads[i], 1.0 / _PROPORTIONAL
-    slips = found.reach * np.array([0.25, 0.5, 0.75, 1.0])
+    known = found.reach if model.known_slip is None else float(model.known_slip[i])
+    valid = known if known > 0.0 else found.reach
+    slips = valid * np.array([0.25, 0.5, 0.75, 1.0])
+    radius = _RADIUS * model.vehicle.wheelbase
+    lags = (e.value for e in model.estimates() if (e.title, e.axle) == (RELAXATION, axle))
+    lag = next(lags, 0.0)
     force, band = model.force(slips), "the model cannot tell how sure it is"
     if model.band is not None:
         half = model.band.half(slips)
@@ -110,11 +118,13 @@ def tire_properties(model: TireModel, axle: Axle) -> str:
 $ One {axle} tire of {visible(model.vehicle.name)}, by tireid from a driving log.
 $ Is: lateral force in pure slip, of an axle over its slip angle, shared by two tires. In it are the
 $ friction of the road that was driven, load transfer between left and right, toe and compliance.
-$ Is not: a measured tire. Longitudinal and combined slip, camber, aligning moment and relaxation
-$ are not in it; the longitudinal coefficients repeat the lateral ones, since readers ask for them.
+$ Is not: a measured tire. Longitudinal and combined slip, camber and aligning moment are not in it;
+$ the longitudinal coefficients repeat the lateral ones, since readers ask for them.
+$ Relaxation length: {lag:.3g} m. It is PTY1 times UNLOADED_RADIUS, which is a guess.
 $ Load: force is proportional to it, as in the model.
-$ Identified up to a slip of {math.degrees(found.reach):.3g} deg, beyond that extrapolated; differs
-$ from the model by at most {100.0 * found.misfit:.2g} % of its largest force there.
+$ Identified up to a slip of {math.degrees(known):.3g} deg, beyond that extrapolated; up to
+$ {math.degrees(found.reach):.3g} deg it differs from the model by at most \
+{100.0 * found.misfit:.2g} % of the largest force there.
 $ Band of 90 % at the nominal load: {band}.
 [MDI_HEADER]
 FILE_TYPE = 'tir'
@@ -127,13 +137,15 @@ MASS = 'kg'
 TIME = 'second'
 [MODEL]
 PROPERTY_FILE_FORMAT = 'PAC2002'
-USE_MODE = 2
+USE_MODE = {12 if lag > 0.0 else 2}
 TYRESIDE = 'LEFT'
+[DIMENSION]
+UNLOADED_RADIUS = {radius:.10g}
 [VERTICAL]
 FNOMIN = {load:.10g}
 [SLIP_ANGLE_RANGE]
-ALPMIN = {-found.reach:.10g}
-ALPMAX = {found.reach:.10g}
+ALPMIN = {-valid:.10g}
+ALPMAX = {valid:.10g}
 [VERTICAL_FORCE_RANGE]
 FZMIN = {0.2 * load:.10g}
 FZMAX = {2.0 * load:.10g}
@@ -147,4 +159,6 @@ PDY1 = {mu:.10g}
 PEY1 = {E:.10g}
 PKY1 = {-K * (1.0 + u**2) / (2.0 * u):.10g}
 PKY2 = {_PROPORTIONAL:.10g}
+PTY1 = {lag / radius:.10g}
+PTY2 = 1
 """

@@ -3,7 +3,8 @@
 Steady turning: F_i = m a_y l_o/L, l_o the other arm, and δ = L a_y/v_x² + α_f - α_r, so that
 K = ∂(δ - L a_y/v_x²)/∂a_y = (m/L) (l_r/C_f - l_f/C_r), C_i the slope of the force curve at that
 force (Milliken, Race Car Vehicle Dynamics, 1995, ch. 5; Pacejka, Tire and Vehicle Dynamics, 2012,
-1.3). Angles of the wheels are small; the wheels roll freely. Speed enters by downforce alone.
+1.3). Angles of the wheels are small; the wheels roll freely. Speed enters by downforce alone:
+without it one speed stands for all.
 """
 
 from typing import NamedTuple
@@ -15,7 +16,7 @@ from identifier.tire_model import TireModel, brisk_speed, require_band
 from models.vehicle import GRAVITY
 
 _STEP = 1.0  # m/s², of the lateral acceleration
-_SPEEDS = 3  # at which gradients are given
+_SPEEDS = 3  # at which gradients are given of a car with downforce
 _DRAWN = 100  # models
 _LOWER_SHARE = 0.16  # share of the models that lie below the lower end, a deviation off
 _UPPER_SHARE = 0.84  # share of them that lie below the upper end, a deviation off
@@ -55,7 +56,8 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
     if known is None or not known.min() > 0.0:
         raise ValueError("the force of an axle is not known at any slip: drive harder")
     slow, fast = (brisk_speed(car, model.min_speed),) * 2 if speeds is None else speeds
-    v_x = np.unique(np.linspace(slow, fast, _SPEEDS))
+    v_x = np.linspace(slow, fast, _SPEEDS) if car.has_downforce else np.array([fast])
+    v_x = np.unique([float(f"{one:.4g}") for one in v_x])  # as it is printed
     force = model.force(SLIPS)
     reached = np.array([np.interp(known[i], SLIPS, force[:, i]) for i in range(2)])
     most = reached * car.load_ratio(v_x) / np.array(car.axle_loads) * GRAVITY  # (n, 2)

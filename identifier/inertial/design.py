@@ -130,6 +130,7 @@ class InertialIdentifier(Method):
             roll_frequency=tires.sway.frequency * vehicle.froude_time,
             doubt=(float(model.band.error_floor[1]), float(model.band.error_share[1])),
             a_y_late=max(model.reach.a_y_late, 0.0),
+            sensor_position=(model.reach.a_y_place, 0.0),
             along=Along(
                 load_f=-model["load_transfer"] * vehicle.wheelbase / vehicle.l_r,
                 load_r=model["load_transfer"] * vehicle.wheelbase / vehicle.l_f,

@@ -286,14 +286,15 @@ def _unsure(evaluated: _Evaluated) -> Iterator[Objection]:
 
 def _no_tire(evaluated: _Evaluated) -> Iterator[Objection]:
     loads = np.array(evaluated.model.vehicle.axle_loads)
-    stiffness = evaluated.model.force(np.array([_SECANT]))[0] / _SECANT
+    secant = evaluated.model.force(np.array([_SECANT]))[0] / _SECANT / loads
     least, most = RULES.stiffness
-    for axle, each, C in zip(AXLES, stiffness / loads, stiffness, strict=True):
+    for axle, each in zip(AXLES, secant, strict=True):
         if not least <= each <= most:
             soft = "play of the steering, " if axle == "front" and each < least else ""
             text = (
-                f"cornering stiffness {C / 1e3:.3g} kN/rad is {each:.2g} static loads per rad, "
-                f"tires have {least:g} to {most:g}: check {soft}signs, units and the vehicle file"
+                f"the force at {np.degrees(_SECANT):.2g} deg of slip is {each:.2g} static loads "
+                f"per rad, tires have {least:g} to {most:g}: check {soft}signs, units and the "
+                "vehicle file"
             )
             yield Objection("no_tire", axle, text, True)
 

@@ -213,7 +213,8 @@ def along_axes(
             means = {letter: float(np.nanmean(grid[name])) for letter, name in one.names.items()}
             up = _up(means) if "y" in means else ("y", 0.0)
             same_box = [other for other in rates if set(other.words) & set(one.words) - {"?"}]
-            gyro = next(iter(same_box + rates), None)
+            likely = same_box or rates
+            gyro = likely[0] if len(likely) == 1 else None  # of several none is known to be its own
             channels = {*one.names.values(), *(gyro.names.values() if gyro else ())}
             if up[0] == "?":
                 oblique |= channels

@@ -429,14 +429,21 @@ def _bounded(path: Path) -> Iterator[None]:
         for one in sorted(path.glob("*.zstd")):
             _require_small(one, zstd)
 
+    so_far = np.zeros(2)  # unpacked and packed
+
+    def require_allowed(size: int, packed: int) -> None:
+        few(path, size / 1e6, "block", "megabytes of a chunk")
+        so_far[:] += size, packed
+        dense(path, so_far[0], so_far[1], "chunks")
+
     def unpacked(decompressor: Any, data: bytes, size: int) -> bytes:
-        _require_allowed(path, size, len(data))
+        require_allowed(size, len(data))
         return bytes(decompressor().decompress(data, max_length=size + 1))
 
     def of_message(data: bytes) -> bytes:
         most = most_unpacked(len(data))
         message = bytes(zstd.ZstdDecompressor().decompress(data, max_length=most + 1))
-        _require_allowed(path, len(message), len(data))
+        require_allowed(len(message), len(data))
         return message
 
     table = mcap.DECOMPRESSORS
@@ -469,11 +476,6 @@ def _require_shallow(path: Path) -> None:
     few(path, max(deepest, indent), "depth", "levels of metadata")
     if _DEEP.search(text):
         raise RecordingError(f"{path}: must not hold lists in lists")
-
-
-def _require_allowed(path: Path, size: int, packed: int) -> None:
-    few(path, size / 1e6, "block", "megabytes of a chunk")
-    dense(path, size, packed, "chunks")
 
 
 def _require_small(path: Path, zstd: Any) -> None:

@@ -25,6 +25,13 @@ from models.logs.stamps import not_rising, since
 
 _GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
 _SLOWER = 0.4  # share of empty cells from which a channel is taken to be slower than its rows
+_FAR = 5.0  # largest steps between samples, beyond which an extreme is no value of the signal
+_ROUND = 5e-5  # by which two digits, or a power of two, are missed
+_NONE = 1e30  # that no sensor gives
+# Words of a bus whose largest number means "no value", or nines; a scale of two digits or a power
+# of two makes them a signal, which may have been in km/h, degrees or g.
+_WORDS = np.array([2.0**k - less for k in range(7, 33) for less in (0, 1, 2)] + [999, 9999, 99999])
+_UNITS = np.array([1.0, 3.6, 180.0 / np.pi, 1.0 / 9.81])
 _ON_STEP = 0.01  # share of a step within which an instant is that of a sample
 
 
@@ -37,7 +44,7 @@ class Segment(NamedTuple):
 
 class Raw(NamedTuple):
     """A signal in SI on the clock of its channel: t (n,), values (n,), and where they stand.
-    holes : how many cells without a value were cut out.
+    holes : how many cells without a value were cut out.   codes : numbers that meant so.
     """
 
     t: Array
@@ -45,6 +52,7 @@ class Raw(NamedTuple):
     place: str
     rows: NDArray[np.int64]
     holes: int = 0
+    codes: str = ""
 
 
 def holes(channel: Channel) -> NDArray[np.intp]:
@@ -65,6 +73,36 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
         return channel
     t, values, rows = channel.t[kept], channel.values[kept], channel.rows[kept]
     return replace(channel, t=t, values=values, rows=rows)
+
+
+@np.errstate(all="ignore")
+def without_codes(channel: Channel) -> tuple[Channel, str]:
+    """Return a channel without samples that mean "no value", and the numbers that do, in words.
+
+    Such a number is a code, and farther from all others than these ever step; of zeros the doctor
+    says more.
+    """
+    values = channel.values
+    extremes = [one.reduce(values, initial=0.0) for one in (np.fmin, np.fmax)]
+    if not _are_codes(np.array(extremes)).any():
+        return channel, ""
+    ends = np.unique(values[~np.isnan(values)])
+    ends = np.concatenate([ends[:2], ends[2:][-2:]])
+    ends = ends[_are_codes(ends)]
+    rest = np.where(np.isin(values, ends), np.nan, values)
+    step = np.fmax.reduce(np.abs(np.diff(rest)), initial=0.0)
+    codes = [one for one in ends if np.fmin.reduce(np.abs(rest - one)) > _FAR * step > 0.0]
+    kept = ~np.isin(values, codes)
+    t, rows, said = channel.t[kept], channel.rows[kept], ", ".join(f"{one:.9g}" for one in codes)
+    return replace(channel, t=t, values=values[kept], rows=rows) if codes else channel, said
+
+
+def _are_codes(numbers: Array) -> NDArray[np.bool_]:
+    """Return which numbers are codes, (n,)."""
+    scale = np.abs(numbers)[:, None, None] / _WORDS[:, None] * _UNITS
+    digits = np.stack([scale * 10.0 ** (1.0 - np.floor(np.log10(scale))), np.log2(scale)])
+    exact = (np.abs(digits - np.rint(digits)) < _ROUND).any(axis=(0, 2, 3))
+    return np.asarray(exact | (np.abs(numbers) > _NONE))
 
 
 def gaps(t: Array, longest: float) -> NDArray[np.intp]:

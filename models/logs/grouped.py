@@ -23,6 +23,7 @@ from models.logs.log import (
     chosen,
     few,
     one_run,
+    require_small,
     some,
 )
 from models.logs.stamps import Stamps, seconds
@@ -130,6 +131,7 @@ class GroupedLog(Generic[_P]):
         if self.clock_name:
             return self._timed(names)
         requested = chosen(self.path, names, {one[0].name: one for one in self.channels})
+        require_small(self.path, sum(one.samples for one, _ in requested))
         found: dict[str, tuple[Array, Array, Any]] = {}
         with one_line(self.path, self.what):
             for clock, t, values in self.samples(requested):

@@ -5,26 +5,35 @@ references. Links to other files and arrays that lie in them are not followed.
 """
 
 import math
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from codegen.arrays import Array
+from models.apart import apart, each
 from models.logs.foreign import need
 from models.logs.grouped import require_room
-from models.logs.log import few
+from models.logs.log import RecordingError, few
 from models.logs.tree import Leaf, Tree, Unread
 from models.schema import swells
 
 _LONGEST_TEXT = 1_000_000  # bytes of all texts of a dataset
 _MOST_TEXTS = 10_000  # of a dataset
 
+_AT_ONCE = 1 << 17  # numbers that are handed over at a time
+
 _INTERNAL = ("#refs#", "#subsystem#")  # groups that MATLAB keeps for itself
 
 
 def read_tree(path: Path) -> dict[str, Tree]:
     """Return the variables of a file; numbers are read when they are asked for."""
+    return apart(RecordingError, path, 0.0, _read_tree, path)
+
+
+def _read_tree(path: Path) -> dict[str, Tree]:
     h5py = need(path, "h5py", "MATLAB 7.3 or HDF5", "mat")
     with h5py.File(path, "r") as file:
         reader = _Reader(path, h5py, file)
@@ -36,7 +45,7 @@ def read_tree(path: Path) -> dict[str, Tree]:
 class _Reader:
     def __init__(self, path: Path, h5py: Any, file: Any) -> None:
         self.path, self.h5py, self.file = path, h5py, file
-        self.count = 0
+        self.count, self.size, self.stored = 0, 0, 0  # of all arrays, in memory and in the file
 
     def members(self, group: Any) -> list[tuple[str, Any]]:
         """Return what a group holds itself, not by links to elsewhere."""
@@ -79,7 +88,7 @@ class _Reader:
         if node.external or node.is_virtual:
             return Unread("in another file")
         if "MATLAB_empty" in node.attrs or node.shape is None:
-            return Leaf(shape=(0, 0), load=lambda: np.zeros((0, 0)))
+            return Leaf(shape=(0, 0), load=partial(np.zeros, (0, 0)))
         if self.h5py.check_ref_dtype(node.dtype) is self.h5py.Reference:
             few(self.path, node.size, "values", "cells")
             references = np.asarray(node[()]).reshape(-1)
@@ -94,12 +103,16 @@ class _Reader:
         name, path, turned = node.name, self.path, bool(kind)
         if name is None:
             return Unread("without a name")
-        if swells(8 * max(node.size, _chunk(node)), node.id.get_storage_size()):
-            return Unread(f"{node.size} numbers in {node.id.get_storage_size()} bytes")
+        stored = node.id.get_storage_size()
+        size = self.size + 8 * max(node.size, _chunk(node))
+        if swells(size, self.stored + stored):
+            return Unread(f"{node.size} numbers in {stored} bytes")
+        self.size, self.stored = size, self.stored + stored
         shape = (*node.shape, 1, 1)[:2] if node.ndim < 2 else node.shape
         rows, columns = shape[::-1] if turned else shape
         return Leaf(
-            shape=(int(rows), int(columns)), load=lambda: _load(path, name, (rows, columns), turned)
+            shape=(int(rows), int(columns)),
+            load=partial(_load, path, name, (int(rows), int(columns)), turned),
         )
 
     def text(self, node: Any, is_numbers: bool) -> Tree:
@@ -125,11 +138,26 @@ class _Reader:
 
 def _load(path: Path, name: str, shape: tuple[int, int], turned: bool) -> Array:
     """Read a dataset, (rows, columns)."""
-    h5py = need(path, "h5py", "MATLAB 7.3 or HDF5", "mat")
     require_room(path, max(shape), 8 * min(shape))  # an array may be larger than its file
-    with h5py.File(path, "r") as file:
-        values = np.asarray(file[name][()], dtype=np.float64)
-    return values.T.reshape(shape) if turned else values.reshape(shape)
+    values, at = np.empty(shape[::-1] if turned else shape), 0
+    along = values if values.shape[0] >= values.shape[1] else values.T
+    for piece in each(RecordingError, path, values.nbytes, _pieces, path, name):
+        end = at + piece.size // max(along.shape[1], 1)
+        part = along[at:end] if along is values else along[at:end].T
+        part[...] = piece.reshape(part.shape)
+        at = end
+    return values.T if turned else values
+
+
+def _pieces(path: Path, name: str) -> Iterator[Any]:
+    """Yield the numbers of a dataset along its longest axis, in whole chunks."""
+    with need(path, "h5py", "MATLAB 7.3 or HDF5", "mat").File(path, "r") as file:
+        node = file[name]
+        axis = int(np.argmax(node.shape)) if node.shape else 0
+        size, chunk = (*node.shape, 1)[axis], (node.chunks or (1, 1))[axis]
+        step = max(1, _AT_ONCE * size // max(node.size, 1) // chunk) * chunk
+        for k in range(0, size, step):
+            yield node[(slice(None),) * axis + (slice(k, k + step),)] if node.shape else node[()]
 
 
 def _chunk(node: Any) -> int:

@@ -33,6 +33,15 @@ def few(path: object, count: float, limit: str, what: str) -> None:
     require_few(RecordingError, str(path), count, limit, what)
 
 
+def require_small(path: Path, numbers: float) -> None:
+    """Refuse numbers that in sum swell as those of no log, as arrays that were never written.
+    numbers : how many are read, of all channels.
+    """
+    size = sum(one.stat().st_size for one in (path, *path.glob("*")) if one.is_file())
+    if size:  # it is no data frame
+        dense(path, 8.0 * numbers, size, "what is read of it")
+
+
 def dense(path: object, size: float, packed: float, what: str) -> None:
     """Refuse data of a log that swell as none does, as `require_dense`."""
     require_dense(RecordingError, str(path), size, packed, what)
@@ -48,13 +57,15 @@ class Heading(NamedTuple):
 class Clock(NamedTuple):
     """The column that is the time.
     column: from 0; name: as in the file; unit: of `units.PER_SECOND`, "hhmmss" or "instant"; words:
-    for people.
+    for people, what is unusual behind a semicolon; summed: whether it holds the time since the
+    sample before.
     """
 
     column: int
     name: str
     unit: str
     words: str
+    summed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

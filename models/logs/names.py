@@ -21,6 +21,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.logs.axes import Triad, along_axes, ground, triads
+from models.logs.clock import without_codes
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import BETA, COLUMNS, POSE, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import unit_in_name, without_units
@@ -263,6 +264,12 @@ def _name_confidence(signal: str, name: str) -> float:
     return _VAGUE if rule.vague & set(ends) else 0.0
 
 
+def called(signal: str, headings: Sequence[Heading]) -> list[str]:
+    """Return the channels that name and unit alone let be a signal, the surest first."""
+    found = [one for one in _candidates(signal, headings) if one.confidence > HINT]
+    return [one.channel[0] for one in sorted(found, key=lambda one: -one.confidence)]
+
+
 def _is_hint(signal: str, one: Heading) -> bool:
     """Return whether a word of a name and its unit let a channel be what no rule knows."""
     words = _with_parts(_words_of(_field(one.name)))
@@ -483,7 +490,8 @@ def _seen(log: LogFile, names: list[str], run: str | None) -> dict[str, Channel]
     if not names:
         return {}
     try:
-        return dict(zip(names, log.read(names, chosen), strict=True))
+        read = log.read(names, chosen)
+        return {name: without_codes(one)[0] for name, one in zip(names, read, strict=True)}
     except RecordingError:
         if len(names) == 1:
             return {}
@@ -669,14 +677,17 @@ def _beside_turning(
 def _levered(guess: Guess, best: Mapping[str, Guess], seen: Mapping[str, Channel]) -> Guess:
     """Return a guess of the steering, of the hand wheel where it turns too far for the car's bend.
 
-    v_x δ / r is the wheelbase, and more of a car that understeers.
+    v_x δ / r is the wheelbase, and more of a car that understeers; a_y, where its unit is given,
+    tells v_x r whatever the unit of r.
     """
-    there = {"v_x": best["v_x"], "r": best["r"], "delta_f": guess}
-    v, r, delta = (
+    turning = "a_y" if "a_y" in best and _is_given(best["a_y"]) else "r"
+    there = {"v_x": best["v_x"], turning: best[turning], "delta_f": guess}
+    v, turn, delta = (
         _root_mean_square(seen[one.channel[0]].values) * to_si(one.unit, QUANTITIES[name], name)
         for name, one in there.items()
     )
-    if guess.hand or not v * delta > _LONGEST * r > 0.0:
+    turn = turn if turning == "r" else turn / max(v, 1e-9)
+    if guess.hand or not v * delta > _LONGEST * turn > 0.0:
         return guess
     return replace(_said(guess, "too far for how the car turns"), hand=True)
 

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from codegen.escape import displayed
+from models.apart import apart, each
 from models.logs.arrow import doubles, whole_numbers, words
 from models.logs.foreign import need, one_line
-from models.logs.log import RecordingError, dense, few
+from models.logs.log import RecordingError, dense, few, require_small
 from models.logs.spelling import unit_in_name
 from models.logs.stamps import MISSING, nanoseconds
 from models.logs.table import Cells, Columns, Gathered, Kind, TableLog
@@ -24,21 +25,29 @@ _WHAT = "a Parquet file"  # that a file is read as
 
 
 def open_parquet(path: Path) -> TableLog:
-    parquet = need(path, "pyarrow.parquet", "Parquet", "parquet")
+    need(path, "pyarrow", "Parquet", "parquet")
     require_file(path, RecordingError, limit="megabytes")
-    with one_line(path, _WHAT), parquet.ParquetFile(path) as file:
+    with one_line(path, _WHAT):
+        return TableLog(table=apart(RecordingError, path, 0.0, _table, path))
+
+
+def _table(path: Path) -> "_ParquetTable":
+    parquet = need(path, "pyarrow.parquet", "Parquet", "parquet")
+    with parquet.ParquetFile(path) as file:
         about = file.metadata
         few(path, about.num_columns, "columns", "columns")
         few(path, about.num_rows, "samples", "rows")
         groups = [about.row_group(k) for k in range(about.num_row_groups)]
         size = sum(group.total_byte_size for group in groups)
         few(path, size / 1e6, "megabytes", "megabytes")
+        total = np.zeros(2)  # unpacked and packed
         for one in (group.column(k) for group in groups for k in range(group.num_columns)):
-            unpacked, packed = one.total_uncompressed_size, one.total_compressed_size
+            sizes = one.total_uncompressed_size, one.total_compressed_size
             what = f"the cells of {displayed(one.path_in_schema)}"
-            dense(path, unpacked, packed, what)
-        table = _ParquetTable(path=path, schema=file.schema_arrow, rows=about.num_rows)
-        return TableLog(table=table)
+            dense(path, sizes[0], sizes[1], what)
+            total += sizes
+        dense(path, total[0], total[1], "the cells of all columns")
+        return _ParquetTable(path=path, schema=file.schema_arrow, rows=about.num_rows)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,14 +68,15 @@ class _ParquetTable:
         return Columns(tuple(self.schema.names), tuple(units), tuple(numeric))
 
     def first_rows(self, column: int) -> list[str]:
-        with one_line(self.path, _WHAT):
-            if column not in self._head:
-                return ["?"] * min(self.rows, _HEAD)
-            return _as_text(self._head[column], self.schema.field(column).type)
+        return self._head.get(column, ["?"] * min(self.rows, _HEAD))
 
     @cached_property
-    def _head(self) -> dict[int, Any]:
-        """The first rows of the columns that may be read, which all are looked at."""
+    def _head(self) -> dict[int, list[str]]:
+        with one_line(self.path, _WHAT):
+            return apart(RecordingError, self.path, 0.0, _ParquetTable._read_head, self)
+
+    def _read_head(self) -> dict[int, list[str]]:
+        """Return the first rows of the columns that may be read, which all are looked at."""
         from pyarrow.types import is_timestamp
 
         columns = [  # others, as lists and bytes, are not read at all
@@ -75,7 +85,10 @@ class _ParquetTable:
             if _is_numeric(one.type) or _is_text(one.type) or is_timestamp(one.type)
         ]
         first = next(self._batches(columns, _HEAD), [])
-        return dict(zip(columns, first, strict=False))
+        return {
+            k: _as_text(cells, self.schema.field(k).type)
+            for k, cells in zip(columns, first, strict=False)
+        }
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns.
@@ -92,16 +105,23 @@ class _ParquetTable:
                 raise RecordingError(f"{self.path}: {name} must be numeric, its type is {found}")
         if self.rows == 0:
             raise RecordingError(f"{self.path}: has columns but no row of data")
-        order = list(wanted)
+        require_small(self.path, self.rows * len(wanted))
+        size = 8.0 * self.rows * len(wanted)
         with one_line(self.path, _WHAT):
-            for batch in self._batches(order, _BATCH):
-                rows = np.arange(1, len(batch[0]) + 1) + len(gathered)
-                columns = {
-                    column: self._column(column, wanted[column], cells, rows)
-                    for column, cells in zip(order, batch, strict=True)
-                }
-                gathered.extend(rows, columns)
+            for block in each(RecordingError, self.path, size, _ParquetTable._read, self, wanted):
+                gathered.extend(*block)
         return gathered.finished()
+
+    def _read(self, wanted: Mapping[int, Kind]) -> Iterator[tuple[Any, dict[int, Any]]]:
+        seen = 0
+        for batch in self._batches(list(wanted), _BATCH):
+            rows = np.arange(1, len(batch[0]) + 1) + seen
+            seen += rows.size
+            columns = {
+                column: self._column(column, kind, cells, rows)
+                for (column, kind), cells in zip(wanted.items(), batch, strict=True)
+            }
+            yield rows, columns
 
     def _batches(self, columns: Sequence[int], size: int) -> Iterator[list[Any]]:
         """Yield the cells of columns, some rows at a time; names may repeat, places do not."""

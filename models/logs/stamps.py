@@ -27,6 +27,7 @@ from models.logs.spelling import unit_in_name
 from models.logs.units import PER_SECOND, TABLES, time_unit
 
 _FASTEST = 1e-5  # [s] between samples of a car's log, at least
+_IMPLAUSIBLE = 5e-5  # [s] between samples, below which the header's unit is false: 20 kHz
 _SLOWEST = 0.11  # [s] between samples of a car's log, at most
 _COARSEST = 1.0  # [s] between stamps without a unit: more than that are no seconds
 _WORTH = 0.05  # share of a step by which rounding must shift stamps to be taken out
@@ -41,9 +42,20 @@ _REPEATED = 0.2  # share of stamps of a column that repeat, of which another may
 _OTHER_RATE = 0.2  # share of a step by which that of another clock differs
 _SAME_DRIVE = 60.0  # [s] between the beginnings of two clocks of one drive, at most
 
+_ALIKE = 0.1  # of a step, by which those of two columns of one time differ
+_INTERVAL = 0.5  # of the median, by which intervals between samples differ from it
+_LATE = 2.5  # usual steps that may lie about the end of a counter
+_FULL = 40.0  # usual steps, in four rounds, until a counter is full: fewer are samples astray
+_RUN = 1.0  # [s]: a counter that begins again sooner is no run of its own
+
 MISSING = -(2**63)  # an instant that is not there, in ns
 _DAY = 86400.0
 NAMES: tuple[str, ...] = tuple(TABLES["clock"]["names"].split())
+_INTERVALS = tuple(TABLES["clock"]["intervals"].split())
+_CALLED = (*NAMES, *_INTERVALS)
+# [s] after which counters begin again: of ticks in words of bits; of decimals and of the clock.
+_OF_BITS = [2.0**bits * tick for bits in (8, 16, 24, 32) for tick in (1e-3, 1e-4, 1e-6, 1e-9)]
+_ROUND = [*(10.0**k for k in range(-2, 5)), 60.0, 3600.0]
 # Between 1980 and 2100 in each unit: a number so large counts from 1970.
 _EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
 _MICROSECONDS = 1e6
@@ -108,8 +120,8 @@ def find_clock(names: Sequence[str], units: Sequence[str], head: _Head) -> Clock
     Of several that are called so it is the first whose stamps hardly ever repeat, as one that is
     rounded to seconds does. One that counts samples, or the way, is none.
     """
-    named = [k for k, name in enumerate(names) if _plain(name) in NAMES]
-    named.sort(key=lambda k: NAMES.index(_plain(names[k])))
+    named = [k for k, name in enumerate(names) if _plain(name) in _CALLED]
+    named.sort(key=lambda k: _CALLED.index(_plain(names[k])))
     for fits in (_moves, _rises):
         for k in named:
             if (clock := _clock(k, names[k], units[k], head(k), fits)) is not None:
@@ -121,6 +133,20 @@ def find_clock(names: Sequence[str], units: Sequence[str], head: _Head) -> Clock
         if not even and (clock := _clock(k, names[k], units[k], head(k), _is_any)) is not None:
             return clock
     return None
+
+
+@np.errstate(all="ignore")
+def alike_clocks(
+    names: Sequence[str], units: Sequence[str], head: _Head, clock: Clock
+) -> list[Clock]:
+    """Return other columns that rise by the steps of a clock, as that of a drive by a lap's."""
+    others = _even(names, units, head, [clock.column])
+    own, *steps = (np.diff(_times(one, head(one.column))) for one in (clock, *others))
+    return [
+        one
+        for one, step in zip(others, steps, strict=True)
+        if abs(np.median(step) - np.median(own)) < _ALIKE * np.median(own)
+    ]
 
 
 def no_clock(names: Sequence[str], units: Sequence[str], head: _Head) -> str:
@@ -208,12 +234,9 @@ def _is_beside(
     clock: Clock, cells: Sequence[str], first: Clock, first_cells: Sequence[str]
 ) -> bool:
     """Return whether a time is that of other samples than the first one's, of the same drive."""
-    times = []
-    for advice, column in ((clock, cells), (first, first_cells)):
-        numbers = [value for cell in column if (value := _number(cell)) is not None]
-        if advice.unit not in PER_SECOND or len(numbers) < _FEWEST:
-            return False
-        times.append(np.array(numbers) / PER_SECOND[advice.unit])
+    times = [_times(clock, cells), _times(first, first_cells)]
+    if min(t.size for t in times) < _FEWEST:
+        return False
     if (
         any((np.diff(t) <= 0.0).any() for t in times)
         or abs(times[0][0] - times[1][0]) > _SAME_DRIVE
@@ -223,6 +246,13 @@ def _is_beside(
         return not np.array_equal(times[0], times[1])
     steps = [float(np.median(np.diff(t))) for t in times]
     return abs(steps[0] / steps[1] - 1.0) > _OTHER_RATE
+
+
+def _times(clock: Clock, cells: Sequence[str]) -> Array:
+    """Return the numbers in some cells of a clock [s]; none of a clock of the calendar."""
+    numbers = [value for cell in cells if (value := _number(cell)) is not None]
+    there = numbers and clock.unit in PER_SECOND
+    return in_seconds(clock, np.array(numbers)) if there else np.zeros(0)
 
 
 def given_clock(column: int, name: str, unit: str, head: Sequence[str]) -> Clock | None:
@@ -258,16 +288,41 @@ def _clock(
         if values.count(None) > few:
             return None
     t = np.array([value for value in values if value is not None], dtype=np.float64)
+    advice, plain = time_unit(unit), _plain(name)
+    summed = not kind and (fits is _is_any or plain in _CALLED)
+    summed = summed and _are_intervals(t, advice, alike=plain in _INTERVALS)
+    t = np.cumsum(t) if summed else t
     if not fits(np.diff(t)):
         return None
     if kind:
         form = "date or time of day" if kind == "instant" else kind
         return Clock(column, name, kind, f"{name!r} as {form}, {words}")
-    advice = time_unit(unit)
     found, epoch = _unit(t, advice)
+    if fits is not _is_any and 0.0 < _step(t, found) < _IMPLAUSIBLE:
+        found, epoch = _unit(t, "")
     since = " since 1970" if epoch else ""
     guessed = "" if advice else ", a unit that fits its steps (likely)"
-    return Clock(column, name, found, f"{name!r} in {found}{since}, {words}{guessed}")
+    if advice and found != advice:
+        guessed = f"; as its steps are too short for {unit.strip()} (likely)"
+    guessed += "; it holds intervals, which are summed" * summed
+    return Clock(column, name, found, f"{name!r} in {found}{since}, {words}{guessed}", summed)
+
+
+def _are_intervals(t: Array, unit: str, *, alike: bool) -> bool:
+    """Return whether a column holds the time since the sample before, which does not rise.
+    unit : "" where none is told.   alike : whether all may be equal, which a clock that stands is.
+    """
+    steps, usual = np.diff(t), float(np.median(t)) if t.size else 0.0
+    rises, falls = np.count_nonzero(steps > 0.0), np.count_nonzero(steps < 0.0)
+    near = np.abs(t - usual) <= _INTERVAL * usual
+    possible = 0.0 < usual <= _SLOWEST * PER_SECOND[unit or "ns"]
+    return bool(
+        possible
+        and near.mean() > 0.9
+        and t.min() >= 0.0
+        and (rises or alike)
+        and 0.5 * rises <= falls
+    )
 
 
 def _is_any(_: Array) -> bool:
@@ -310,8 +365,9 @@ def _unit(t: Array, advice: str) -> tuple[str, bool]:
 
 
 def _step(t: Array, unit: str) -> float:
-    """Return the mean step of times in a unit [s]; stamps may repeat."""
-    return float(t[-1] - t[0]) / max(t.size - 1, 1) / PER_SECOND[unit] if t.size else 0.0
+    """Return the mean step of times in a unit [s]; stamps may repeat, a counter begin again."""
+    steps = np.diff(t)
+    return float(np.mean(steps[steps >= 0.0])) / PER_SECOND[unit] if (steps >= 0.0).any() else 0.0
 
 
 def _number(cell: str) -> float | None:
@@ -424,23 +480,42 @@ def seconds(
         return Stamps(np.empty(0), ())
     require_times(label, clock, values, rows, place)
     t = in_seconds(clock, values)
-    fall = _first_step(t, lambda step: step < 0.0)
-    if fall is not None and clock.unit in ("instant", "hhmmss"):
-        steps = np.diff(t)
-        days = np.concatenate([[0.0], np.cumsum((steps < -0.9 * _DAY) & (steps > -1.1 * _DAY))])
-        t = np.asarray(np.round(t + _DAY * days, 6))
+    fall, said = _first_step(t, lambda step: step < 0.0), list[str]()
+    if fall is not None:
+        t, said = _gone_on(t, calendar=clock.unit in ("instant", "hhmmss"))
         fall = _first_step(t, lambda step: step < 0.0)
+    said = [f"{clock.name} {one}" for one in said]
     repeat = None if fall is not None else _first_step(t, lambda step: step == 0.0)
     even = None if fall is not None else _even_clock(t)
     if even is not None:
-        return even._replace(notes=(f"{clock.name} {even.notes[0]}",))
+        return even._replace(notes=(*said, f"{clock.name} {even.notes[0]}"))
     if fall is None and repeat is None:
-        return Stamps(t, ())
+        return Stamps(t, tuple(said))
     mended = _in_order(t, restarts=restarts) if mend else None
     if mended is None:
-        said = not_rising(t, rows, place, restarts=restarts)
-        raise RecordingError(f"{label}: {clock.name} {said}")
-    return mended._replace(notes=tuple(f"{clock.name}: {note}" for note in mended.notes))
+        wrong = not_rising(t, rows, place, restarts=restarts)
+        raise RecordingError(f"{label}: {clock.name} {wrong}")
+    return mended._replace(notes=(*said, *(f"{clock.name}: {note}" for note in mended.notes)))
+
+
+@np.errstate(all="ignore")
+def _gone_on(t: Array, *, calendar: bool) -> tuple[Array, list[str]]:
+    """Return stamps over midnight, or of a counter that is full, as if they went on; and a note.
+
+    A run begins at zero, too, and may last a round number of seconds.
+    """
+    steps = np.diff(t)
+    usual = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else math.nan
+    for period in [_DAY] if calendar else [*_OF_BITS, *_ROUND]:
+        slack = 0.1 * _DAY if calendar else _LATE * usual
+        falls = (steps < 0.0) & (np.abs(steps + period) < slack)
+        times = int(np.count_nonzero(falls))
+        is_run = period in _ROUND and t[0] < _LATE * usual and (period > _RUN or times < 2)
+        if calendar or (min(times, 4) * period > _FULL * usual and not is_run):
+            t = np.round(t + period * np.concatenate([[0.0], np.cumsum(falls)]), 9)
+            said = f"begins again each {period:.9g} s, as a counter that is full: taken as going on"
+            return t, [] if calendar else [f"{said} ({times} times)"]
+    return t, []
 
 
 def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
@@ -496,7 +571,7 @@ def since(t: Array, first: float) -> Array:
 
 def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
     """Return stamps in seconds, (n,); those of the calendar from the first on."""
-    first = values[0]
+    first, values = values[0], np.cumsum(values) if clock.summed else values
     per_second = PER_SECOND.get(clock.unit, 1.0)
     if clock.unit == "instant":
         return filled(values.size, lambda part: (values[part] - first) / 1e9)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
@@ -28,6 +29,7 @@ from models.logs.spelling import unit_in_name, without_unit
 from models.logs.stamps import (
     MISSING,
     Stamps,
+    alike_clocks,
     clocks_of_channels,
     find_clock,
     given_clock,
@@ -249,7 +251,8 @@ class TableLog:
         if self.rate:
             return None
         if not self.clock_name:
-            return find_clock(self.names, self._columns.units, table.first_rows)
+            found = find_clock(self.names, self._columns.units, table.first_rows)
+            return found and self._rising(found)
         name = self.clock_name
         if name not in self._places:  # it may stand with its unit in the file, or the unit be given
             bare = [one for one in self.names if without_unit(one) == without_unit(name)]
@@ -263,6 +266,19 @@ class TableLog:
                 f"{displayed(', '.join(table.first_rows(column)[:3]))}"
             )
         return given
+
+    def _rising(self, first: Clock) -> Clock:
+        """Return a clock, or the first of those with its steps that rises over the whole log."""
+        table, found = self.table, [first]
+        if self._run_column is None:
+            found += alike_clocks(self.names, self._columns.units, table.first_rows, first)
+        for one in found if len(found) > 1 else ():
+            with suppress(RecordingError):  # as it does not rise, or cannot be read
+                cells = table.cells({one.column: kind_of(one)})
+                seconds("", one, cells.columns[one.column], cells.rows, table.place)
+                said = f"; {first.name!r} does not rise throughout" * (one != first)
+                return one._replace(words=one.words + said)
+        return first
 
     @property
     def may_be_long(self) -> bool:

@@ -10,6 +10,7 @@ Assumed away: pitch, steer by the suspension, aligning moments of the tires, spi
 (longitudinal slip follows from the wanted force at once), rolling and air resistance.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -65,6 +66,24 @@ def _mounted(tire: Tire, wheel: _Wheel) -> Tire:
     if isinstance(tire, MagicFormula):
         return tire.mounted("left" if wheel.y > 0.0 else "right")
     return tire
+
+
+def own_lengths(vehicle: Vehicle, tires: Sequence[Tire]) -> tuple[float, ...]:
+    """Return the relaxation lengths that tires have in their files [m], 0 for none.
+    tires : front and rear.
+    """
+    return tuple(
+        float(tire.relaxation_length(0.5 * load)) if isinstance(tire, MagicFormula) else 0.0
+        for tire, load in zip(tires, vehicle.axle_loads, strict=True)
+    )
+
+
+def relaxation_lengths(vehicle: Vehicle, tires: Sequence[Tire]) -> tuple[float, ...]:
+    """Return the relaxation lengths of both axles [m], of the tires or else of the chassis."""
+    c = vehicle.require_chassis()
+    declared = c.relaxation_length_front, c.relaxation_length_rear
+    own = own_lengths(vehicle, tires)
+    return tuple(one if one > 0.0 else other for one, other in zip(own, declared, strict=True))
 
 
 def _relax(slip: Any, delta: Any, velocity: tuple[Any, Any], length: float) -> Any:
@@ -214,7 +233,7 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
     for k, wheel in enumerate(_wheels(vehicle)):
         angle, axle = delta[wheel.axle], wheel.axle
         velocity = wheel.velocity(v_x, sway, r)
-        length = (c.relaxation_length_front, c.relaxation_length_rear)[axle]
+        length = relaxation_lengths(vehicle, tires)[axle]
         slip_dot.append(_relax(slip[k], angle, velocity, length))
         alpha.append(angle - ca.atan2(velocity[1], velocity[0]))
         here = X + wheel.x * ca.cos(psi) - wheel.y * ca.sin(psi)

@@ -18,9 +18,10 @@ from models.logs.clock import (
     on_one_clock,
     require_rising,
     typical_step,
+    without_codes,
     without_empty,
 )
-from models.logs.log import Channel, Heading, LogFile, RecordingError, one_run
+from models.logs.log import Channel, Clock, Heading, LogFile, RecordingError, one_run
 from models.logs.signals import (
     BETA,
     POSE,
@@ -32,7 +33,8 @@ from models.logs.signals import (
     quantity_of,
     signed,
 )
-from models.logs.units import is_given, to_si
+from models.logs.spelling import without_unit
+from models.logs.units import PER_SECOND, is_given, to_si
 from models.recordings.choice import chosen_signals, column_of, has_wheels, missing_signals
 from models.recordings.map import AXES, CUT, LogMap
 from models.recordings.pose import with_pose
@@ -100,6 +102,8 @@ def recording_of(
     ) -> tuple[dict[str, Signal], dict[str, list[Raw]], tuple[str, ...], _Segments]:
         channels = _channels(log, label, chosen, log_map, run)
         named, raws, said = with_pose(label, chosen, channels, "heading" in log_map.signals)
+        for raw in {id(raw.t): raw for listed in raws.values() for raw in listed}.values():
+            _judge_time(label, raw, log.clock)
         return named, raws, said, _segments(label, named, raws, log_map, dt)
 
     try:
@@ -139,7 +143,8 @@ def recording_of(
 def _notes(log: LogFile) -> tuple[str, ...]:
     """Return what a format says of what it took or mended."""
     clock = log.clock
-    said = () if clock is None or clock.unit == "s" else (f"time is {clock.words}",)
+    plain = clock is None or (clock.unit == "s" and ";" not in clock.words)
+    said = () if plain or clock is None else (f"time is {clock.words}",)
     return (*said, *log.notes)
 
 
@@ -156,7 +161,8 @@ def _channels(
     for ours, signal in signals.items():
         found[ours] = []
         for name in signal.channel:
-            logged, cut = by_name[name], log_map.holes == CUT
+            logged, codes = without_codes(by_name[name])
+            cut, coded = log_map.holes == CUT, by_name[name].values.size - logged.values.size
             channel = without_empty(logged, cut=cut)
             unit = signal.unit if is_given(signal.unit) else channel.unit
             what = f"{label}: {column_of(ours)}"
@@ -170,8 +176,8 @@ def _channels(
                 sign = by_name[signal.sign]
                 values = signed(values, channel.t, sign.t, sign.values)
             _require_of_a_car(label, ours, values, channel)
-            empty = holes(logged).size if cut else 0
-            found[ours].append(Raw(channel.t, values, channel.place, channel.rows, empty))
+            empty = coded + (holes(logged).size if cut else 0)
+            found[ours].append(Raw(channel.t, values, channel.place, channel.rows, empty, codes))
     return found
 
 
@@ -217,8 +223,6 @@ def _segments(
 ) -> _Segments:
     """Return the signals on one clock, in the segments between gaps; at least one."""
     raws = {f"{name}/{k}": raw for name, listed in parts.items() for k, raw in enumerate(listed)}
-    for raw in {id(raw.t): raw for raw in raws.values()}.values():
-        _judge_time(label, raw)
     one_clock = are_one_clock(list(raws.values()))
     first = next(iter(raws.values()))
     span = (max(raw.t[-1] for raw in raws.values()) - min(raw.t[0] for raw in raws.values())) / dt
@@ -262,27 +266,32 @@ def _shortest(dt: float) -> float:
     return max(_SHORTEST, MINIMUM_SAMPLES * dt)
 
 
-def _judge_time(label: str, raw: Raw) -> None:
+def _judge_time(label: str, raw: Raw, clock: Clock | None) -> None:
     """Refuse time that does not rise, is not in seconds, or too coarse."""
     if raw.t.size < MINIMUM_SAMPLES:
         raise RecordingError(
             f"{label}: there are {raw.t.size} rows, at least {MINIMUM_SAMPLES} needed"
         )
     require_rising(label, raw)
-    typical = typical_step(raw.t)
+    require_often(label, raw.t, clock)
+
+
+def require_often(label: str, t: Array, clock: Clock | None) -> None:
+    """Refuse samples that are too rare, and say in which unit of the time they were not.
+    t : rising [s], (n,).
+    """
+    typical = typical_step(t)
     if typical > _SLOWEST_CHANNEL:
+        name, unit = (clock.name, clock.unit) if clock else ("CHANNEL", "s")
+        step = typical * PER_SECOND.get(unit, 1.0)
+        other = (
+            u for u in ("ms", "us", "ns") if _FASTEST <= step / PER_SECOND[u] <= _SLOWEST_CHANNEL
+        )
+        remedy = "".join(f'; --columns "t={without_unit(name)} [{u}]"?' for u in other)
         raise RecordingError(
             f"{label}: t must be in s with at least 10 samples per second, its typical step is "
-            f"{typical:.6g}{_other_unit(typical)}"
+            f"{typical:.6g}{remedy}"
         )
-
-
-def _other_unit(step: float) -> str:
-    """Return what the time may be in where samples are so far apart."""
-    for power, unit in ((3, "milliseconds"), (6, "microseconds"), (9, "nanoseconds")):
-        if _FASTEST <= step / 10.0**power <= _SLOWEST_CHANNEL:
-            return f"; {unit}? divide by 1{power * '0'}"
-    return ""
 
 
 def _pieces(t: Array, longest: float) -> list[slice]:
@@ -292,11 +301,14 @@ def _pieces(t: Array, longest: float) -> list[slice]:
 
 def _hole_notes(parts: Mapping[str, list[Raw]]) -> tuple[str, ...]:
     """Return what is to be said of cells without a value that were cut out."""
-    counts = {column_of(name): sum(raw.holes for raw in raws) for name, raws in parts.items()}
-    empty = {name: count for name, count in counts.items() if count}
-    if not empty:
+    given = ", ".join(
+        f"{raw.holes} of {column_of(name)}" + f" ({raw.codes} means no value)" * bool(raw.codes)
+        for name, raws in parts.items()
+        for raw in raws
+        if raw.holes
+    )
+    if not given:
         return ()
-    given = ", ".join(f"{count} of {name}" for name, count in empty.items())
     return (f"cells without a value are cut out: {given}",)
 
 

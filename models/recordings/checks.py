@@ -19,6 +19,7 @@ from models.recordings.evidence import (
     Means,
     Pair,
     Steering,
+    computed_v_y,
     correlation,
     course_rate,
     least_squares,
@@ -44,6 +45,8 @@ _LONGEST_WHEELBASE = 4.0  # [m], in judging a mass: so 64 kg at least, a kart wi
 _LIGHTEST = 1.0  # [kg/m^3]: mass over wheelbase cubed is 17 to 300 for all cars; in kN 0.3 at most
 _LARGEST_SLIP = 0.7  # [rad], 40 degrees in the median window: nobody drives a whole run like that
 
+_PLACED = 0.03  # [m] to which the place of a v_y is known: more slip than that tells a sign
+
 _DOCTOR = "tireid doctor LOG --vehicle FILE looks for other faults, and repairs them"
 
 
@@ -55,6 +58,7 @@ def check_physics(recording: Recording) -> None:
 def _refuse(recording: Recording, contradiction: str | None) -> None:
     """Raise what contradicts, and say who finds out why."""
     if contradiction is not None:
+        contradiction = ("vy" in contradiction and computed_v_y(recording)) or contradiction
         raise RecordingError(f"{recording.name}: {contradiction}; {_DOCTOR}")
 
 
@@ -472,7 +476,7 @@ def _check_rear_rises(alpha: Array, w: Means, l_r: float, other: str) -> str | N
     Where an accelerometer has the slope 1 on v̇_y the sign of v_y is right, and the car is wrong.
     """
     falls = _falls(alpha, w.acceleration)
-    if falls is None:
+    if falls is None or np.mean(alpha**2) < np.mean((_PLACED * w.r / w.v_x) ** 2):
         return None
     car = f"name the right vehicle; this file declares l_r = {l_r:g} m"
     place = "move vy to the center of gravity"

@@ -7,12 +7,15 @@ something is not sure, the error says what it may be, and the word that tells it
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+
 from codegen.escape import displayed
 from models.logs.log import Heading, LogFile, RecordingError, some
-from models.logs.names import HINT, STILL, Proposal, propose
+from models.logs.names import HINT, STILL, Proposal, called, propose
 from models.logs.signals import (
     BETA,
     COLUMNS,
@@ -28,8 +31,13 @@ from models.logs.signals import (
     signal_name,
 )
 from models.logs.spelling import without_unit
-from models.logs.units import SI
+from models.logs.units import RATE, SI, to_si
+from models.recordings.checks import world_axes
 from models.recordings.map import LogMap
+from models.recordings.record import Recording, resample
+
+_SAME = 0.02  # of a speed, by which two sensors of it differ
+_DT = 0.01  # [s], of a look at the directions of velocities
 
 _INVERSE = {"Fyf_inv": "Fyf", "Fyr_inv": "Fyr"}  # computed backwards from the motion
 
@@ -54,13 +62,16 @@ def chosen_signals(
 ) -> _Reading:
     names = [one.name for one in headings]
     by_map = as_listed(log, log_map.signals, names)
+    headings, turned, world = of_the_car(log, headings, run)
+    names = [one.name for one in headings]
     lost: tuple[str, ...] = ()
     if "v_x" in log_map.signals and "v_x" not in by_map:
         channels = displayed(" + ".join(log_map.signals["v_x"].channel))
         lost = (f"there is no column {channels}: vx is computed from the wheels",)
     if log_map.is_complete:
         return _Reading(by_map, lost)
-    given = _without_wheels(_beside(standard_signals(log, names), by_map), by_map)
+    lost += (world,) * bool(world)
+    given = _without_wheels(_beside({**standard_signals(log, names), **turned}, by_map), by_map)
     missing = missing_signals(given)
     if has_v_y(given) and not missing:
         return _Reading(given, lost)
@@ -82,6 +93,36 @@ def chosen_signals(
     if aside := aside_text(found, proposal):
         notes.append(aside)
     return _Reading(found, tuple(notes))
+
+
+def of_the_car(
+    log: LogFile, headings: Sequence[Heading], run: str | None
+) -> tuple[Sequence[Heading], dict[str, Signal], str]:
+    """Return headings less a velocity of the world's axes beside one of the car's, this one where
+    it is in SI as that is, and a note: both are of one size, and one turns as the car does.
+    run : of the log; None its only one.
+    """
+    along, across, turns = (called(name, headings) for name in ("v_x", "v_y", "r"))
+    pairs, found = list(zip(along, across, strict=False))[: 2 if turns else 0], []
+    with suppress(RecordingError):  # of channels that cannot be read
+        for pair in pairs if len(pairs) > 1 else ():
+            r, *both = log.read([turns[0], *pair], run)
+            x, y = (np.interp(r.t, one.t, one.values) for one in both)
+            rate = to_si(r.unit, RATE, r.name) * r.values
+            t, some = resample(r.t, {"v_x": x, "v_y": y, "r": rate}, _DT)
+            v_x, v_y, rate = some.values()
+            drive = Recording(
+                name="", t=t, v_x=v_x, v_y=v_y, r=rate, delta_f=0.0 * t, delta_r=0.0 * t
+            )
+            found.append((world_axes(drive) is not None, pair, np.hypot(x, y)))
+    if {turned for turned, *_ in found} != {True, False}:
+        return headings, {}, ""
+    (_, ours, speed), (_, world, size) = sorted(found, key=lambda one: one[0])
+    alike = np.mean(np.abs(speed - size)) < _SAME * np.mean(size) and all(map(signal_name, world))
+    sure = {name: Signal(channel=(one,)) for name, one in zip(("v_x", "v_y"), ours, strict=True)}
+    said = f"{world[0]} and {world[1]} are of the world's axes, as they turn with the car: "
+    left = [one for one in headings if one.name not in world]
+    return left, sure if alike else {}, f"{said}{ours[0]} and {ours[1]} are of the car's"
 
 
 def as_listed(

@@ -1,6 +1,7 @@
 """From a log, a file or arrays in memory, to a Recording: read, brought to a clock, judged."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -10,8 +11,10 @@ from codegen.escape import displayed
 from models.logs.door import ENDINGS, open_log
 from models.logs.log import LogFile, RecordingError
 from models.logs.memory import open_arrays
+from models.logs.signals import Signal
 from models.recordings.assembly import recording_of
 from models.recordings.checks import check_against_vehicle, check_physics
+from models.recordings.evidence import least_squares, pair, windows
 from models.recordings.map import MEND, LogMap, given_channel, given_signals
 from models.recordings.record import Recording
 from models.recordings.repair import Repair
@@ -19,6 +22,8 @@ from models.vehicle import Vehicle, sedan
 
 _NO_NAMES: Mapping[str, str] = {}
 _DT = 0.01  # [s], the sample time of every method
+_MOST_TRIED = 50  # channels that may be the lateral acceleration
+_UNLIKE, _ALIKE = 0.3, 0.9  # correlation of a_y with v_x r, of another axis, and of it
 _GivenMap = LogMap | str | PathLike[str] | None
 
 
@@ -153,6 +158,8 @@ def _judged(
     log: LogFile, name: str, given: LogMap, *, run: str | None, dt: float, check: bool
 ) -> Recording:
     recording = recording_of(log, name, given, run=run, dt=dt)
+    other = _lateral(log, recording, given, run)
+    recording = replace(recording, notes=(*recording.notes, other)) if other else recording
     if check:
         try:
             # Repaired; of the car only its size counts, for noise.
@@ -160,8 +167,33 @@ def _judged(
             check_physics(repair.apply(recording, sedan())[0] if given.repair else recording)
         except RecordingError as error:
             label = f"{log.path}{recording.name.removeprefix(name)}"
-            raise RecordingError(label + str(error).removeprefix(recording.name)) from None
+            said = str(error).removeprefix(recording.name) + f"; {other}" * bool(other)
+            raise RecordingError(label + said) from None
     return recording
+
+
+def _lateral(log: LogFile, recording: Recording, given: LogMap, run: str | None) -> str:
+    """Return which channel is the lateral acceleration where a_y is none; "" where it is one."""
+    if recording.a_y is None or abs(_turning(recording)[1]) > _UNLIKE:
+        return ""
+    for one in log.headings()[:_MOST_TRIED]:
+        read = given.with_signals({"a_y": Signal(channel=(one.name,))})
+        with suppress(RecordingError):  # of a channel that is no acceleration
+            slope, together = _turning(recording_of(log, "", read, run=run, dt=recording.dt))
+            in_g = abs(slope) < 1.0 / 3.0
+            if abs(together) > _ALIKE and 0.8 < abs(slope) * (9.81 if in_g else 1.0) < 1.25:
+                words = f"{one.name}{' [g]' * in_g}{' *-1' * (slope < 0.0)}"
+                said = f"ay does not go with vx r, {one.name} does (slope {slope:.3g})"
+                return f'{said}: --columns "ay={words}", and ax likewise if they are exchanged'
+    return ""
+
+
+def _turning(recording: Recording) -> tuple[float, float]:
+    """Return the slope of a_y on v_x r, and their correlation; 1 where nothing turns."""
+    w = windows(recording)
+    both = pair(w.v_x_r, w.v_x_r if w.a_y is None else w.a_y)
+    slope = least_squares(w.v_x_r[:, None], w.a_y).theta[0] if w.a_y is not None else 1.0
+    return float(slope), both.correlation if both.seconds >= 2.0 else 1.0
 
 
 def runs(path: str | Path) -> list[str]:

@@ -19,12 +19,18 @@ COPY = 1e-4  # of a signal, rms, that is left of it beside another one which it 
 _ALTERNATE = -0.35  # correlation of neighboring second differences, below which they are noise
 _NO_STEP = 1e-9  # of a signal's peak: values that differ by less are equal
 _ON_GRID = 0.99  # share of the steps of a rounded signal that are multiples of the smallest
+_SPARSE = 40  # steps, by which values of a rounded signal differ at least
+_SAMPLED = 200  # differences of values that tell most steps wrong
 _ON_GRID_REPEATED = 0.9  # the same of values that repeat
+FAR = 1.5  # steps of a rounded signal that rounding alone does not make
+_ROUNDING = 0.3  # steps², variance that rounding may add where a signal moves; 1/12 if white
+_ROUNDED_JUMP = 0.5  # of a step, in which rounding lets both sides of an instant disagree
 _FEW = 5  # steps that tell the rounding of values that repeat
 _GOES_ON = 0.6  # of a step after a rest, that the next but one has where a signal begins to move
 _SPIKE = 12.0  # times the noise beyond its neighbors
 _OUTLIER = 16.0  # times the variance that is expected of a difference, and not more
 _BLOCK = 5  # samples in a row that were logged before, of all signals
+_ALIKE = 2  # samples at its ends that rounding may make alike
 _SIDE = 12  # samples on each side of a jump
 _JUMP = 5.5  # of the usual disagreement of both sides of a jump, in two signals
 _ALSO = 2.5  # of the same disagreement, in a third signal
@@ -80,23 +86,28 @@ def noise(signal: Array) -> float:
 # Resolution, and values that repeat.
 
 
-def _step(values: Array, on_grid: float) -> float | None:
-    """Return the step of which differences of rising values are multiples, None: there is none."""
+def _step(values: Array, on_grid: float) -> float:
+    """Return the step of which differences of rising values are multiples, 0: there is none."""
     steps = np.diff(values)
     steps = steps[steps > _NO_STEP * float(np.abs(values).max(initial=0.0))]
     if steps.size < 2:
-        return None
-    step = float(np.median(steps[steps < 1.5 * float(steps.min())]))
-    count = steps / step
-    return step if float(np.mean(np.abs(count - np.round(count)) < 0.05)) > on_grid else None
+        return 0.0
+    least = float(steps.min())
+    usual = float(np.median(steps[steps < 1.5 * least]))
+
+    def fit(step: float, some: Array) -> bool:
+        count = some / step
+        return float(np.mean(np.abs(count - np.round(count)) < 0.05)) > on_grid
+
+    # Values may be so few that none differ by one step.
+    tried = (usual, *(least / np.arange(2, _SPARSE + 1)).tolist())
+    few = steps[:: 1 + steps.size // _SAMPLED]
+    return next((step for step in tried if fit(step, few) and fit(step, steps)), 0.0)
 
 
-def resolution(signal: Array) -> float | None:
-    """Return the step to which a signal was rounded, None where its samples do not tell one."""
-    values = np.unique(signal)
-    step = _step(values, _ON_GRID)
-    few = step and values.size < min(0.5 * signal.size, 0.5 * np.ptp(signal) / step + 2e3)
-    return step if few else None
+def resolution(signal: Array) -> float:
+    """Return the step to which a signal was rounded, 0 where its samples tell none."""
+    return _step(np.unique(signal), _ON_GRID)
 
 
 class Runs(NamedTuple):
@@ -110,54 +121,51 @@ class Runs(NamedTuple):
         starts = np.flatnonzero(np.concatenate([[True], np.diff(signal) != 0.0]))
         return cls(starts, np.diff(np.append(starts, signal.size)))
 
-    def stairs(self, *, rounded: bool) -> int | None:
-        """Return how many samples each value of a slow signal lasts, None where it is not slow."""
-        inner = self.length[1:-1]
+    def far(self, signal: Array, step: float) -> NDArray[np.bool_]:
+        """Return between which runs a signal moves by more than its step, (k - 1,)."""
+        return np.abs(np.diff(signal[self.first])) > FAR * step
+
+    def stairs(self, signal: Array, step: float) -> int | None:
+        """Return how many samples each value of a slow signal lasts, None where it is not slow.
+
+        Where a signal moves by less than its step in a sample, rounding makes stairs of any.
+        """
+        every, far = self.length[1:-1], self.far(signal, step)
+        inner = every[far[:-1] & far[1:]]
         if inner.size < 10:
             return None
         typical = int(np.median(inner))
         same = np.abs(inner - typical) <= max(1, round(0.1 * typical))
-        regular = inner[same].sum() > (0.9 if rounded else 0.7) * self.length.sum()
-        return typical if typical >= 2 and regular and np.mean(inner >= 2) > 0.8 else None
+        regular = inner[same].sum() > (0.9 if step else 0.7) * inner.sum()
+        return typical if typical >= 2 and regular and np.mean(every >= 2) > 0.8 else None
 
-    def resolution(self, signal: Array) -> float | None:
+    def resolution(self, signal: Array) -> float:
         """Return the step to which values are rounded that a signal keeps for a while.
 
         Between them a signal that was brought to another clock has any value, so that all of its
         values say nothing.
         """
         kept = np.unique(signal[self.first[self.length > 2]])
-        return _step(kept, _ON_GRID_REPEATED) if kept.size > _FEW else None
+        return _step(kept, _ON_GRID_REPEATED) if kept.size > _FEW else 0.0
 
-    def lost(self, signal: Array, rounded: float | None) -> NDArray[np.bool_]:
-        """Return which runs may be samples that were lost: a rest of a rounded signal is none.
+    def lost(self, signal: Array, step: float) -> tuple[NDArray[np.bool_], float]:
+        """Return which runs may be samples that were lost, and how many are by chance.
 
-        A rest ends by one step of the rounding, or as the signal begins to move: by a step that
-        others follow. After a loss the signal catches up at once, brought to another clock by two
-        steps; that of a rest then may overshoot.
+        A rest of a rounded signal is none: it ends by one step of the rounding, or as the signal
+        begins to move: by a step that others follow. After a loss the signal catches up at once,
+        brought to another clock by two steps; that of a rest then may overshoot.
+
+        By chance neighbors differ by k steps so often that ln(share of k) falls with k², as of
+        noise: those of ±1 and ±2 tell how many are 0.
         """
-        again = self.length > 1
-        if rounded is None:
-            return again
         change = np.concatenate([np.diff(signal), [0.0, 0.0, 0.0]])
-        end = self.first + self.length - 1
-        step, after, later = change[end], change[end + 1], change[end + 2]
-        far = np.minimum(np.abs(step), np.abs(step + after)) > 1.5 * rounded
-        may: NDArray[np.bool_] = again & far & ~(step * later > _GOES_ON * step**2)
-        return may
-
-
-def alike_by_rounding(signal: Array) -> float:
-    """Return the share of neighbors that rounding alone makes equal; 0 where nothing was rounded.
-
-    Differences of a rounded signal are multiples k of its last digit. Where noise makes them,
-    ln(share of k) falls with k²: those of ±1 and ±2 tell how many are 0.
-    """
-    steps = np.abs(np.diff(signal))
-    moved = steps[steps > _NO_STEP * float(np.abs(signal).max())]
-    digits = np.round(moved / moved.min(initial=np.inf))
-    one, two = (float(np.count_nonzero(digits == k)) / (2.0 * signal.size) for k in (1, 2))
-    return one * (one / two) ** (1.0 / 3.0) if two > 0.0 else 0.0
+        now, after, later = change[:-2], change[1:-1], change[2:]
+        far = np.minimum(np.abs(now), np.abs(now + after)) > FAR * step
+        far &= ~((now * later > _GOES_ON * now**2) & (step > 0.0))
+        may: NDArray[np.bool_] = (self.length > 1) & far[self.first + self.length - 1]
+        before = np.abs(change[:-3][far[1:]])
+        one, two = (float(np.sum(np.abs(before - k * step) < 0.05 * step)) for k in (1, 2))
+        return may, 0.5 * one * (one / max(two, 0.5)) ** (1.0 / 3.0)
 
 
 # Samples that are off.
@@ -165,16 +173,20 @@ def alike_by_rounding(signal: Array) -> float:
 
 def dropouts(signal: Array, white: float) -> NDArray[np.intp]:
     """Return the samples that are exactly zero far from what stands before and after them.
+
+    None are at the beginning or at the end.
     white : its noise.
     """
     zero = signal == 0.0
     if not 0.0 < zero.mean() <= 0.3:
         return np.empty(0, dtype=np.intp)
-    kept = np.flatnonzero(~zero)
-    between = np.interp(np.arange(signal.size), kept, signal[kept])
-    step = float(np.percentile(np.abs(np.diff(signal[kept])), 90))
-    found = np.flatnonzero(zero & (np.abs(between) > 10.0 * max(white, step)))
-    return found if found.size >= 2 and found[-1] >= found.size else found[:0]
+    kept = np.abs(np.concatenate([[0.0], signal[~zero], [0.0]]))
+    place = np.cumsum(~zero)
+    beside = np.minimum(kept[place], kept[np.minimum(place + 1, kept.size - 1)])
+    steps = np.abs(np.diff(signal[~zero]))
+    step = float(np.percentile(steps[steps > 0.0], 90)) if steps.any() else math.inf
+    found = np.flatnonzero(zero & (beside > 10.0 * max(white, step)))
+    return found if found.size >= 2 else found[:0]
 
 
 def spikes(signal: Array, white: float) -> NDArray[np.intp]:
@@ -190,8 +202,9 @@ def spikes(signal: Array, white: float) -> NDArray[np.intp]:
     return found
 
 
-def lateness(signal: Array, dt: float) -> tuple[float, float] | None:
+def lateness(signal: Array, dt: float, step: float) -> tuple[float, float] | None:
     """Return how late samples are at most, and in how many deviations: noise that grows with slope.
+    step : to which it is rounded, which is noise too where the signal moves.
 
     Samples late by u, uniform from 0 to J, are off by slope times u: third differences then have
     the variance 20 (σ^2 + J^2 slope^2/12).
@@ -212,14 +225,15 @@ def lateness(signal: Array, dt: float) -> tuple[float, float] | None:
     variance = _variance(X, y)
     weighted = X / variance[:, None]
     normal = weighted.T @ weighted
-    if not np.linalg.cond(normal) < 1e15:
+    if not np.linalg.cond(normal) < 1e12:
         return None
     still, moved = np.linalg.solve(normal, weighted.T @ (y / variance))
     if moved <= 0.0:
         return None
     z = float(moved) / math.sqrt(float(np.linalg.inv(normal)[1, 1]) * 2.0 * 1.8)
     size = math.sqrt(12.0 * float(moved) * size_y / size_x)
-    grows = moved * float(np.percentile(x, 90)) > 0.5 * max(float(still), 0.0)
+    rounding = _ROUNDING * step**2 / size_y
+    grows = moved * float(np.percentile(x, 90)) > max(0.5 * float(still), rounding)
     return (size, 2.0 * z) if z > 8.0 and grows and size > 0.3 * dt else None
 
 
@@ -235,6 +249,8 @@ def _variance(X: Array, y: Array) -> Array:
 
 def logged_again(signals: Mapping[str, Array]) -> tuple[int, int] | None:
     """Return where samples begin that were logged before, and how many samples before.
+
+    After them the log goes on: what repeats for longer, or for less, is a motion that does.
     signals : that move (n,); fewer than three say nothing.
     """
     if len(signals) < 3:
@@ -246,11 +262,12 @@ def logged_again(signals: Mapping[str, Array]) -> tuple[int, int] | None:
     same = np.flatnonzero(np.diff(code[order]) == 0)
     back = order[same + 1] - order[same]
     lags, count = np.unique(back[back > _BLOCK], return_counts=True)
-    for lag in lags[count >= _BLOCK]:
-        late = np.sort(order[same + 1][back == lag])
-        block = late[: np.count_nonzero(np.diff(late) == 1) + 1]
-        if np.all(np.ptp(table[block], axis=0) > 0.0) and block.size >= _BLOCK:
-            return int(late[0]), int(lag)
+    for lag in lags[count >= np.maximum(_BLOCK, 0.5 * lags)]:
+        runs = Runs.of((code[lag:] != code[:-lag]).astype(np.float64))
+        for first in runs.first[(runs.length >= lag) & (runs.length <= lag + _ALIKE)]:
+            block = table[first : first + lag]
+            if code[first] == code[first + lag] and np.all(np.ptp(block, axis=0) > 0.0):
+                return int(first + lag), int(lag)
     return None
 
 
@@ -269,7 +286,7 @@ def tears(signals: Mapping[str, Array]) -> list[tuple[int, float]]:
     for signal in signals.values():
         jump = np.convolve(signal, np.concatenate([value[::-1], -value]), "valid")
         size = np.abs(jump)
-        usual = np.median(size) / _NORMAL_MEDIAN
+        usual = max(np.median(size) / _NORMAL_MEDIAN, _ROUNDED_JUMP * resolution(signal))
         busy = np.convolve(size, np.full(8 * _SIDE, 1.0 / (8 * _SIDE)), "same")
         scores.append(size / np.maximum(np.maximum(usual, 0.8 * busy), 1e-300))
         jumps.append(jump)

@@ -261,6 +261,15 @@ class MagicFormula:
         """∂F_y/∂α at zero slip and camber, paper's sign: positive [N/rad]; 0 in the air."""
         return -_lateral_slope(self.coefficients, positive(F_z))
 
+    def relaxation_length(self, F_z: Expression) -> Expression:
+        """Relaxation length of F_y without camber [m]; 0 where the file has none.
+
+        σ_α = PTY1 sin(2 atan(F_z/(PTY2 F_z0))) R_0 LFZO LSGAL (MSC, Using the PAC2002 Tire Model).
+        """
+        c = self.coefficients
+        over_load = ca.sin(2.0 * ca.atan2(positive(F_z), c.PTY2 * c.FNOMIN * c.LFZO))
+        return c.PTY1 * over_load * c.UNLOADED_RADIUS * c.LFZO * c.LSGAL
+
     def mirrored(self) -> Self:
         """The same tire for the other side of the car.
 

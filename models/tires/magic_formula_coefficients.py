@@ -88,6 +88,10 @@ class Coefficients:
     RVY4: float = 0.0
     RVY5: float = 0.0
     RVY6: float = 0.0
+    # relaxation: length of F_y over radius and load; radius [m]
+    PTY1: float = 0.0
+    PTY2: float = 0.0
+    UNLOADED_RADIUS: float = 0.0
     # scaling factors: load, shape, friction, curvature, stiffness, shifts, camber, interaction
     LFZO: float = 1.0
     LCX: float = 1.0
@@ -108,6 +112,7 @@ class Coefficients:
     LXAL: float = 1.0
     LYKA: float = 1.0
     LVYKA: float = 1.0
+    LSGAL: float = 1.0
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -8,7 +8,7 @@ import numpy as np
 from codegen.arrays import Array
 from codegen.errors import TireidError
 from models.plant import tire_of
-from models.plant.dynamics import wheel_loads
+from models.plant.dynamics import own_lengths, relaxation_lengths, wheel_loads
 from models.tires import MagicFormula, Tire
 from models.vehicle import Vehicle
 from mpc.tires.axles import LadderAxles, curve_weights
@@ -86,27 +86,28 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     tire : of all four wheels; None reads the file that the chassis names.
     mu : friction of the road over that of the measurement [-]: scales the peak and its slip.
     """
-    chassis = vehicle.require_chassis()
     tire = tire_of(vehicle) if tire is None else tire
     alpha = slip_grid(_LARGEST_SLIP * min(mu, 1.0))
     grid = np.concatenate([[0.0], alpha])
     force = np.stack([cornering_force(vehicle, tire, axle, grid, mu) for axle in (0, 1)])
     force = force[:, 1:] - force[:, :1]  # wheels that are not mirrored push at zero slip, too
-    lengths = np.array([chassis.relaxation_length_front, chassis.relaxation_length_rear])
+    lengths = np.array(relaxation_lengths(vehicle, (tire, tire)))
     return _fitted_tire(vehicle, alpha, force, lengths)
 
 
 def mounted_tire(vehicle: Vehicle, tire: Tire, rear: Tire | None = None) -> PredictionTire:
-    """Return two tires an axle at its static load, without lag.
+    """Return two tires an axle at its static load, lagged where both files say by how much.
     vehicle : the car; it needs no chassis.   rear : tire of the rear axle; None takes the same.
     """
     alpha = slip_grid(_LARGEST_SLIP)
     x = ca.SX.sym("alpha")
-    force = []
-    for one, load in zip((tire, tire if rear is None else rear), vehicle.axle_loads, strict=True):
+    force, tires = [], (tire, tire if rear is None else rear)
+    for one, load in zip(tires, vehicle.axle_loads, strict=True):
         axle = ca.Function("axle", [x], [_both_sides(one, x, 0.0, (0.5 * load, 0.5 * load), 1.0)])
         force.append(np.array(axle(alpha[None])).ravel())
-    return _fitted_tire(vehicle, alpha, np.stack(force), None)
+    lengths = own_lengths(vehicle, tires)
+    lagged = np.array(lengths) if min(lengths) > 0.0 else None
+    return _fitted_tire(vehicle, alpha, np.stack(force), lagged)
 
 
 def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: float) -> Array:

@@ -58,10 +58,6 @@ def misses(motion, t=T):
     }
 
 
-def test_a_pose_without_noise_is_the_motion():
-    assert max(misses(motion_of(posed())).values()) < 2e-3
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_a_pose_with_noise_tells_the_motion_and_its_noise(seed):
     x, y = noisy(X, 0.005, seed), noisy(Y, 0.005, seed + 50)
@@ -112,6 +108,21 @@ def test_where_the_drive_does_not_tell_how_a_heading_counts_it_is_asked_for():
     with pytest.raises(RecordingError, match=r'"x=x" "y=y" "heading=heading \[rad\]", with \*-1'):
         motion_of(straight)
     assert abs(motion_of(straight, declared=True).r.values).max() < 0.05
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.05, -0.08])
+def test_how_the_frame_of_a_pose_is_turned_is_taken_off(turned):
+    psi = noisy(PSI + turned, np.radians(0.3), 4)
+    motion = motion_of(posed(noisy(X, 1e-3, 5), noisy(Y, 1e-3, 6), psi))
+    assert np.mean((motion.v_y.values - V_Y) / V_X) == pytest.approx(0.0, abs=3e-3)
+    assert ("deg off the travel" in motion.said) == (turned != 0.0)
+
+
+def test_a_drive_to_one_side_does_not_tell_how_the_frame_is_turned():
+    psi = integral(np.abs(R))
+    x, y = integral(V_X * np.cos(psi)), integral(V_X * np.sin(psi))
+    found = motion_of(posed(x, y, psi + 0.05))
+    assert np.mean(found.v_y.values / V_X) == pytest.approx(-0.05, abs=3e-3)
 
 
 def test_a_car_that_reverses_for_a_while_keeps_its_heading():

@@ -433,3 +433,27 @@ def test_a_log_without_any_motion_sideways_is_judged_without_a_warning():
     made, nothing = drive(peak=0.0), np.zeros(1200)
     names = ("v_y", "r", "delta_f", "a_y")
     check_physics(replace(made, axle_force=None, **dict.fromkeys(names, nothing)))
+
+
+def test_of_two_velocities_that_of_the_car_is_read_by_their_directions():
+    made = drive()
+    world = (made.v_x + 1j * made.v_y) * np.exp(1j * np.cumsum(made.r) * made.dt)
+    velocities = {"v_x": world.real, "v_y": world.imag, "v_long": made.v_x, "v_tran": made.v_y}
+    rest = {"t": made.t, "r": made.r, "delta_f": made.delta_f}
+    read = read_recording({**rest, **velocities})
+    np.testing.assert_array_equal(read.v_x, made.v_x)
+    np.testing.assert_array_equal(read.v_y, made.v_y)
+    assert any("v_x and v_y are of the world's axes" in note for note in read.notes)
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "offered"),
+    [("ax", 1.0, "ay=ax"), ("acc_2", -1.0 / 9.81, "ay=acc_2 [g] *-1")],
+)
+def test_the_channel_that_is_the_lateral_acceleration_is_offered(rng, name, factor, offered):
+    made = drive()
+    other = 0.5 * np.sin(made.t) + 0.05 * rng.normal(size=made.t.size)
+    rest = {"t": made.t, "r": made.r, "delta_f": made.delta_f, "vx": made.v_x}
+    with pytest.raises(RecordingError, match="its slope on v_x r") as refused:
+        read_recording({**rest, "ay": other, name: factor * made.a_y})
+    assert f'--columns "{offered}"' in str(refused.value)

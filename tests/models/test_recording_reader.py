@@ -145,6 +145,8 @@ def test_time_must_rise_in_seconds(tmp_path):
     assert in_ms.t[-1] == pytest.approx(0.59) and any("in ms" in one for one in in_ms.notes)
     write(path, HEADER.replace("t,", "t [s],"), rows(dt=0.2))
     assert "at least 10 samples per second" in refusal(path)
+    write(path, HEADER.replace("t,", "t [s],"), rows(dt=10.0))
+    assert 'its typical step is 10; --columns "t=t [ms]"?' in refusal(path)
     write(path, HEADER, rows(8))
     assert "there are 8 rows" in refusal(path)
     write(path, HEADER, rows(60, dt=0.001))

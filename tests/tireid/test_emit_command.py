@@ -27,11 +27,12 @@ def refused(capsys, *words):
 
 def test_several_outputs_are_written_at_once(stored, tmp_path, capsys):
     tire = ti.TireModel.load(stored / "tire.json")
-    words = ["--tir", "car.tir", "--ggv", "ggv.csv", "--out", "understeer.csv"]
+    words = ["--tir", "car.tir", "--ggv", "ggv.csv", "--steady", "steady.csv"]
+    words += ["--out", "understeer.csv"]
     words = [word if word.startswith("--") else str(tmp_path / word) for word in words]
     assert typed("emit", stored / "tire.json", "--understeer", *words) == 0
     printed = capsys.readouterr()
-    names = {"car_front.tir", "car_rear.tir", "ggv.csv", "understeer.csv"}
+    names = {"car_front.tir", "car_rear.tir", "ggv.csv", "steady.csv", "understeer.csv"}
     assert {path.name for path in tmp_path.iterdir()} == names
     assert all(f"wrote {tmp_path / name}" in printed.err for name in names)
     rows = np.loadtxt(tmp_path / "understeer.csv", delimiter=",", skiprows=1)

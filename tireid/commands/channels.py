@@ -11,13 +11,13 @@ import numpy as np
 
 from codegen.escape import visible
 from models.files import write_atomically
-from models.logs.clock import holes
+from models.logs.clock import holes, without_codes, without_empty
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
 from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, WHEELS, Signal, given_by
 from models.logs.units import SI, is_given
 from models.recordings import LogMap, choice, split_log_argument
-from models.recordings.assembly import wheel_scales, wheel_units
+from models.recordings.assembly import require_often, wheel_scales, wheel_units
 from models.recordings.choice import column_of
 from models.recordings.map import CUT
 from models.recordings.wheels import scale_text, wheel_factor, with_scales
@@ -56,9 +56,11 @@ def run(options: argparse.Namespace) -> int:
     chosen = one_run(log.path, runs if wanted else runs[:1], wanted or None)
     listed = log.listed()
     names = [one.name for one in listed]
-    proposal = propose(log, log.headings(), chosen)
+    headings, turned, world = choice.of_the_car(log, log.headings(), chosen)
+    proposal = propose(log, headings, chosen)
     by_map = choice.as_listed(log, log_map.signals, names)
-    sure = {**choice.standard_signals(log, names), **by_map}
+    standard = choice.standard_signals(log, [one.name for one in headings])
+    sure = {**standard, **turned, **by_map}
     signals = choice.likely_signals(sure, proposal)
     signals = choice.with_wheels(signals, proposal)
     hand, given = proposal.guesses.get("delta_f"), signals.get("delta_f")
@@ -71,8 +73,14 @@ def run(options: argparse.Namespace) -> int:
         del signals["delta_f"]  # declared without the ratio that it wants
     missing = choice.missing_signals(signals)
     tell("\n".join(_head(log, chosen)))
-    seen = _seen(log, listed, signals, chosen)
+    coded = {name: without_codes(one) for name, one in _seen(log, listed, signals, chosen).items()}
+    seen = {name: one for name, (one, _) in coded.items()}
     tell(_channels_text(listed, seen, signals, proposal, frozenset(sure)))
+    if world:
+        tell(world)
+    for name, (_, codes) in coded.items():
+        if codes:
+            tell(f"{visible(name)} is {codes} where it has no value: left out")
     empty = _holes_text(seen, signals)
     if empty:
         cut = "cut out, as given" if log_map.holes == CUT else _CUT_BY_MAP
@@ -84,6 +92,9 @@ def run(options: argparse.Namespace) -> int:
     elif not choice.has_v_y(signals) and not missing:
         tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
     said, of_wheels, rolls = _wheels(log, signals, log_map, chosen)
+    if not missing:
+        for name in {channel for one in signals.values() for channel in one.channel} & set(seen):
+            require_often(str(log.path), without_empty(seen[name]).t, log.clock)
     if rolls or missing:
         tell(_missing_text(options.log, missing, proposal, signals))
     if said:

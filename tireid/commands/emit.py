@@ -23,6 +23,7 @@ def declare(new: Any) -> None:
         "--slipx DIR": "folder of a car of 1:10 for slipx 0.2.0",
         "--ggv FILE": "speed, largest a_x and a_y, for raceline planners; at the lower end of the "
         "band",
+        "--steady FILE": "lateral acceleration of steady turning over steering angle and speed",
         "--out FILE": "with --understeer: also write it as CSV",
     }
     shared.add_options(parser, Path, files)
@@ -34,7 +35,7 @@ def declare(new: Any) -> None:
 def run(options: argparse.Namespace) -> None:
     if options.out is not None and not options.understeer:
         raise ValueError("--out goes with --understeer: the other options name their files")
-    if not (options.understeer or options.tir or options.slipx or options.ggv):
+    if not (options.understeer or options.tir or options.slipx or options.ggv or options.steady):
         raise ValueError(f"nothing is asked for: add one or more of {WANTED}")
     model = load_model(options.model)
     warn_of_stored(options.model)
@@ -43,6 +44,7 @@ def run(options: argparse.Namespace) -> None:
         tir=options.tir,
         slipx=options.slipx,
         ggv=options.ggv,
+        steady=options.steady,
         understeer=options.understeer if options.out is None else options.out,
         overwrite=options.force,
     )

@@ -5,10 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from identifier.doctor.samples import CERTAIN, _is_late, sample_findings
 from models.recordings import Recording
-from models.recordings.samples import alike_by_rounding
+from models.recordings.evidence import computed_v_y
+from models.recordings.samples import Runs, resolution
 
 DT = 0.01
 T = np.arange(3000) * DT
@@ -110,10 +112,39 @@ def test_one_sample_that_is_zero_is_no_dropout(noisy):
     assert sample_findings(changed(noisy, "v_x", 500, 0.0)) == []
 
 
-@pytest.mark.parametrize("step", [0.5, 1.0, 1.5])
+@pytest.mark.parametrize("step", [0.3, 0.6, 1.0])
 def test_rounding_makes_as_many_neighbors_alike_as_is_said(step):
     signal = step * np.round(np.random.default_rng(2).standard_normal(100_000) / step)
-    assert alike_by_rounding(signal) == pytest.approx(np.mean(np.diff(signal) == 0.0), rel=0.1)
+    assert resolution(signal) == pytest.approx(step)
+    may, chance = Runs.of(signal).lost(signal, step)
+    assert np.count_nonzero(may) == pytest.approx(chance, rel=0.15)
+
+
+def driven(to, lasts=60.0, dt=DT):
+    """A car without noise: straight ahead, in a turn that tightens evenly, in a sine of 7 s."""
+    t, smooth = np.arange(0.0, lasts, dt), np.ones(round(1.0 / dt)) * dt
+    turn = np.interp(t, [5.0, 15.0, 18.0, 20.0], [0.0, 1.0, 1.0, 0.0])
+    turn = np.convolve(np.convolve(turn, smooth, "same"), smooth, "same")
+    waves = np.clip((t - 25.0) / 5.0, 0.0, 1.0) ** 2 * np.sin(2.0 * math.pi * (t - 25.0) / 7.0)
+    motion = dict(v_y=(0.05, 0.2), r=(0.2, 0.1), delta_f=(0.03, 0.0), a_y=(4.0, 0.12))
+    exact = {n: x * np.interp(t - late, t, turn + waves) for n, (x, late) in motion.items()}
+    exact["v_x"] = 20.0 + 0.002 * t
+    return Recording(
+        name="made", t=t, delta_r=np.zeros(t.size), **{n: to(n, x) for n, x in exact.items()}
+    )
+
+
+@pytest.mark.parametrize("per_unit", [1.0, 3.6])
+@pytest.mark.parametrize("digits", [4, 3, 2])
+def test_the_digits_of_a_file_are_no_fault(noisy, digits, per_unit):
+    def to(_, signal):
+        return np.round(per_unit * signal, digits) / per_unit
+
+    names = {name: to(name, getattr(noisy, name)) for name in NOISE}
+    for log in (driven(to), driven(to, dt=0.02), replace(noisy, **names)):
+        found = sample_findings(log)
+        assert {one.code for one in found} <= {"quantized"}
+        assert not [one for one in found if one.matters]
 
 
 def test_single_samples_far_off_are_spikes(noisy):
@@ -126,13 +157,11 @@ def test_single_samples_far_off_are_spikes(noisy):
     assert sample_findings(two) == [], "two are none"
 
 
-@pytest.mark.parametrize("step", [0.05, 0.02])
-def test_a_coarse_channel_is_told_with_its_step(noisy, step):
-    found = [one for one in sample_findings(replace(noisy, r=step * np.round(noisy.r / step)))]
-    assert [(one.code, one.channel, one.unit) for one in found] == [("quantized", "r", "rad/s")]
-    assert found[0].size == pytest.approx(step)
-    fine = 0.002 * np.round(noisy.r / 0.002)
-    assert sample_findings(replace(noisy, r=fine)) == [], "of a hundredth of what it moves"
+def test_a_coarse_channel_is_told_with_its_step(noisy):
+    found = only(replace(noisy, r=0.05 * np.round(noisy.r / 0.05)))
+    assert (found.code, found.channel, found.unit, found.note) == ("quantized", "r", "rad/s", True)
+    assert found.size == pytest.approx(0.05)
+    assert sample_findings(replace(noisy, r=0.02 * np.round(noisy.r / 0.02))) == []
 
 
 @pytest.mark.parametrize(("factor", "words"), [(1.0, "is a copy of"), (-2.5, "is -2.5 times")])
@@ -205,3 +234,44 @@ def test_samples_are_late_where_those_of_r_and_another_channel_are_alike():
         assert not _is_late("r", {"r": 0.05, "delta_f": size}, DT)
     assert not _is_late("v_y", {"v_y": 0.05, "a_y": 0.05}, DT), "without r"
     assert not _is_late("r", {"r": 0.006, "delta_f": 0.006}, DT), "within a sample"
+
+
+def cornering(v_y=None):
+    """A car of 3 m from axle to axle whose rear tires have 14 loads per rad, and its v_y or one."""
+    rng = np.random.default_rng(8)
+    r, v_x = swing(rng, 0.2), 18.0 + 4.0 * np.sin(0.3 * T)
+    slip, times = np.zeros(T.size), v_x / (9.81 * 14.0)
+    for k in range(1, T.size):
+        late = times[k] * v_x[k] * r[k] - slip[k - 1]
+        slip[k] = slip[k - 1] + DT / (times[k] + DT) * late
+    true, delta_f = 1.5 * r - slip, 3.0 * r / v_x + 0.002 * v_x * r
+    log = {"v_x": v_x, "v_y": true if v_y is None else v_y(r, v_x * delta_f), "r": r}
+    log |= {"delta_f": delta_f, "a_y": v_x * r + np.gradient(true, DT)}
+    noise = NOISE | {"v_y": 0.002, "delta_f": 0.0002}
+    shown = {n: x + noise[n] * rng.standard_normal(T.size) for n, x in log.items()}
+    return Recording(name="made", t=T, delta_r=0.0 * T, **shown)
+
+
+@pytest.mark.parametrize(
+    ("v_y", "said"),
+    [
+        (lambda r, _: 0.0 * r, "held near zero"),
+        (lambda r, _: 1.5 * r, "computed from r (v_y = 1.50 r)"),
+        (lambda r, _: -0.8 * r, "computed from r (v_y = -0.80"),
+        (lambda r, _: lfilter([0.05], [1.0, -0.95], 1.5 * r), "computed from r (v_y = 1."),
+        (lambda _, steered: 0.5 * steered, "computed from vx delta_f (v_y = 0.50"),
+    ],
+)
+def test_a_v_y_that_was_computed_is_named_alone_with_what_it_follows_from(v_y, said):
+    found = only(cornering(v_y))
+    assert (found.code, found.channel, found.confidence) == ("computed", "v_y", CERTAIN)
+    assert said in found.text and "leave the column vy out of the log: ay is there" in found.text
+
+
+@pytest.mark.parametrize("times", [1.0, 1.0 / 18.0, -1.0, 3.6])
+def test_a_v_y_that_was_measured_is_none_whatever_its_unit(times):
+    log = cornering()
+    v_y = 1.5 * log.r + 0.02 * np.random.default_rng(4).standard_normal(T.size)
+    slow = replace(log, v_x=0.1 * log.v_x, v_y=v_y, a_y=None)  # no tire slips there
+    for one in (replace(log, v_y=times * log.v_y), slow):
+        assert computed_v_y(one) is None

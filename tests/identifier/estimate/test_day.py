@@ -14,12 +14,14 @@ from identifier.methods import make_method
 from identifier.motion.parameters import INDEX, NAMES
 from identifier.prediction import predict
 from identifier.run import identify
+from models.maneuvers import SampledSteer
+from models.plant import Plant
 from models.recordings import joined
 from models.recordings.portion import Portion
 from models.vehicle import Vehicle, sedan
 from mpc.tires import prediction_tire
 from tests.identifier.conftest import missed
-from tests.identifier.estimate.conftest import driven
+from tests.identifier.estimate.conftest import NOISE, driven
 
 ZERO, BIAS = 0.02, 0.3  # rad, m/s
 
@@ -79,6 +81,22 @@ def test_logs_of_different_days_have_zeros_of_their_own():
     forces = apart.predict(together)
     error = np.sqrt(np.mean((forces - together.axle_force) ** 2, axis=0))
     assert (error < 0.08 * np.sqrt(np.mean(together.axle_force**2, axis=0))).all()
+
+
+def test_zeros_that_differ_on_gentle_bends_are_no_play_and_no_ratio():
+    t = np.arange(0.0, 90.0, 0.5)
+    bends = np.where(t % 15.0 < 3.0, np.sin(np.pi / 3.0 * (t % 15.0)), 0.0) * (-1.0) ** (t // 15.0)
+    steering = SampledSteer(
+        times=tuple(t), angles=tuple(0.02 * bends), rate_limit=1.0, duration=90.0
+    )
+    drive = Plant(sedan()).simulate(steering, speed=20.0).recording()
+    logs = [NOISE.apply(drive, np.random.default_rng(seed)) for seed in (0, 1)]
+    logs = [
+        replace(one, delta_f=one.delta_f + z) for one, z in zip(logs, (0.01, -0.01), strict=True)
+    ]
+    found = fit(logs, sedan()).model
+    assert found["steering_play"] == 0.0
+    assert abs(found["steering_gain"]) < 0.1
 
 
 def test_without_v_y_a_zero_of_the_steering_is_found_and_no_error_of_v_y_is_taken_off(tire):

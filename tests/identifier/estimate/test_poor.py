@@ -45,6 +45,10 @@ def test_of_a_good_signal_all_are_new(log):
     assert len(_new_values(log.v_y)) == len(log)
     assert len(_new_values(np.where(log.t < 2.0, 0.0, log.v_y))) == len(log)
     assert len(_new_values(np.zeros(100))) == 100
+    t = np.arange(0.0, 60.0, 0.01)
+    slow = np.sin(0.3 * t) * np.sin(2.0 * t) * (np.sin(0.2 * t) > 0.0)
+    for digits in (4, 3, 2):
+        assert len(_new_values(np.round(slow, digits))) == len(t), "rounded, it rests"
 
 
 @pytest.mark.parametrize("how", ["held", "ahead", "lines"])

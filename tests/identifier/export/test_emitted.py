@@ -7,6 +7,7 @@ from datetime import date
 
 import numpy as np
 import pytest
+from scipy.optimize import fsolve
 
 from identifier.axle.model import begun
 from identifier.band import normal_quantile
@@ -16,11 +17,13 @@ from identifier.estimate.priors import Priors
 from identifier.estimate.solve import car_numbers
 from identifier.export.ggv import ggv_text, limits
 from identifier.export.slipx import slipx_files
+from identifier.export.steady import steady_text
 from identifier.export.tir import tire_properties
 from identifier.export.understeer import understeer_gradient
 from identifier.methods import make_method
 from identifier.motion.model import pushed_function
 from identifier.motion.parameters import INDEX
+from models.plant.dynamics import relaxation_lengths
 from models.tires import MagicFormula
 from models.vehicle import GRAVITY, Vehicle, sedan
 
@@ -87,6 +90,20 @@ def test_a_property_file_reads_back_the_axle_over_slip_and_load(tmp_path, i):
         pair = [2.0 * float(tire.forces(a, 0.0, 0.0, load).F_y) for a in alpha]
         force = model.force(alpha, axle, v_x=v_x)
         assert np.abs(pair - force).max() <= 0.02 * np.abs(force).max()
+    load = 0.5 * PRESSED.axle_loads[i]
+    lag = float(tire.relaxation_length(load))
+    assert lag == pytest.approx(model.relaxation_length[i], rel=1e-8)
+    assert float(tire.relaxation_length(1.5 * load)) == pytest.approx(lag, rel=0.1)
+    assert relaxation_lengths(sedan(), (tire, tire))[i] == pytest.approx(lag, rel=0.1)
+    assert tire.valid_range.alpha[1] == pytest.approx(model.known_slip[i])
+
+
+def test_a_property_file_claims_the_slip_that_the_verdict_says():
+    model = fitted()
+    model = replace(model, reach=model.reach._replace(slip=np.radians([1.1, 0.8])))
+    for axle, known in zip(("front", "rear"), np.degrees(model.known_slip), strict=True):
+        assert f"Identified up to a slip of {known:.3g} deg" in tire_properties(model, axle)
+    assert known == pytest.approx(0.8)
 
 
 def test_a_curve_that_is_no_magic_formula_has_no_property_file():
@@ -214,7 +231,10 @@ def steering_slope(model, i, a_y, ratio):
 def test_the_gradient_is_that_of_the_single_track_at_every_acceleration(car):
     model = fitted(car, sd=1e-3)
     found = understeer_gradient(model, np.random.default_rng(0))
-    assert list(found.v_x) == [5.0, 17.5, 30.0]
+    assert list(found.v_x) == ([5.0, 17.5, 30.0] if car is PRESSED else [30.0])
+    rows = [[float(one) for one in row.split(",")] for row in found.csv.splitlines()[1:]]
+    for v_x in found.v_x:  # each once
+        assert (np.diff([row[1] for row in rows if row[0] == v_x]) > 0.0).all()
     for n, v_x in enumerate(found.v_x):
         ratio = car.load_ratio(v_x)
         for k, a_y in enumerate(found.a_y):
@@ -246,12 +266,40 @@ def test_the_standard_deviation_is_that_of_linear_propagation():
     rows = first.csv.splitlines()
     assert rows[0] == "v_x_m_s,a_y_m_s2,gradient_deg_per_g,sd_deg_per_g"
     K = math.degrees(found.gradient[0, 0]) * GRAVITY
-    assert [float(one) for one in rows[1].split(",")[:3]] == pytest.approx([5.0, 0.0, K])
+    assert [float(one) for one in rows[1].split(",")[:3]] == pytest.approx([30.0, 0.0, K], rel=1e-3)
 
 
 def test_a_model_that_knows_no_doubt_has_no_gradient():
     with pytest.raises(ValueError, match="NetworkModel cannot tell how sure it is"):
         understeer_gradient(network(), np.random.default_rng(0))
+
+
+# Steady turning.
+
+
+@pytest.mark.parametrize("car", [CAR, PRESSED], ids=["plain", "pressed"])
+def test_the_table_of_steady_turning_solves_the_equations_of_the_single_track(car):
+    model = fitted(car, **TIRES)
+    table = np.loadtxt(steady_text(model).splitlines(), delimiter=",")  # as ForzaETH's reader does
+    v, delta, a_y = table[0, 1:], table[1:, 0], table[1:, 1:]
+    assert table[0, 0] == delta[0] == 0.0 and (a_y[0] == 0.0).all() and v[-1] == 30.0
+    assert np.isfinite(a_y[:, 0]).all() and np.isnan(a_y[-1, -1])
+    assert (np.diff(a_y, axis=0)[np.isfinite(a_y[1:])] > 0.0).all()
+    for n in (3, 20, 63):
+        k = int(0.8 * np.isfinite(a_y[:, n]).sum())
+
+        def missed(x, v_x=v[n], steer=delta[k]):
+            v_y, r = x
+            slip = (
+                steer - math.atan((v_y + car.l_f * r) / v_x),
+                -math.atan((v_y - car.l_r * r) / v_x),
+            )
+            F = [float(model.force(np.array([one]))[0, i]) * car.load_ratio(v_x)[i]
+                 for i, one in enumerate(slip)]  # fmt: skip
+            return sum(F) / car.mass - v_x * r, (car.l_f * F[0] - car.l_r * F[1]) / car.yaw_inertia
+
+        r = a_y[k, n] / v[n]
+        assert fsolve(missed, (car.l_r * r, r))[1] == pytest.approx(r, rel=2e-3)
 
 
 # A car of slipx.

@@ -1,18 +1,23 @@
 """Files of a few kilobytes that say to hold gigabytes: refused by what they tell of themselves."""
 
 import contextlib
+import os
 import re
 import struct
 import subprocess
 import sys
+import time
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from models import apart
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.schema import _SWELLS
+from tests.models.logs.conftest import refusal
 
 MANY = 100_000_000  # samples of a channel that the limits allow
 ROOM = 700_000_000  # bytes beyond what the readers themselves take
@@ -106,6 +111,10 @@ def test_what_swells_in_memory_is_refused_before_it_does(tmp_path):
             r"not read: t \(100000000 numbers in 0 bytes\), v \(100000000 numbers in 0 bytes\)",
         ),
         (hdf5(tmp_path / "matrix.h5", m=((MANY // 4, 4), "f4")), r"m \(100000000 numbers in 0 "),
+        (
+            hdf5(tmp_path / "sum.h5", **{name: ((MANY // 3,), "f4") for name in "abc"}),
+            r"not read: b \(33333333 numbers in 0 bytes\), c \(33333333 numbers",
+        ),
         (hdf5(tmp_path / "wide.h5", units=((5000,), "S1000000")), r"units \(a long text\)"),
         (hdf5(tmp_path / "many.h5", units=((90_000,), "text")), r"units \(a long text\)"),
         (matlab(tmp_path / "v.mat", numbers(b"t", MANY)), r"t \(100000000 numbers in \d+ bytes\)"),
@@ -174,9 +183,75 @@ def test_what_a_file_unpacks_to_is_told_by_it_and_judged_first(
     written, words, tmp_path, monkeypatch
 ):
     path = written(tmp_path / "log")
+    monkeypatch.setattr("models.apart.resource", None)  # no process apart: it is not patched
     monkeypatch.setattr("models.schema._SWOLLEN_FROM", 10_000_000)
     with contextlib.suppress(RecordingError):  # such as that nothing rises
         open_log(path).listed()
     monkeypatch.setattr("models.schema._SWOLLEN_FROM", 100_000)
     with pytest.raises(RecordingError, match=words):
         open_log(path)
+
+
+# What a library in C does with a damaged file, in a process apart.
+
+
+def test_a_list_of_an_hdf5_file_that_leads_to_itself_is_refused(tmp_path):
+    path = hdf5(tmp_path / "log.h5", t=((300,), "f8"), v=((300,), "f8"))
+    raw = bytearray(path.read_bytes())
+    free, place = struct.unpack_from("<QQ", raw, raw.index(b"HEAP") + 16)
+    assert raw[place + free] == 1  # no free block follows the first one
+    raw[place + free] = free
+    path.write_bytes(raw)
+    assert "is damaged or cut off (Link iteration failed (memory alloc" in refusal(path)
+
+
+def test_an_hdf5_file_with_a_changed_byte_is_read_or_refused_in_one_line(tmp_path):
+    path = hdf5(tmp_path / "log.h5", t=((300,), "f8"), zipped=((300,), "f8"))
+    raw = path.read_bytes()
+    for place in range(0, len(raw), 61):
+        path.write_bytes(raw[:place] + bytes([raw[place] ^ 0xFF]) + raw[place + 1 :])
+        with contextlib.suppress(RecordingError):
+            open_log(path).listed()
+    assert apart.apart(RecordingError, path, 0.0, len, "again") == 5
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        ((bytes, 10**10), "takes more than .* GB of memory"),
+        ((os.abort,), "crashes"),
+        ((pow, 7, 10**9), "takes more than 0 s"),
+    ],
+)
+def test_a_library_that_takes_too_much_or_crashes_is_stopped(call, words, tmp_path, monkeypatch):
+    monkeypatch.setattr(apart, "_LEAST_SECONDS", 0.0)
+    path = tmp_path / "log"
+    path.write_bytes(b"x")
+    with pytest.raises(RecordingError, match=f"log: is damaged, reading it {words}.*; save it"):
+        apart.apart(RecordingError, path, 0.0, *call)
+    assert apart.apart(RecordingError, path, 0.0, len, "again") == 5
+
+
+KILLED = """
+import os, threading
+from pathlib import Path
+from models import apart
+def stop():
+    print(worker.pid, flush=True)
+    os.kill(os.getpid(), 9)
+worker = apart._started()
+apart._started = lambda: worker
+threading.Timer(0.7, stop).start()
+apart.apart(ValueError, Path("."), 0.0, pow, 7, 10**9)
+"""
+
+
+def test_a_process_apart_ends_with_the_one_that_started_it():
+    run = [sys.executable, "-c", KILLED]
+    killed = subprocess.run(run, capture_output=True, text=True, check=False)
+    about, waited = Path(f"/proc/{int(killed.stdout)}/stat"), 0.0
+    with contextlib.suppress(FileNotFoundError):
+        while about.read_text().split()[2] != "Z":
+            assert waited < 3.0
+            waited += 0.05
+            time.sleep(0.05)

@@ -14,6 +14,7 @@ from models.logs.clock import (
     on_one_clock,
     sampled,
     typical_step,
+    without_codes,
     without_empty,
 )
 from models.logs.log import Channel
@@ -128,14 +129,27 @@ def test_slow_channels_have_no_gap_between_their_samples():
     assert gaps(np.array([0.0, 0.01, 0.02, 0.13, 0.14]), LONGEST_GAP).tolist() == [3]
 
 
+def channel(values):
+    rows = np.arange(100)
+    return Channel(name="v", unit="", t=DT * rows, values=values, place="line", rows=rows)
+
+
+CODES = [655.35, 655.35 / 3.6, 255.0, -327.68, 2.0**31 - 1.0, 65535.0 / 256.0, -9999.0, np.inf]
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_the_largest_code_of_a_word_is_no_value_but_the_end_of_a_signal_is(code):
+    ramp = np.linspace(-1.27, 1.27, 100)
+    values = np.where(np.arange(100) % 30 == 5, code, ramp)
+    left, said = without_codes(channel(values))
+    assert said == f"{code:.9g}" and np.array_equal(left.values, values[values != code])
+    for right in (ramp, np.sign(np.sin(np.arange(100.0))) * 0.127):
+        assert without_codes(channel(right))[1] == ""
+
+
 def test_empty_cells_of_a_slower_channel_are_no_holes_but_single_ones_are():
     t = DT * np.arange(100)
     every_tenth = np.where(np.arange(100) % 10 == 0, t, np.nan)
-
-    def channel(values):
-        rows = np.arange(100)
-        return Channel(name="v", unit="", t=t, values=values, place="line", rows=rows)
-
     slower = without_empty(channel(every_tenth))
     assert slower.t.size == 10 and np.isfinite(slower.values).all()
     broken = channel(np.where(np.arange(100) % 10 == 0, np.nan, t))

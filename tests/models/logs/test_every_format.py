@@ -91,6 +91,7 @@ def test_a_missing_library_is_named_with_the_pip_line(format, monkeypatch, writt
         return real(name)
 
     monkeypatch.setattr(importlib, "import_module", without)
+    monkeypatch.setattr("models.apart.resource", None)  # no process apart: it is not patched
     text = refusal(written.path, written.dbc)
     extra = EXTRAS[format]
     assert f": pip install {' '.join(INSTALLED[extra])} (" in text

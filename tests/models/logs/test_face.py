@@ -13,7 +13,7 @@ import tireid as ti
 ROOM = Path(__file__).resolve().parents[3] / "models" / "logs"
 BESIDE = {
     *("codegen.arrays", "codegen.errors", "codegen.escape", "codegen.face"),
-    *("models.extras", "models.limits", "models.schema"),
+    *("models.apart", "models.extras", "models.limits", "models.schema"),
 }
 OPTIONAL = {"h5py", "pyarrow", "asammdf", "rosbags", "cantools", "can"}
 ALONE = """

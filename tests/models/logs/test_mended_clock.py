@@ -89,17 +89,14 @@ def test_a_clock_of_several_that_starts_again_is_refused_all_the_same(tmp_path, 
         log.read(list(written.names.values()))
 
 
-def test_stamps_that_are_shared_throughout_are_refused_all_the_same(drive):
+@pytest.mark.parametrize(
+    ("power", "each", "said"),
+    [(0.5, 2, "stamps are rounded, 2 samples share one"), (0.0, 1, "it never moves: declare")],
+)
+def test_stamps_that_rest_throughout_are_refused_all_the_same(drive, power, each, said):
     t, columns = drive
-    log = as_arrays(np.sqrt(t), columns, np.repeat(EVERY, 2))
-    with pytest.raises(RecordingError, match="stamps are rounded, 2 samples share one"):
-        log.read(["r"])
-
-
-def test_a_time_that_never_moves_is_refused_all_the_same(drive):
-    t, columns = drive
-    log = as_arrays(0.0 * t, columns, EVERY)
-    with pytest.raises(RecordingError, match="it never moves: declare the column"):
+    log = as_arrays(t**power, columns, np.repeat(EVERY, each))
+    with pytest.raises(RecordingError, match=said):
         log.read(["r"])
 
 

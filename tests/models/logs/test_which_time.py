@@ -64,11 +64,36 @@ def test_a_column_that_counts_rows_is_no_time(tmp_path, name):
     assert log.listed()[-1].rate == 50.0 and "time is even at 50 Hz, as given" in log.notes
     both = written(tmp_path / "both.csv", {name: COUNTED, "stamp": numbers(T)})
     steps(open_log(both))
+    tens = written(tmp_path / "tens.csv", {"sample": numbers(10 * np.arange(N))})
+    refused(tens, "'sample' counts samples")
 
 
-def test_a_counter_in_tens_is_known_by_its_name(tmp_path):
-    path = written(tmp_path / "log.csv", {"sample": numbers(10 * np.arange(N))})
-    refused(path, "'sample' counts samples")
+# Columns of a time that does not rise as it should, and what is said of it.
+TICKS = 20 * np.arange(N)
+DEVIATING = 20.0 + 0.3 * np.sin(97.0 * TICKS)
+CLOCKS = {
+    "16 bits": ({"t [ms]": (TICKS + 64000) % 65536}, "begins again each 65.536 s"),
+    "16 bits with sign": ({"t [ms]": (TICKS + 64000) % 65536 - 32768}, "again each 65.536 s"),
+    "8 bits": ({"time_ms": TICKS % 256}, "begins again each 0.256 s"),
+    "32 bits": ({"micros": (1000 * TICKS + 2**32 - 3000000) % 2**32}, "again each 4294.9673 s"),
+    "second of the minute": ({"time [s]": (T + 57.3) % 60.0}, "begins again each 60 s"),
+    "intervals": ({"dt [ms]": DEVIATING}, "it holds intervals, which are summed"),
+    "intervals called time": ({"time": DEVIATING / 1e3}, "it holds intervals, which are summed"),
+    "of a lap": ({"TIME [s]": T % 2.5, "TOTALTIME [s]": T + 9.0}, "'TIME [s]' does not rise"),
+    "s called us": ({"t [us]": T}, "too short for us"),
+    "us called ns": ({"t [ns]": 1000 * TICKS}, "too short for ns"),
+}
+
+
+@pytest.mark.parametrize("kind", CLOCKS)
+def test_a_time_is_known_by_what_it_does(tmp_path, kind):
+    columns, said = CLOCKS[kind]
+    cells = {name: numbers(values, "{:.12g}") for name, values in columns.items()}
+    log = open_log(written(tmp_path / "log.csv", cells), mend=True)
+    (channel,) = log.read(["vx"])
+    np.testing.assert_allclose(np.diff(channel.t), 0.02, rtol=0.02)
+    np.testing.assert_array_equal(channel.values, SIGNALS["vx"])
+    assert said in " ".join((*log.dialect, *log.notes))
 
 
 @pytest.mark.parametrize("name", ["Distance", "Distance [m]", "Lap Distance", "odometer"])

@@ -99,7 +99,7 @@ PCY1 = 130.E-2
 PKY1 = -19.
 PKY2 = 1.9
 $ the end, without a line break"""
-    plain = tire_of(tmp_path, edited(TYRESIDE="RIGHT"))
+    plain = tire_of(tmp_path, edited(TYRESIDE="RIGHT", UNLOADED_RADIUS=0.316))
     forms = [
         odd.encode("utf-8"),
         odd.replace("\n", "\r\n").encode("utf-8"),

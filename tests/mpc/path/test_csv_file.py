@@ -50,6 +50,7 @@ LINE = np.column_stack((np.arange(24.0), RING, np.ones((24, 4))))
         ("# x_m, y_m, w_tr_right_m, w_tr_left_m", WIDE, ", "),
         ("", WIDE, ", "),
         ("x_mm\ty_mm", 1e3 * np.array(RING), "\t"),
+        ("x;y", RING, ";"),
     ],
 )
 @pytest.mark.parametrize("again", [0, 1])
@@ -57,6 +58,7 @@ def test_race_lines_and_center_lines_are_read_with_or_without_the_first_point_ag
     tmp_path, head, table, apart, again
 ):
     text = "".join(apart.join(f"{x:.3f}" for x in row) + "\n" for row in [*table, *table[:again]])
+    text = text.replace(".", ",") if head == "x;y" else text
     path = Path.from_csv(write(tmp_path, f"{head}\n{text}"))
     assert path.closed
     assert path.length == pytest.approx(60.0 * np.pi, rel=1e-4)
