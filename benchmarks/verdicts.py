@@ -52,12 +52,8 @@ EACH, PER_CAR = 60, 5  # answers of each class and of recordings; of one plant c
 OWN_SENSORS = {"r": "r_imu", "ay": "ay_imu", "vx": "vx_encoder"}  # 90 ms late, as they come
 FREE = ("free_10_02_28", "free_10_12_05")
 BY_CAMERA = (
-    "free_10_01_01",
-    "rubber_12_37_59",
-    "ramp_steerneg025",
-    "tape_tiles_steer_neg03",
-    *FREE,
-)
+    "free_10_01_01", "rubber_12_37_59", "ramp_steerneg025", "tape_tiles_steer_neg03", *FREE,
+)  # fmt: skip
 RUNS: tuple[tuple[str, Vehicle, tuple[str, ...], Mapping[str, str]], ...] = (
     ("carmaker.csv.gz", CARMAKER, ("slalom1_14_5ms", "experiment2_40kmh"), {}),
     ("dart.csv.gz", DART, ("ramp_steer02", *FREE), {}),

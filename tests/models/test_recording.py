@@ -15,17 +15,15 @@ from models.recordings import (
     read_recording,
     write_recording,
 )
+from tests.made import made as recorded
 
 N = 100
 
 
 def recording(**change):
     t = 0.01 * np.arange(N)
-    signals: dict[str, object] = {
-        "name": "made", "t": t, "v_x": np.full(N, 20.0), "v_y": 0.1 * np.sin(t),
-        "r": 0.2 * np.sin(t), "delta_f": 0.03 * np.sin(t), "delta_r": np.zeros(N),
-    }  # fmt: skip
-    return Recording(**(signals | change))  # type: ignore[arg-type]
+    wave = np.sin(t)
+    return recorded(t, **{"v_y": 0.1 * wave, "r": 0.2 * wave, "delta_f": 0.03 * wave, **change})
 
 
 def test_signals_cannot_be_changed_and_do_not_follow_their_source():
