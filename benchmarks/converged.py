@@ -190,13 +190,11 @@ def solve(tracker: Tracker, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike) -> 
     return instance.command(float(instance.state["x"][1, 4]), status, time.perf_counter() - start)
 
 
-def prepare_solution(tracker: Tracker, kappa: ArrayLike, v_x: ArrayLike) -> float:
-    """Do ahead of `solve` what does not ask for its state, along the plan as it is; return [s]."""
+def prepare_solution(tracker: Tracker, kappa: ArrayLike, v_x: ArrayLike) -> None:
+    """Do ahead of `solve` what does not ask for its state, along the plan as it is."""
     instance = _on_road(tracker, kappa, v_x)
-    start = time.perf_counter()
     instance.start[:] = instance.state["x"][0]
     instance._library.mpc_prepare_from(*instance.solve_arguments)
-    return time.perf_counter() - start
 
 
 def iterated(

@@ -5,8 +5,8 @@
 Thread CPU time of the solver call alone; of each step the least of ROUNDS identical drives, which
 take turns: what other programs on the machine cost is in all but that one. Every solver drives its
 own closed loop; the closed-loop cost says that none of them is fast by being wrong. Where a step is
-prepared its time is the latency from the measurement to the command; what was done ahead is
-recorded beside it. The tracker once more with the sensor noise of `tireid drive`.
+prepared its time is the latency from the measurement to the command. The tracker once more with the
+sensor noise of `tireid drive`.
 """
 
 import sys
@@ -112,9 +112,6 @@ def main() -> int:
         targets.record(f"{name}/cost", last[name].cost)
         cells = " ".join(f"{targets.values[f'{name}/{q}']:9.4f}" for q in QUANTILES)
         print(f"{WAYS[name]:40}{cells} ms, {last[name].failures} failed, {last[name].cost:.4f}")
-    ahead = solvers["prepared"]
-    assert isinstance(ahead, Ours)
-    targets.record("prepared/ahead", 1e3 * float(np.median(ahead.ahead)))
     targets.at_most("steps that failed", last["tireid"].failures, 0, "")
     if not options.quick:
         slow = float(targets.values["noisy/p99"]) / float(targets.values["noisy/median"])

@@ -192,9 +192,6 @@ def everything(session: Session, cases: Sequence[Case], workers: int) -> Iterato
     cases : to run.
     workers : processes.
     """
-    if workers == 1:
-        yield from map(session.run, cases)
-        return
     with ProcessPoolExecutor(workers, mp_context=get_context("fork")) as pool:
         yield from pool.map(partial(_run, session), cases, chunksize=CHUNK)
 

@@ -13,6 +13,7 @@ from models.logs.signals import QUANTITIES, Signal
 from models.recordings import LogMap, Repair
 from models.recordings.map import given_signals
 from models.recordings.wheels import DRIVEN, Wheels
+from tests.refused import line_about
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
 factors = finite.filter(bool)
@@ -134,10 +135,7 @@ def test_what_is_written_reads_back_bit_for_bit(
 def test_what_is_no_map_is_refused_in_one_line(tmp_path, text, rule):
     path = tmp_path / "log.toml"
     path.write_text(text)
-    with pytest.raises(RecordingError) as caught:
-        LogMap.from_toml(path)
-    message = str(caught.value)
-    assert message.startswith(str(path)) and rule in message and "\n" not in message
+    assert rule in line_about(path, RecordingError, LogMap.from_toml)
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from models.recordings import (
     write_recording,
 )
 from tests.made import made
+from tests.refused import line_about
 
 HEADER = "t,vx,vy,r,delta_f"
 
@@ -31,12 +32,7 @@ def write(path, header, lines):
 
 
 def refusal(path, run=None):
-    with pytest.raises(RecordingError) as caught:
-        read_recording(path, run)
-    message = str(caught.value)
-    assert "\n" not in message
-    assert message.startswith(str(path))
-    return message.removeprefix(str(path))
+    return line_about(path, RecordingError, read_recording, run)
 
 
 def test_other_columns_order_spaces_quotes_and_byte_order_marks_do_not_matter(tmp_path):

@@ -9,6 +9,7 @@ import pytest
 from identifier.frozen import vehicle_from, vehicle_numbers
 from models.tires import MagicFormula
 from models.vehicle import _OF_CHASSIS, GRAVITY, Vehicle, VehicleError, estimate, sedan
+from tests.refused import line_about
 
 SIX = """mass = 1500
 yaw_inertia = 2500.0
@@ -78,13 +79,8 @@ def test_axle_loads_balance_weight_and_pitch_moment():
     ],
 )
 def test_a_wrong_file_is_one_line_with_file_key_and_rule(tmp_path, text, said):
-    path = written(tmp_path, text)
-    with pytest.raises(VehicleError) as caught:
-        Vehicle.from_toml(path)
-    message = str(caught.value)
-    assert message.startswith(f"{path}: ")
-    assert said in message
-    assert "\n" not in message
+    message = line_about(written(tmp_path, text), VehicleError, Vehicle.from_toml)
+    assert message.startswith(": ") and said in message
 
 
 def test_a_vehicle_comes_back_from_its_file_bit_for_bit(tmp_path, rng):
