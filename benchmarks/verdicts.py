@@ -38,7 +38,7 @@ from benchmarks.random_cars import (
     inertial_drive,
     random_beginning,
 )
-from benchmarks.recorded_cars import CARMAKER, DART, DATA
+from benchmarks.recorded_cars import CARMAKER, DART, DATA, OWN
 from benchmarks.targets import Table, Targets, Values, parse, show
 from identifier.estimate.model import FittedModel
 from identifier.estimate.priors import Priors
@@ -49,7 +49,6 @@ from models.recordings import Recording, Repair, read_recording
 from models.vehicle import Vehicle
 
 EACH, PER_CAR = 60, 5  # answers of each class and of recordings; of one plant car
-OWN_SENSORS = {"r": "r_imu", "ay": "ay_imu", "vx": "vx_encoder"}  # 90 ms late, as they come
 FREE = ("free_10_02_28", "free_10_12_05")
 BY_CAMERA = (
     "free_10_01_01", "rubber_12_37_59", "ramp_steerneg025", "tape_tiles_steer_neg03", *FREE,
@@ -58,7 +57,7 @@ RUNS: tuple[tuple[str, Vehicle, tuple[str, ...], Mapping[str, str]], ...] = (
     ("carmaker.csv.gz", CARMAKER, ("slalom1_14_5ms", "experiment2_40kmh"), {}),
     ("dart.csv.gz", DART, ("ramp_steer02", *FREE), {}),
     ("dart_imu.csv.gz", DART, BY_CAMERA, {}),
-    ("dart_imu.csv.gz", DART, BY_CAMERA, OWN_SENSORS),
+    ("dart_imu.csv.gz", DART, BY_CAMERA, OWN),
 )
 LASTS, DRIVING = (20.0, 40.0), 0.6  # s; share of a part in which the car drives
 
