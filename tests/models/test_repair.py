@@ -19,10 +19,11 @@ from benchmarks.faults import (
     WrongUnit,
 )
 from models.faults import SensorFault
-from models.recordings import Recording, RecordingError, Repair
+from models.recordings import RecordingError, Repair
 from models.recordings.record import CHANNELS
 from models.schema import Table
 from models.vehicle import VehicleError, sedan
+from tests.made import made
 
 CAR = sedan()
 
@@ -35,14 +36,12 @@ def drive():
     def swing(late):
         return np.sin(2.0 * np.pi * 0.4 * (t - late)) * np.sin(0.2 * (t - late))
 
-    return Recording(
-        name="swings",
-        t=t,
+    return made(
+        t,
         v_x=20.0 + 2.0 * np.sin(0.3 * t),
         v_y=0.5 * swing(0.15),
         r=0.3 * swing(0.1),
         delta_f=0.05 * swing(0.0),
-        delta_r=0.0 * t,
         a_y=6.0 * swing(0.1),
         axle_force=np.column_stack([swing(0.0), swing(0.1)]),
     )
