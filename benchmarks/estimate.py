@@ -407,14 +407,10 @@ def judge_ratio(targets: Targets) -> None:
         right = [one.value for one in found[RATIO][0]]
         for ratio in WRONG_RATIOS:
             stiff, valid = found[ratio]
-            covers = all(
-                abs(one.value - value) <= 2.0 * (one.sd or 0.0)
-                for one, value in zip(stiff, right, strict=True)
-            )
-            silent += valid and not covers
+            told = [(one.value, one.sd or 0.0, x) for one, x in zip(stiff, right, strict=True)]
+            silent += valid and any(abs(value - x) > 2.0 * sd for value, sd, x in told)
             words = ", ".join(
-                f"{1e-3 * one.value:.0f} ± {1e-3 * (one.sd or 0.0):.0f} for {1e-3 * value:.0f}"
-                for one, value in zip(stiff, right, strict=True)
+                f"{1e-3 * value:.0f} ± {1e-3 * sd:.0f} for {1e-3 * x:.0f}" for value, sd, x in told
             )
             judged = "valid" if valid else "not valid"
             known = "" if all(one.identified for one in stiff) else ", not known"
