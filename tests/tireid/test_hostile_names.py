@@ -60,7 +60,8 @@ def test_a_name_is_a_comment_in_what_other_tools_read(name, tmp_path):
         model = method.frozen(car, method.setup(car).carry)
         emit(model, tir=tmp_path / "car.tir", overwrite=True)
         lines = (tmp_path / "car_front.tir").read_text(encoding="utf-8").splitlines()
-        assert [line.startswith("$") for line in lines] == [k < 9 for k in range(len(lines))]
+        comments = [line.startswith("$") for line in lines]
+        assert comments == sorted(comments, reverse=True) and 0 < sum(comments) < len(lines)
 
 
 @pytest.mark.sweep("an order to cmake")

@@ -59,7 +59,7 @@ def test_for_skewed_error_dynamics_only_the_lyapunov_direction_is_positive_real(
     assert drift_frequency(A_d=SKEWED, forgetting=3.0, law=law, direction=pair.P) == np.inf
     printed = Loop(A_d=SKEWED, forgetting=3.0, law=law, G=np.eye(2))
     assert np.isfinite(gain_margin(printed).factor)
-    assert gain_margin(replace(printed, direction=pair.P)).factor == np.inf
+    assert gain_margin(printed._replace(direction=pair.P)).factor == np.inf
 
 
 def test_the_law_that_runs_goes_along_p_of_the_lyapunov_equation():
