@@ -39,18 +39,10 @@ def documented_parameters(docstring, *, inner=False):
     return said
 
 
-def fields(node):
-    return [
-        item
-        for item in node.body
-        if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name)
-    ]
-
-
 def is_method(node):
     arguments = [*node.args.posonlyargs, *node.args.args]
-    bound = {ast.unparse(d) for d in node.decorator_list} & {"classmethod"}
-    return bool(arguments) and (arguments[0].arg == "self" or bool(bound))
+    bound = "classmethod" in map(ast.unparse, node.decorator_list)
+    return bool(arguments) and (arguments[0].arg == "self" or bound)
 
 
 def actual_parameters(node):
@@ -59,7 +51,8 @@ def actual_parameters(node):
         for item in node.body:
             if isinstance(item, ast.FunctionDef) and item.name == "__init__":
                 return actual_parameters(item)
-        return {item.target.id: ast.unparse(item.annotation) for item in fields(node)}
+        fields = (item for item in node.body if isinstance(item, ast.AnnAssign))
+        return {item.target.id: ast.unparse(item.annotation) for item in fields}
     arguments = node.args
     listed = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
     extra = [a for a in (arguments.vararg, arguments.kwarg) if a]
