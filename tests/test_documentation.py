@@ -8,9 +8,8 @@ from pathlib import Path
 from types import ModuleType
 
 import tireid as ti
-from tests.sources import tree_of
+from tests.sources import ROOT, texts_of, tree_of
 
-ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 Documented = ast.FunctionDef | ast.ClassDef
@@ -157,10 +156,10 @@ def complaints(source, offered):
 def test_documented_parameters_are_those_of_the_signature():
     offered = interface()
     wrong = [
-        f"{path.relative_to(ROOT)}: {line}"
+        f"{path}: {line}"
         for package in PACKAGES
-        for path in sorted((ROOT / package).rglob("*.py"))
-        for line in complaints(path.read_text(encoding="utf-8"), offered.get(path, set()))
+        for path, text in texts_of(package).items()
+        for line in complaints(text, offered.get(ROOT / path, set()))
     ]
     assert not wrong, "\n".join(wrong)
 

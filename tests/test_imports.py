@@ -3,13 +3,11 @@
 import ast
 import re
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path
 
 import pytest
 
-from tests.sources import nodes_of
+from tests.sources import ROOT, nodes_of, texts_of
 
-ROOT = Path(__file__).resolve().parents[1]
 ORDER = ("codegen", "models", "identifier", "mpc", "tireid")
 PLOTTING_ALLOWED = ("tireid", "examples", "benchmarks")
 
@@ -39,8 +37,8 @@ def wrong_imports(package, source):
 
 @pytest.mark.parametrize("package", ORDER)
 def test_imports_run_one_way(package):
-    for path in (ROOT / package).rglob("*.py"):
-        assert not wrong_imports(package, path.read_text(encoding="utf-8")), path
+    for path, text in texts_of(package).items():
+        assert not wrong_imports(package, text), path
 
 
 def test_the_rule_catches_a_planted_import():
@@ -71,9 +69,7 @@ def circle_of(sources):
 
 @pytest.mark.parametrize("package", ORDER)
 def test_no_files_of_a_package_import_one_another_in_a_circle(package):
-    paths = (ROOT / package).rglob("*.py")
-    texts = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in paths}
-    assert not circle_of(texts)
+    assert not circle_of(texts_of(package))
 
 
 def test_the_rule_catches_planted_circles_of_late_and_of_typed_imports():
@@ -113,11 +109,10 @@ def test_the_rule_catches_a_planted_circle_of_c_files():
 
 
 def test_commands_call_the_interface_and_nothing_calls_the_commands():
-    files = [path for package in (*ORDER, "examples") for path in (ROOT / package).rglob("*.py")]
-    free = [path for path in files if path != ROOT / "tireid/cli.py"]
-    for path in free:
-        if path.parent != ROOT / "tireid/commands":
-            assert not commands_imported(path.read_text(encoding="utf-8")), path
+    for folder in (*ORDER, "examples"):
+        for path, text in texts_of(folder).items():
+            if path != "tireid/cli.py" and path.rpartition("/")[0] != "tireid/commands":
+                assert not commands_imported(text), path
 
 
 def test_the_rule_catches_an_interface_that_calls_a_command():

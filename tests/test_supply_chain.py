@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from models.extras import EXTRAS
+from tests.sources import texts_of
 from tests.test_imports import ORDER, imported
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -58,8 +59,7 @@ def test_project_changelog_and_citation_name_the_same_release():
 
 
 def test_every_package_that_is_imported_is_declared():
-    paths = [path for package in ORDER for path in (ROOT / package).rglob("*.py")]
-    texts = [path.read_text(encoding="utf-8") for path in paths]
+    texts = [text for package in ORDER for text in texts_of(package).values()]
     names = {name.split(".")[0] for text in texts for name in imported(text)}
     declared = {name.replace("-", "_") for name, _ in wanted(PROJECT["optional-dependencies"])}
     declared.add("PIL")  # of pillow
