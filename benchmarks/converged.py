@@ -174,32 +174,34 @@ def solve_converged(
 # The tracker's solver, from a state: x0 (n_x,), curvature [1/m] and speed [m/s] of the stages (N,).
 
 
-def solve(tracker: Tracker, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike) -> Command:
-    """Take one iteration from the plan as it is; the steering is that behind the first stage."""
+def _on_road(tracker: Tracker, kappa: ArrayLike, v_x: ArrayLike) -> Any:
+    """Return its instance, told the road."""
     instance = tracker.instance
     instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
+    return instance
+
+
+def solve(tracker: Tracker, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike) -> Command:
+    """Take one iteration from the plan as it is; the steering is that behind the first stage."""
+    instance = _on_road(tracker, kappa, v_x)
     instance.start[:] = x0
     start = time.perf_counter()
     status = instance.solve()
     return instance.command(float(instance.state["x"][1, 4]), status, time.perf_counter() - start)
 
 
-def prepare_solution(tracker: Tracker, kappa: ArrayLike, v_x: ArrayLike) -> float:
-    """Do ahead of `solve` what does not ask for its state, along the plan as it is; return [s]."""
-    instance = tracker.instance
-    instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
-    start = time.perf_counter()
+def prepare_solution(tracker: Tracker, kappa: ArrayLike, v_x: ArrayLike) -> None:
+    """Do ahead of `solve` what does not ask for its state, along the plan as it is."""
+    instance = _on_road(tracker, kappa, v_x)
     instance.start[:] = instance.state["x"][0]
     instance._library.mpc_prepare_from(*instance.solve_arguments)
-    return time.perf_counter() - start
 
 
 def iterated(
     tracker: Tracker, x0: ArrayLike, kappa: ArrayLike, v_x: ArrayLike, *, most: int = 100
 ) -> Command:
     """Iterate from a guess until the plan stays; its status is that of the last iteration."""
-    instance = tracker.instance
-    instance.input["kappa"][1:], instance.input["v_x"][1:] = kappa, v_x
+    instance = _on_road(tracker, kappa, v_x)
     instance.start[:] = x0
     instance._library.mpc_guess(*instance._step[:2], *instance.solve_arguments[3:])
     for _ in range(most):

@@ -7,7 +7,6 @@ changes lanes or drives a slalom, up to half the grip at least. Everything follo
 import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import count
 
 import numpy as np
 
@@ -16,8 +15,8 @@ from benchmarks.random_cars import (
     Beginning,
     RandomCar,
     RandomDrive,
+    first_good,
     is_good,
-    random_car,
     steering_gradient,
 )
 from codegen.arrays import Array
@@ -131,12 +130,12 @@ def drawn_everyday(kind: str, maneuver: str, seed: int) -> RandomDrive:
     maneuver : one of `KINDS`.
     seed : of the car.
     """
-    for attempt in count():
-        car = random_car(kind, np.random.default_rng([seed, attempt, *kind.encode()]))
+
+    def drive(car: RandomCar, attempt: int) -> RandomDrive:
         rng = np.random.default_rng([seed, attempt, 60, *maneuver.encode()])
-        with suppress(PlantError):
-            return everyday_drive(car, maneuver, rng)
-    raise AssertionError("it counts for ever")
+        return everyday_drive(car, maneuver, rng)
+
+    return first_good(kind, seed, drive)
 
 
 def everyday_log(kind: str, seed: int) -> tuple[Recording, Vehicle, Recording]:

@@ -9,7 +9,6 @@ QEMU that part is left out.
 """
 
 import sys
-from typing import NamedTuple
 
 import numpy as np
 
@@ -36,15 +35,7 @@ MOST = {  # in float on the small processor
 }
 MOST_TIME = 5.0  # us, of a step of the last of `METHODS` on this machine
 TRACKER = "tracker"
-
-
-class Figures(NamedTuple):
-    """What a step costs at most."""
-
-    instructions: int
-    flash_B: int
-    stack_B: int
-    ram_B: int
+FIGURES = ("instructions", "flash_B", "stack_B", "ram_B")  # of the costliest step
 
 
 def on_arm(targets: Targets) -> None:
@@ -66,11 +57,13 @@ def on_arm(targets: Targets) -> None:
     for name, some in costs.items():
         for cost in some:
             run = cost.replay
-            found = Figures(run.most_instructions, cost.flash, run.stack, cost.ram)
+            found = dict(
+                zip(FIGURES, (run.most_instructions, cost.flash, run.stack, cost.ram), strict=True)
+            )
             key = f"arm/{name}/{cost.processor}/{cost.precision}"
             show(key, str(found))
             limits = MOST.get(name, {}) if cost.processor == SMALL and cost.single else {}
-            for what, value in found._asdict().items():
+            for what, value in found.items():
                 targets.record(f"{key}/{what}", value)
                 if what in limits:
                     targets.at_most(f"{name}, {SMALL}, float: {what}", value, limits[what], "")
@@ -86,7 +79,7 @@ def tables(v: Values) -> dict[str, Table]:
     arm = []
     for key in (one for one in v if one.endswith("/instructions")):
         _, name, *where, _ = key.split("/")
-        cost = [int(v[key.replace("instructions", what)]) for what in Figures._fields[1:]]
+        cost = [int(v[key.replace("instructions", what)]) for what in FIGURES[1:]]
         kilo = [f"{1e-3 * value:.1f}" for value in cost]
         arm.append([f"{name}", ", ".join(where), f"{int(v[key]):,}".replace(",", " "), *kilo])
     header = ("exported C", "processor, precision", "instructions of the longest step",

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
+from scipy.signal import lfilter
 
 from codegen.arrays import Array
 from models.faults import channel_of
@@ -23,9 +24,6 @@ from models.vehicle import GRAVITY, Vehicle
 
 # How often a wrong unit fits into the right one: what is logged is the SI value times it.
 UNITS: Mapping[str, float] = {"deg": 180.0 / math.pi, "km/h": 3.6, "g": 1.0 / GRAVITY}
-
-
-_NEGLIGIBLE = 1e-20  # share of an earlier sample of a low pass
 
 
 def low_passed(signal: Array, lag: float, dt: float) -> Array:
@@ -38,14 +36,8 @@ def low_passed(signal: Array, lag: float, dt: float) -> Array:
     keep = math.exp(-dt / lag)
     ramp = (1.0 - keep) * lag / dt  # lag of a straight line, T u_dot
     # y_k = keep y_(k-1) + (1 - keep) u_(k-1) + (1 - ramp) (u_k - u_(k-1)), from y_0 = u_0
-    y = np.array(signal, dtype=np.float64)
-    y[1:] = (ramp - keep) * signal[:-1] + (1.0 - ramp) * signal[1:]
-    # 1/(1 - q) = (1 + q)(1 + q²)(1 + q⁴)...: of a sum over all samples before, by whole arrays
-    behind = 1
-    while behind < y.size and keep > _NEGLIGIBLE:
-        y[behind:] += keep * y[:-behind]  # NumPy reads all of the right side first
-        keep, behind = keep * keep, 2 * behind
-    return y
+    b, a = [1.0 - ramp, ramp - keep], [1.0, -keep]
+    return np.asarray(lfilter(b, a, signal, zi=[ramp * signal[0]])[0])
 
 
 class Fault(Protocol):
@@ -156,21 +148,19 @@ class Held:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Jitter:
-    """Samples that were taken up to some time before their stamp, each by its own time.
+    """Samples that were taken up to some time before their stamp, all channels late together.
 
     size : longest time that a sample is old [s]; uniform from zero.
-    channels : concerned; empty for all, which then are late together.
     """
 
     size: float
-    channels: tuple[str, ...] = ()
     seed: int = 0
 
     def apply(self, recording: Recording) -> Recording:
         """Return the recording with each sample as it was some time ago."""
         t, rng = recording.t, np.random.default_rng(self.seed)
         taken = t - self.size * rng.uniform(size=t.size)
-        return _through(recording, self.channels, lambda good: np.interp(taken, t, good))
+        return _through(recording, (), lambda good: np.interp(taken, t, good))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -19,7 +19,7 @@ from mpc.tires.network import NetworkAxles
 from mpc.tires.tire import ALL, PredictionTire
 
 SPEED = 20.0  # m/s
-STEPS = 300
+STEPS, SUBSTEPS = 300, 10  # of the loop; of the plant in each
 HIDDEN = 10
 INPUTS = ("v_y", "r", "delta_f", "v_x", "alpha_f", "alpha_r")
 GRIP = 0.9  # of the tire that the network was fitted to
@@ -94,13 +94,13 @@ def road() -> Road:
 class Plant:
     """The car that is driven: x (5,) over a step with the steering rate u."""
 
-    def __init__(self, tire: PredictionTire, substeps: int = 10) -> None:
+    def __init__(self, tire: PredictionTire) -> None:
         self.rk4 = build_rk4(tire.structure)
-        self.weights, self.car, self.substeps = weaker(tire).weights, tire.car, substeps
+        self.weights, self.car = weaker(tire).weights, tire.car
 
     def step(self, x: Array, u: float, kappa: float) -> Array:
         """Return the state a step later."""
-        dt = PROBLEM.dt / self.substeps
-        for _ in range(self.substeps):
+        dt = PROBLEM.dt / SUBSTEPS
+        for _ in range(SUBSTEPS):
             x = np.asarray(self.rk4(x, u, kappa, SPEED, dt, self.car, self.weights, *ALL)).ravel()
         return x

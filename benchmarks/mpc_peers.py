@@ -157,13 +157,12 @@ class Ours:
             clock=time.thread_time,
         )
         self.prepared = prepared
-        self.ahead: list[float] = []  # times of what is done ahead of a measurement [s]
 
     def step(self, x0: Array, kappa: Array) -> Answer:
         """Return the plan from a state, on the curvature of the stages."""
         instance = self.tracker.instance
         instance._library.mpc_shift(*instance._step[:2])
         if self.prepared:
-            self.ahead.append(prepare_solution(self.tracker, kappa, SPEED))
+            prepare_solution(self.tracker, kappa, SPEED)
         told = solve(self.tracker, x0, kappa, SPEED)
         return Answer(told.plan_u, told.solve_time_s, told.status != Status.OK)

@@ -5,15 +5,11 @@
 Thread CPU time of the solver call alone; of each step the least of ROUNDS identical drives, which
 take turns: what other programs on the machine cost is in all but that one. Every solver drives its
 own closed loop; the closed-loop cost says that none of them is fast by being wrong. Where a step is
-prepared its time is the latency from the measurement to the command; what was done ahead is
-recorded beside it. The tracker once more with the sensor noise of `tireid drive`. Last the time
-from nothing to the first solution, and at the second start.
+prepared its time is the latency from the measurement to the command. The tracker once more with the
+sensor noise of `tireid drive`.
 """
 
-import os
-import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
@@ -44,17 +40,6 @@ WAYS = {
     "hpipm": "CasADi sqpmethod + HPIPM, 1 iteration",
     "ipopt": "IPOPT, converged",
 }
-FIRST_USE = """
-import time; start = time.perf_counter()
-import numpy as np
-from benchmarks.mpc_double_lane_change import PROBLEM, SPEED, network_fitted_to_curve
-from mpc.realtime import Measurement, Tracker
-tracker = Tracker(network_fitted_to_curve(), PROBLEM)
-still = np.zeros(PROBLEM.horizon + 1)
-status = tracker.step(Measurement(0.1, 0.0, 0.0, 0.0, still, still + SPEED)).status
-assert status == 0, status
-print(time.perf_counter() - start)
-"""
 
 
 class Loop(NamedTuple):
@@ -82,23 +67,6 @@ def drive(solver: Peer, plant: Plant, tire: PredictionTire, seed: int | None = N
         cost += 0.5 * float(q @ y**2 + PROBLEM.cost.R * u**2 + PROBLEM.limits.soft_e_y * over**2)
         x = plant.step(x, u, now[k])
     return Loop(np.array(times), failures, cost)
-
-
-def first_use() -> list[float]:
-    """Return the time from a new process to the first solution [s]: nothing built, then built."""
-    with tempfile.TemporaryDirectory() as cache:
-        environment = {**os.environ, "TIREID_CACHE": cache}
-        answers = [
-            subprocess.run(
-                [sys.executable, "-c", FIRST_USE],
-                env=environment,
-                capture_output=True,
-                text=True,
-                check=True,
-            )
-            for _ in range(2)
-        ]
-    return [float(answer.stdout.split()[-1]) for answer in answers]
 
 
 def tables(v: Values) -> dict[str, Table]:
@@ -144,12 +112,6 @@ def main() -> int:
         targets.record(f"{name}/cost", last[name].cost)
         cells = " ".join(f"{targets.values[f'{name}/{q}']:9.4f}" for q in QUANTILES)
         print(f"{WAYS[name]:40}{cells} ms, {last[name].failures} failed, {last[name].cost:.4f}")
-    ahead = solvers["prepared"]
-    assert isinstance(ahead, Ours)
-    targets.record("prepared/ahead", 1e3 * float(np.median(ahead.ahead)))
-    for name, seconds in zip(("first_use", "second_start"), first_use(), strict=True):
-        targets.record(name, seconds)
-        print(f"{name}: {seconds:.2f} s")
     targets.at_most("steps that failed", last["tireid"].failures, 0, "")
     if not options.quick:
         slow = float(targets.values["noisy/p99"]) / float(targets.values["noisy/median"])

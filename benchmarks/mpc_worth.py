@@ -38,10 +38,8 @@ def judge(key: str, scores: dict[str, list[Score]], targets: Targets) -> None:
     for tires, some in scores.items():
         completed, peak = sum(one.completed for one in some), max(one.peak for one in some)
         targets.record(f"{key}/{tires}/rms", rms[tires])
-        targets.record(f"{key}/{tires}/peak", 100.0 * peak)
         targets.record(f"{key}/{tires}/completed", completed)
         failures = sum(one.failures for one in some)
-        targets.record(f"{key}/{tires}/failures", failures)
         done = f"{completed} of {len(some)} completed, {failures} periods without a plan"
         print(f"{key:24} {tires:8} rms {rms[tires]:7.2f} cm, peak {peak:5.2f} m, {done}")
     best, oracle, linear = (rms[tires] for tires in ("axle", "oracle", "linear"))

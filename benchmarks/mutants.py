@@ -16,11 +16,8 @@ import sys
 import time
 import tomllib
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from datetime import date
-from itertools import repeat
 from pathlib import Path
-from queue import SimpleQueue
 from typing import Any
 
 from benchmarks.mutation.draw import draw, faults_of, strata
@@ -45,20 +42,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     options = _parser().parse_args(argv)
     faults = _drawn(options)
-    if options.list:
-        for fault in faults:
-            print(f"{fault.kind}: {fault.file}\n{fault.diff(ROOT)}")
-        return 0
     options.out.mkdir(parents=True, exist_ok=True)
-    shops = [Workshop(ROOT, options.out / f"worker{k}") for k in range(options.workers)]
+    shop = Workshop(ROOT, options.out / "worker")
     traced = Traced(ROOT, options.out / "trace.json")
     good = True
     if not options.planted_only:
-        _trace(shops[0], traced, options.out)
-        results = _run_all(faults, shops, traced, options)
-        good = _judge(results, traced, shops[0]) >= LEAST
+        _trace(shop, traced, options.out)
+        results = _run_all(faults, shop, traced, options)
+        good = _judge(results, traced, shop) >= LEAST
     if PLANTED.exists() and not options.only:
-        good &= not _replay(shops[0], traced)
+        good &= not _replay(shop, traced)
     return 0 if good else 1
 
 
@@ -66,9 +59,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seed", type=int, default=date.today().toordinal())
     parser.add_argument("--count", type=int, default=COUNT)
-    parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--only", metavar="PATH", help="draw from one file or folder")
-    parser.add_argument("--list", action="store_true", help="print what is drawn, run nothing")
     parser.add_argument("--planted-only", action="store_true", help="tests/planted_faults.toml")
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "mutants")
     return parser
@@ -94,7 +85,7 @@ def _trace(shop: Workshop, traced: Traced, out: Path) -> None:
 
 
 def _run_all(
-    faults: list[Fault], shops: list[Workshop], traced: Traced, options: argparse.Namespace
+    faults: list[Fault], shop: Workshop, traced: Traced, options: argparse.Namespace
 ) -> list[dict[str, Any]]:
     """Return what became of each fault; a run that was interrupted goes on where it was.
 
@@ -102,9 +93,6 @@ def _run_all(
     """
     file = options.out / f"seed_{options.seed}.json"
     kept = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {}
-    free: SimpleQueue[Workshop] = SimpleQueue()
-    for shop in shops:
-        free.put(shop)
     state = traced.state()
 
     def one(fault: Fault, circle: int) -> dict[str, Any]:
@@ -113,11 +101,7 @@ def _run_all(
         known = kept.get(key)
         if known and (known["caught"] or (known["tests"] == state and known["circle"] >= circle)):
             return dict(known)
-        shop = free.get()
-        try:
-            answer, asked = plant(shop, traced, fault, circle)
-        finally:
-            free.put(shop)
+        answer, asked = plant(shop, traced, fault, circle)
         result = {
             "kind": fault.kind,
             "place": f"{fault.file}:{fault.line(source)}",
@@ -130,8 +114,8 @@ def _run_all(
             "tests": state,
         }
         kept[key] = result
-        scratch = file.with_suffix(f".{key}")
-        scratch.write_text(json.dumps(dict(kept), indent=1, ensure_ascii=False), encoding="utf-8")
+        scratch = file.with_suffix(".part")
+        scratch.write_text(json.dumps(kept, indent=1, ensure_ascii=False), encoding="utf-8")
         scratch.replace(file)
         word = f"caught by {answer.by}" if answer.caught else f"NOT CAUGHT by {asked} tests"
         print(f"{answer.seconds:7.1f} s  {fault.kind}, {result['place']}: {word}", flush=True)
@@ -139,10 +123,9 @@ def _run_all(
             print(result["diff"], flush=True)
         return result
 
-    with ThreadPoolExecutor(len(shops)) as pool:
-        for circle in range(CIRCLES):
-            results = list(pool.map(one, faults, repeat(circle)))
-            print(f"circle {circle}: {sum(r['caught'] for r in results)} caught", flush=True)
+    for circle in range(CIRCLES):
+        results = [one(fault, circle) for fault in faults]
+        print(f"circle {circle}: {sum(r['caught'] for r in results)} caught", flush=True)
     return results
 
 

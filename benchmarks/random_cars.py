@@ -346,13 +346,15 @@ class RandomDrive:
         begin, good = self.beginning, self.car.sensors
         shown = good.apply(self.exact, rng)
         if begin.rough > 1.0:
-            rough = _noisier(good, begin.rough).apply(self.exact, rng)
+            names = ("v_x", "v_y", "r")
+            noise = {name: begin.rough * getattr(good, name).noise for name in names}
+            noisier = {name: replace(getattr(good, name), noise=noise[name]) for name in names}
+            rough = replace(good, **noisier).apply(self.exact, rng)
             before = self.exact.t < begin.rest + begin.lead
-            mixed = {
-                name: np.where(before, getattr(rough, name), getattr(shown, name))
-                for name in ("v_x", "v_y", "r")
+            mixed: dict[str, Any] = {
+                name: np.where(before, getattr(rough, name), getattr(shown, name)) for name in names
             }
-            shown = replace(shown, v_x=mixed["v_x"], v_y=mixed["v_y"], r=mixed["r"])
+            shown = replace(shown, **mixed)
         return begin.faults.apply(shown)
 
     def cornering(self, recording: Recording) -> Recording:
@@ -382,24 +384,36 @@ def random_drive(
         Where none of `DRAWS` drives is such.
     """
     begin = beginning if beginning is not None else Beginning()
-    for _ in range(DRAWS):
+
+    def bank(t: Array) -> Array:
+        return np.asarray(begin.bank * np.clip(begin.lead - t, 0.0, 1.0))
+
+    found = _good_run(car, rng, begin, DRAWS, lambda: bank)
+    if found is None:
+        raise PlantError(f"{DRAWS} drives of a {car.kind} did not excite both axles without a spin")
+    run, speed = found
+    exact = _after_rest(run.recording(), begin)
+    return RandomDrive(car=car, beginning=begin, exact=exact, speed=speed)
+
+
+def _good_run(
+    car: RandomCar,
+    rng: np.random.Generator,
+    begin: Beginning,
+    draws: int,
+    bank: Callable[[], Callable[[Array], Array]],
+) -> tuple[PlantRun, float] | None:
+    """A run, and its speed [m/s]; None where none of some draws is good."""
+    for _ in range(draws):
         speed = rng.uniform(2.6, 4.5) * car.vehicle.froude_speed
         maneuver = random_steering(car, speed, begin.lead, rng)
-        if maneuver is None:
-            continue
-        try:
-            run = car.plant.simulate(
-                maneuver,
-                speed=_speed_over_time(begin, speed),
-                bank=lambda t: begin.bank * np.clip(begin.lead - t, 0.0, 1.0),
-                name=f"{car.kind}, {begin.kind}",
-            )
-        except PlantError:
-            continue
-        if is_good(car, run, begin, speed):
-            exact = _after_rest(run.recording(), begin)
-            return RandomDrive(car=car, beginning=begin, exact=exact, speed=speed)
-    raise PlantError(f"{DRAWS} drives of a {car.kind} did not excite both axles without a spin")
+        if maneuver is not None:
+            over_time, name = _speed_over_time(begin, speed), f"{car.kind}, {begin.kind}"
+            with suppress(PlantError):
+                run = car.plant.simulate(maneuver, speed=over_time, bank=bank(), name=name)
+                if is_good(car, run, begin, speed):
+                    return run, speed
+    return None
 
 
 def steering_gradient(car: Vehicle, speed: float) -> float | None:
@@ -490,16 +504,6 @@ def _after_rest(recording: Recording, begin: Beginning) -> Recording:
     )
 
 
-def _noisier(sensors: Sensors, times: float) -> Sensors:
-    """Sensors of velocity and yaw rate with that many times the noise."""
-    return replace(
-        sensors,
-        v_x=replace(sensors.v_x, noise=times * sensors.v_x.noise),
-        v_y=replace(sensors.v_y, noise=times * sensors.v_y.noise),
-        r=replace(sensors.r, noise=times * sensors.r.noise),
-    )
-
-
 MakeBeginning = Callable[[Vehicle, np.random.Generator], Beginning]
 
 
@@ -515,12 +519,28 @@ def drawn(
     beginning : makes one from car and generator; None is a straight road.
     number : of the drive, each another.
     """
-    for attempt in count():
-        car = random_car(kind, np.random.default_rng([seed, attempt, *kind.encode()]))
+
+    def drive(car: RandomCar, attempt: int) -> RandomDrive:
         rng = np.random.default_rng([seed, attempt, number, *kind.encode()])
         begin = None if beginning is None else beginning(car.vehicle, rng)
+        return random_drive(car, rng, begin)
+
+    return first_good(kind, seed, drive)
+
+
+def first_good(kind: str, seed: int, drive: Callable[[RandomCar, int], RandomDrive]) -> RandomDrive:
+    """Return the drive of the first car of a seed that has a good one.
+
+    Parameters
+    ----------
+    kind : class of the car.
+    seed : of the car.
+    drive : of a car, and how many were drawn before.
+    """
+    for attempt in count():
+        car = random_car(kind, np.random.default_rng([seed, attempt, *kind.encode()]))
         with suppress(PlantError):
-            return random_drive(car, rng, begin)
+            return drive(car, attempt)
     raise AssertionError("it counts for ever")
 
 
@@ -586,22 +606,13 @@ def inertial_drive(kind: str, seed: int) -> InertialDrive:
 
 
 def _inertial(car: RandomCar, rng: np.random.Generator) -> InertialDrive | None:
-    vehicle, begin = car.vehicle, Beginning(lead=LEAD)
-    for _ in range(INERTIAL_DRAWS):
-        speed = rng.uniform(2.6, 4.5) * vehicle.froude_speed
-        maneuver = random_steering(car, speed, begin.lead, rng)
-        if maneuver is None:
-            continue
-        bank = random_bank(rng, LEAD + DRIVEN)
-        try:
-            run = car.plant.simulate(maneuver, speed=speed, bank=bank, name=car.kind)
-        except PlantError:
-            continue
-        if is_good(car, run, begin, speed):
-            break
-    else:
+    found = _good_run(
+        car, rng, Beginning(), INERTIAL_DRAWS, lambda: random_bank(rng, LEAD + DRIVEN)
+    )
+    if found is None:
         return None
-    exact, L = run.recording(), vehicle.wheelbase
+    run, _ = found
+    exact, L = run.recording(), car.vehicle.wheelbase
     size = math.sqrt(L / 2.7)
     t, n = exact.t, len(exact)
     x, y = rng.uniform(-0.15, 0.15) * L, rng.uniform(-0.05, 0.05) * L

@@ -13,15 +13,16 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from benchmarks.targets import Table, Targets, Values, parse, without
+from benchmarks.targets import Table, Targets, Values, parse
 from identifier.methods import make_method
 from identifier.paper.design import VARIANTS
 from identifier.reproducibility import AxleRmse, force_rms, online_error, replay
 from identifier.run import identify
-from models.recordings import Recording, read_recording
+from models.recordings import Recording, read_recording, runs
 from models.vehicle import Vehicle
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -74,34 +75,22 @@ TASKS = {
 }
 
 
-OWN = ("vx_encoder", "r_imu", "ay_imu")  # sensors of the 1:10 car
+OWN = {"r": "r_imu", "ay": "ay_imu", "vx": "vx_encoder"}  # of the 1:10 car, as they come
 LATE = 6  # samples by which their fresh numbers are late
 
 
 def own_sensors() -> dict[str, tuple[Recording, Recording]]:
     """Return what the 1:10 car's own sensors and Vicon show of each run, by its name."""
-    table = np.genfromtxt(
-        DATA / "dart_imu.csv.gz", delimiter=",", names=True, dtype=None, encoding="utf-8"
-    )
-    found = {}
-    for name in dict.fromkeys(table["run"]):
-        run = table[table["run"] == name]
-        late = {key: np.append(run[key][LATE:], np.full(LATE, run[key][-1])) for key in OWN}
-        vicon = Recording(
-            name=str(name),
-            t=run["t"] - run["t"][0],
-            v_x=run["vx"],
-            v_y=run["vy"],
-            r=run["r"],
-            delta_f=run["delta_f"],
-            delta_r=np.zeros(len(run)),
-            a_y=run["ay"],
-            axle_force=np.column_stack((run["Fyf_inv"], run["Fyr_inv"])),
+    path, found = DATA / "dart_imu.csv.gz", {}
+    for run in runs(path):
+        own, vicon = (
+            read_recording(path, run=run, columns=columns, check=False) for columns in (OWN, {})
         )
-        own = replace(
-            vicon, v_x=late["vx_encoder"], r=late["r_imu"], a_y=late["ay_imu"], axle_force=None
-        )
-        found[str(name)] = (own, vicon)
+        late: dict[str, Any] = {
+            name: np.append(signal[LATE:], np.full(LATE, signal[-1]))
+            for name, signal in (("v_x", own.v_x), ("r", own.r), ("a_y", own.needed("a_y")))
+        }
+        found[run] = replace(vicon, **late, axle_force=None), vicon
     return found
 
 
@@ -159,7 +148,8 @@ def main() -> int:
     """Print medians over the seeds, front / rear."""
     targets, options = Targets("recorded_cars"), parse("recorded_cars", __doc__)
     if not DATA.is_dir():
-        without(f"the recordings are not there: {DATA} (set TIREID_DATA)")
+        print(f"skipped: the recordings are not there: {DATA} (set TIREID_DATA)")
+        return 0
     seeds = range(1 if options.quick else SEEDS)
     with ProcessPoolExecutor() as pool:
         for task, law in product(TASKS, VARIANTS):

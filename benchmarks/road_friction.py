@@ -178,8 +178,6 @@ def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
             off = [abs(one.told / one.ratio - 1.0) for one in slid if not math.isnan(one.told)]
             soon = 100.0 * float(np.mean(after <= SOON))
             targets.at_least(f"{way}: told within 1 s", soon, 90.0, key=f"{way}/drop/soon")
-            targets.record(f"{way}/drop/after", float(np.median(after)))
-            targets.record(f"{way}/drop/off", 100.0 * float(np.median(off)))
             print(f"  median {np.median(after):.2f} s, size off by {100.0 * np.median(off):.1f} %")
 
 

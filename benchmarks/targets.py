@@ -9,7 +9,6 @@ an exit code of 1.
 import argparse
 import json
 import platform
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -137,9 +136,3 @@ def parse(script: str, doc: str | None, parts: Sequence[str] = ()) -> argparse.N
 def show(label: str, text: str) -> None:
     """Print a value that has no target of its own."""
     print(f"  {label:66} {text}", flush=True)
-
-
-def without(what: str) -> None:
-    """End a benchmark that needs what is not there, and has nothing to judge then."""
-    print(f"skipped: {what}")
-    sys.exit(0)

@@ -21,7 +21,7 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import cache, partial
 from operator import methodcaller
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,7 @@ import tireid as ti
 from benchmarks.answers import RIGHT, WRONG, Answer, answer, blind, force_error
 from benchmarks.estimate import PLACES, of_random_cars
 from benchmarks.fault_cases import Case, random_case
+from benchmarks.faults import Late, SwappedAxles, WrongNumber
 from benchmarks.random_cars import (
     BEGINNINGS,
     CLASSES,
@@ -37,30 +38,26 @@ from benchmarks.random_cars import (
     inertial_drive,
     random_beginning,
 )
-from benchmarks.recorded_cars import CARMAKER, DART, DATA
+from benchmarks.recorded_cars import CARMAKER, DART, DATA, OWN
 from benchmarks.targets import Table, Targets, Values, parse, show
 from identifier.estimate.model import FittedModel
 from identifier.estimate.priors import Priors
 from identifier.motion.parameters import INDEX, curve_index
 from identifier.tire_model import TireModel
+from models.faults import SensorFault
 from models.recordings import Recording, Repair, read_recording
 from models.vehicle import Vehicle
 
 EACH, PER_CAR = 60, 5  # answers of each class and of recordings; of one plant car
-OWN_SENSORS = {"r": "r_imu", "ay": "ay_imu", "vx": "vx_encoder"}  # 90 ms late, as they come
 FREE = ("free_10_02_28", "free_10_12_05")
 BY_CAMERA = (
-    "free_10_01_01",
-    "rubber_12_37_59",
-    "ramp_steerneg025",
-    "tape_tiles_steer_neg03",
-    *FREE,
-)
+    "free_10_01_01", "rubber_12_37_59", "ramp_steerneg025", "tape_tiles_steer_neg03", *FREE,
+)  # fmt: skip
 RUNS: tuple[tuple[str, Vehicle, tuple[str, ...], Mapping[str, str]], ...] = (
     ("carmaker.csv.gz", CARMAKER, ("slalom1_14_5ms", "experiment2_40kmh"), {}),
     ("dart.csv.gz", DART, ("ramp_steer02", *FREE), {}),
     ("dart_imu.csv.gz", DART, BY_CAMERA, {}),
-    ("dart_imu.csv.gz", DART, BY_CAMERA, OWN_SENSORS),
+    ("dart_imu.csv.gz", DART, BY_CAMERA, OWN),
 )
 LASTS, DRIVING = (20.0, 40.0), 0.6  # s; share of a part in which the car drives
 
@@ -157,31 +154,22 @@ def recorded_answer(seed: int) -> Judged:
     return Judged("recordings", seed, f"{recording.name}: {case}", result)
 
 
-def faulty(
-    log: Recording, car: Vehicle, fault: str, rng: np.random.Generator
-) -> tuple[Recording, Vehicle]:
-    """Return a log and its car with a fault of a size that is drawn.
+def blind_fault(fault: str, rng: np.random.Generator) -> Case:
+    """Return a fault of a size that is drawn.
 
     Parameters
     ----------
-    log : without.
-    car : as it was declared.
     fault : one of `FAULTS`, or empty.
     rng : source of the size.
     """
     channel, _, what = fault.partition(" ")
     if what == "scaled":
-        changed: dict[str, Any] = {channel: rng.choice(SCALES) * getattr(log, channel)}
-        return replace(log, **changed), car
+        return Case(SensorFault(channel=channel, kind="scaled", size=rng.choice(SCALES)))
     if what == "late":
-        signal, k = getattr(log, channel), round(rng.choice(LATE) / log.dt)
-        changed = {channel: np.append(np.full(k, signal[0]), signal[:-k])}
-        return replace(log, **changed), car
+        return Case(Late(channels=(channel,), delay=rng.choice(LATE)))
     if fault == "yaw inertia":
-        return log, replace(car, yaw_inertia=rng.choice(INERTIA) * car.yaw_inertia)
-    if fault:
-        return log, replace(car, l_f=car.l_r, l_r=car.l_f)
-    return log, car
+        return Case(told=WrongNumber(field="yaw_inertia", factor=rng.choice(INERTIA)))
+    return Case(told=SwappedAxles()) if fault else Case()
 
 
 def blind_answers(job: tuple[str, int]) -> list[Judged]:
@@ -197,7 +185,8 @@ def blind_answers(job: tuple[str, int]) -> list[Judged]:
     own, car = Repair(acceleration_sensor_x=drive.position[0]).apply(own, drive.told)
     found = []
     for fault in ("", str(rng.choice(FAULTS))):
-        log, known = faulty(own, car, fault, rng)
+        case = blind_fault(fault, rng)
+        log, known = case.log(own), case.car(car)
         end = float(log.t[0]) + SHARE * log.duration
         run = ti.identify(log.between(log.t[0], end), known, check=False)
         error = force_error(run.freeze(), log.between(end, log.t[-1]))

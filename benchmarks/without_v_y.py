@@ -14,8 +14,9 @@ recording.
 import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,8 +59,7 @@ def rivals() -> tuple[str, ...]:
     return tuple(name for name in installed if "v_y" not in make_method(name, CARMAKER).needs)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Told:
+class Told(NamedTuple):
     """How well a method told side slip, and what its frozen tires miss.
 
     Parameters
@@ -151,15 +151,9 @@ def record(targets: Targets, key: str, found: Mapping[str, Told]) -> None:
         within = "" if one.within is None else f"{one.within:5.0f} % within two sigma"
         force = "" if one.force is None else f"force {one.force:5.1f} %"
         print(f"  {key:28} {name:10} {one.rms:7.3f} deg {one.share:6.2f}  {within:24} {force}")
-        targets.record(f"{key}/{name}/rms", one.rms)
-        targets.record(f"{key}/{name}/share", one.share)
-        if one.within is not None:
-            targets.record(f"{key}/{name}/within", one.within)
-        if one.force is not None:
-            targets.record(f"{key}/{name}/force", one.force)
-    if OWN in found:
-        best = min(one.rms for name, one in found.items() if name != OWN)
-        targets.record(f"{key}/over_best", found[OWN].rms / best)
+        for what, value in one._asdict().items():
+            if value is not None:
+                targets.record(f"{key}/{name}/{what}", value)
 
 
 def median(found: Sequence[Told]) -> Told:
@@ -288,7 +282,7 @@ def held(targets: Targets) -> None:
             model = taught.freeze()
             method = continuing(model, car, log.dt, v_y=False)
             found = judged(identify(blind, car, method, model), log, slowest)
-            record(targets, key, {of: replace(found, force=None)})
+            record(targets, key, {of: found._replace(force=None)})
             within.append(found.within or 0.0)
             if of == "itself":
                 own = judged(taught.history, log, slowest)

@@ -2,6 +2,7 @@
 
 import gc
 import os
+import sys
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import hypothesis
 import numpy as np
 import pytest
 
+from codegen import plugins
 from tests.optional_tools import listen, unlisted
 
 # The same examples in every run: no outcome hangs on one draw.
@@ -68,6 +70,28 @@ def shared_data():
 @pytest.fixture
 def rng():
     return np.random.default_rng(20260101)
+
+
+@pytest.fixture
+def distribution(tmp_path, monkeypatch):
+    """A function that puts a distribution beside tireid, as pip would write it."""
+    put = []
+
+    def installed(points, **modules):
+        folder = tmp_path / "theirs-1.0.dist-info"
+        folder.mkdir()
+        (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
+        (folder / "entry_points.txt").write_text(points)
+        for name, text in modules.items():
+            (tmp_path / f"{name}.py").write_text(text)
+        monkeypatch.syspath_prepend(str(tmp_path))
+        plugins.installed.cache_clear()
+        put.extend(modules)
+
+    yield installed
+    plugins.installed.cache_clear()
+    for name in put:
+        sys.modules.pop(name, None)
 
 
 # What takes longest in a command is to draw its figures; who reads files and words need not wait.

@@ -13,10 +13,10 @@ from tests.c_reference.write import FOLDER, reference
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = (
-    *("codegen/target", "identifier/export/c", "identifier/export/c_fmu"),
-    *("identifier/export/target", "mpc/c", "mpc/export/c", "mpc/export/pair", "mpc/export/target"),
-    *("tests/identifier/export", "tests/mpc/export"),
-)
+    "codegen/target", "identifier/export/c", "identifier/export/c_fmu", "identifier/export/target",
+    "mpc/c", "mpc/export/c", "mpc/export/pair", "mpc/export/target", "tests/identifier/export",
+    "tests/mpc/export",
+)  # fmt: skip
 ARM = "codegen/target/board.c"  # for a compiler of its own
 HERE = [
     str(path.relative_to(ROOT))

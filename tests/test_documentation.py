@@ -8,9 +8,8 @@ from pathlib import Path
 from types import ModuleType
 
 import tireid as ti
-from tests.sources import tree_of
+from tests.sources import ROOT, texts_of, tree_of
 
-ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 Documented = ast.FunctionDef | ast.ClassDef
@@ -39,18 +38,10 @@ def documented_parameters(docstring, *, inner=False):
     return said
 
 
-def fields(node):
-    return [
-        item
-        for item in node.body
-        if isinstance(item, ast.AnnAssign) and isinstance(item.target, ast.Name)
-    ]
-
-
 def is_method(node):
     arguments = [*node.args.posonlyargs, *node.args.args]
-    bound = {ast.unparse(d) for d in node.decorator_list} & {"classmethod"}
-    return bool(arguments) and (arguments[0].arg == "self" or bool(bound))
+    bound = "classmethod" in map(ast.unparse, node.decorator_list)
+    return bool(arguments) and (arguments[0].arg == "self" or bound)
 
 
 def actual_parameters(node):
@@ -59,7 +50,8 @@ def actual_parameters(node):
         for item in node.body:
             if isinstance(item, ast.FunctionDef) and item.name == "__init__":
                 return actual_parameters(item)
-        return {item.target.id: ast.unparse(item.annotation) for item in fields(node)}
+        fields = (item for item in node.body if isinstance(item, ast.AnnAssign))
+        return {item.target.id: ast.unparse(item.annotation) for item in fields}
     arguments = node.args
     listed = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
     extra = [a for a in (arguments.vararg, arguments.kwarg) if a]
@@ -164,10 +156,10 @@ def complaints(source, offered):
 def test_documented_parameters_are_those_of_the_signature():
     offered = interface()
     wrong = [
-        f"{path.relative_to(ROOT)}: {line}"
+        f"{path}: {line}"
         for package in PACKAGES
-        for path in sorted((ROOT / package).rglob("*.py"))
-        for line in complaints(path.read_text(encoding="utf-8"), offered.get(path, set()))
+        for path, text in texts_of(package).items()
+        for line in complaints(text, offered.get(ROOT / path, set()))
     ]
     assert not wrong, "\n".join(wrong)
 

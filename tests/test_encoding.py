@@ -1,13 +1,11 @@
 """Text is read and written in UTF-8, whatever the machine prefers."""
 
 import ast
-from pathlib import Path
 
 import pytest
 
-from tests.sources import nodes_of
+from tests.sources import nodes_of, texts_of
 
-ROOT = Path(__file__).resolve().parents[1]
 PLACES = ("codegen", "models", "identifier", "mpc", "tireid", "examples", "benchmarks")
 
 
@@ -38,8 +36,8 @@ def _is_text(call):
 
 @pytest.mark.parametrize("place", PLACES)
 def test_no_text_is_in_the_encoding_of_the_machine(place):
-    for path in (ROOT / place).rglob("*.py"):
-        assert without_encoding(path.read_text(encoding="utf-8")) == [], path
+    for path, text in texts_of(place).items():
+        assert without_encoding(text) == [], path
 
 
 def test_the_rule_catches_what_leaves_it_to_the_machine():

@@ -1,6 +1,5 @@
 """What is installed is what the lock lists, and the parts list says so."""
 
-import ast
 import json
 import re
 import runpy
@@ -12,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from models.extras import EXTRAS
-from tests.sources import nodes_of
+from tests.sources import texts_of
+from tests.test_imports import ORDER, imported
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -59,21 +59,14 @@ def test_project_changelog_and_citation_name_the_same_release():
 
 
 def test_every_package_that_is_imported_is_declared():
-    imported = set()
-    for package in ("codegen", "models", "identifier", "mpc", "tireid"):
-        for path in (ROOT / package).rglob("*.py"):
-            for node in nodes_of(path.read_text(encoding="utf-8")):
-                if isinstance(node, ast.Import):
-                    imported |= {name.name.split(".")[0] for name in node.names}
-                elif isinstance(node, ast.ImportFrom) and node.module:
-                    imported.add(node.module.split(".")[0])
+    texts = [text for package in ORDER for text in texts_of(package).values()]
+    names = {name.split(".")[0] for text in texts for name in imported(text)}
     declared = {name.replace("-", "_") for name, _ in wanted(PROJECT["optional-dependencies"])}
     declared.add("PIL")  # of pillow
     assert "pillow" in declared
     known = set(sys.stdlib_module_names) | declared
-    own = {"codegen", "models", "identifier", "mpc", "tireid"}
-    assert {"casadi", "scipy"} <= imported
-    assert imported - known - own == set()
+    assert {"casadi", "scipy"} <= names
+    assert names - known - {*ORDER} == set()
 
 
 def test_the_parts_list_holds_the_lock():

@@ -20,7 +20,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from benchmarks.fuzz.cases import draw
-from benchmarks.fuzz.doors import DOORS, Door
+from benchmarks.fuzz.doors import DOORS
 from benchmarks.fuzz.session import Outcome, Session, everything
 
 CASES, SEED = 20_000, 2026
@@ -41,7 +41,6 @@ def parse(words: Sequence[str] | None = None) -> argparse.Namespace:
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--case", type=int, help="this one alone, whose folder is kept")
     parser.add_argument("--minutes", type=float, help="of cases, then end wherever it is")
-    parser.add_argument("--door", help="doors whose name holds this")
     parser.add_argument("--out", type=Path, default=Path("out/fuzz"))
     return parser.parse_args(words)
 
@@ -54,23 +53,19 @@ def main(words: Sequence[str] | None = None) -> int:
     words : of the command; None takes those of the process.
     """
     options = parse(words)
-    doors = [door for door in DOORS if options.door is None or options.door in door.name]
-    session = Session.begin(options.out.resolve(), doors)
+    session = Session.begin(options.out.resolve(), DOORS)
     if options.case is not None:
-        outcome = session.run(draw(options.seed, options.case, doors), keep=True)
+        outcome = session.run(draw(options.seed, options.case), keep=True)
         print(json.dumps(outcome._asdict(), indent=1, ensure_ascii=False, default=list))
         return 1 if outcome.findings else 0
     print(f"warm after {session.seconds():.0f} s", flush=True)
-    outcomes = list(_progress(options, session, doors))
-    found = session.keep_smallest(outcomes, doors)
-    return _report(outcomes, found, doors)
+    outcomes = list(_progress(options, session))
+    return _report(outcomes, session.keep_smallest(outcomes))
 
 
-def _progress(
-    options: argparse.Namespace, session: Session, doors: list[Door]
-) -> Iterator[Outcome]:
+def _progress(options: argparse.Namespace, session: Session) -> Iterator[Outcome]:
     began, seen = session.seconds(), set()
-    cases = [draw(options.seed, number, doors) for number in range(options.cases)]
+    cases = [draw(options.seed, number) for number in range(options.cases)]
     for count, outcome in enumerate(everything(session, cases, options.workers), 1):
         for finding in outcome.findings:
             if finding.key not in seen:
@@ -91,11 +86,11 @@ def _progress(
             return
 
 
-def _report(outcomes: list[Outcome], found: dict[tuple[str, str], Path], doors: list[Door]) -> int:
+def _report(outcomes: list[Outcome], found: dict[tuple[str, str], Path]) -> int:
     """Print what ended how by door, and what was found by kind; return the exit code."""
     heads = ("cases", "exit 0", "exit 1", "exit 2", "other", "found", "s each")
     print("\n" + f"{'door':28}" + "".join(f"{head:>8}" for head in heads))
-    for door in doors:
+    for door in DOORS:
         own = [outcome for outcome in outcomes if outcome.door == door.name]
         codes = Counter(outcome.code for outcome in own)
         known = codes[0], codes[1], codes[2]
@@ -107,7 +102,7 @@ def _report(outcomes: list[Outcome], found: dict[tuple[str, str], Path], doors: 
         print(f"{kind}: {place}: {folder}")
     kinds = Counter(finding.kind for outcome in outcomes for finding in outcome.findings)
     said = ", ".join(f"{count} of {kind}" for kind, count in kinds.items())
-    print(f"{len(outcomes)} cases at {len(doors)} doors: found {said or 'nothing'}")
+    print(f"{len(outcomes)} cases at {len(DOORS)} doors: found {said or 'nothing'}")
     return 1 if kinds else 0
 
 

@@ -26,10 +26,6 @@ JUDGES = ("identify", "predict", "compare")  # commands that say by exit code 3 
 DEAD = 0.02  # of the stiffness of the linear tire
 LONGEST_LINE = 1000  # letters that say what is wrong
 OURS = ("out/summary.json", "out/deep/old.csv", "out/.tireid")  # of an earlier run: may be replaced
-KINDS = (
-    *("traceback", "hang", "crash", "exit code", "not finite", "dead axle", "cannot be read back"),
-    *("user file lost", "left behind", "written and failed", "control character", "not one line"),
-)
 
 
 class Finding(NamedTuple):

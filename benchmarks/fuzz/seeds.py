@@ -1,8 +1,7 @@
 """What is mutated: small files that are right, of every format, written by the program itself."""
 
-import json
 from collections.abc import Collection, Mapping
-from dataclasses import fields
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,6 @@ from models.vehicle import Vehicle, sedan
 
 DATA = Path(__file__).resolve().parents[2] / "models" / "data"
 SPEED, DURATION = 20.0, 6.0  # m/s and s
-FRONT = ("name", "mass", "yaw_inertia", "l_f", "l_r")  # of a vehicle file without a chassis
 FROZEN = {  # file of weights, and the method that learnt it
     "axle.json": "axle",
     "fit.json": "fit",
@@ -45,7 +43,7 @@ def write_seeds(folder: Path, needed: Collection[str]) -> Mapping[str, bytes]:
         write_recording(recording, folder / name)
     for name in ("sedan.toml", "sedan.tir"):
         (folder / name).write_bytes((DATA / name).read_bytes())
-    (folder / "car.toml").write_text(_plain_car(car), encoding="utf-8")
+    replace(car, chassis=None).to_toml(folder / "car.toml")
     for name, law in DESIGNS.items():
         (folder / name).write_text(
             design_text(PaperIdentifier.for_vehicle(car, law=law)), encoding="utf-8"
@@ -131,12 +129,6 @@ def _write_logger(recording: Recording, path: Path) -> None:
     lines = ["Fahrzeug;Limousine", ";".join(name for name, _ in columns)]
     lines += [";".join(unit for _, unit in columns), *(";".join(row) for row in cells)]
     path.write_text("\n".join(lines) + "\n", encoding="cp1252")
-
-
-def _plain_car(car: Vehicle) -> str:
-    lines = [f"{name} = {json.dumps(getattr(car, name))}" for name in FRONT]
-    stiffness = [field.name for field in fields(car) if field.name.startswith("cornering")]
-    return "\n".join([*lines, *(f"{name} = {getattr(car, name)!r}" for name in stiffness)]) + "\n"
 
 
 def _write_path(path: Path) -> None:

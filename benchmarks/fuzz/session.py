@@ -131,15 +131,12 @@ class Session(NamedTuple):
             case.number, case.seed, case.door.name, ended.code, found, words, ended.cpu, said
         )
 
-    def keep_smallest(
-        self, outcomes: Sequence[Outcome], doors: Sequence[Door]
-    ) -> dict[tuple[str, str], Path]:
+    def keep_smallest(self, outcomes: Sequence[Outcome]) -> dict[tuple[str, str], Path]:
         """Keep the smallest case of each finding; return the folders by finding.
 
         Parameters
         ----------
         outcomes : of all cases.
-        doors : that they were drawn from.
         """
         first: dict[tuple[str, str], Outcome] = {}
         for outcome in sorted(outcomes, key=lambda one: one.cpu):
@@ -148,7 +145,7 @@ class Session(NamedTuple):
         kept = {}
         clear(self.place / "found")
         for number, (key, outcome) in enumerate(sorted(first.items(), key=lambda item: item[0])):
-            case = self._smaller(draw(outcome.seed, outcome.number, doors), key)
+            case = self._smaller(draw(outcome.seed, outcome.number), key)
             again = self.run(case, keep=True)
             folder = self.place / "found" / f"{number:03}"
             shutil.copytree(self.place / "case", folder, symlinks=True, ignore=_pipes)
@@ -195,9 +192,6 @@ def everything(session: Session, cases: Sequence[Case], workers: int) -> Iterato
     cases : to run.
     workers : processes.
     """
-    if workers == 1:
-        yield from map(session.run, cases)
-        return
     with ProcessPoolExecutor(workers, mp_context=get_context("fork")) as pool:
         yield from pool.map(partial(_run, session), cases, chunksize=CHUNK)
 

@@ -19,98 +19,22 @@ FEW = (
 )  # more of them is more work, as asked
 PLACES = ("--out", "init", "sample")  # what follows is written
 OUTS = (
-    *(
-        "out",
-        "out/deep/er",
-        "notes.txt",
-        "data",
-        "log.csv",
-        ".",
-        "..",
-        "/",
-        "~",
-        "",
-        " ",
-        "-",
-        "a\nb",
-    ),
-    *(
-        "\x1b[31mout",
-        "x" * 300,
-        "o/" * 500,
-        "/dev/null",
-        "/dev/full",
-        "/proc/none/out",
-        "é—🚗",
-        "link",
-    ),
-)
+    "out", "out/deep/er", "notes.txt", "data", "log.csv", ".", "..", "/", "~", "", " ", "-",
+    "a\nb", "\x1b[31mout", "x" * 300, "o/" * 500, "/dev/null", "/dev/full", "/proc/none/out",
+    "é—🚗", "link",
+)  # fmt: skip
 MORE = (
-    *(
-        "--force",
-        "--debug",
-        "--help",
-        "--version",
-        "--no-check",
-        "--paper",
-        "--json",
-        "--fmu",
-        "--no-noise",
-    ),
-    *(
-        "--freeze nan",
-        "--freeze 1e308 -5",
-        "--replay log.csv",
-        "--replay :::",
-        "--columns x",
-    ),
-    *(
-        "--columns r=vy vy=r",
-        "--columns t=vx",
-        "--method linear",
-        "--method none",
-        "--seed -1",
-    ),
-    *(
-        "--weights axle.json",
-        "--design integral.toml",
-        "--speed 1e999%",
-    ),
-    *(
-        "--area 1e999 3",
-        "--area x",
-        "--steering-ratio 0",
-        "--speed 0.9",
-        "--mu nan",
-        "--mu-drop 1e308:1",
-        "--mu-drop ::",
-        "--fault v_y:biased:0:inf:1e308",
-        "--fault r:lost:nan:1",
-    ),
-    *(
-        "--fault all:noisy:0:1:inf",
-        "--delay 1e9",
-        "--bandwidth 1e-300",
-        "--slip 1e-300",
-        "--friction 1e300",
-    ),
-    *(
-        "--noise-v-y 1e300",
-        "--speed 1e-300",
-        "--phase-margin 89.999",
-        "--phase-margin 180",
-        "--name class",
-        "--name 9",
-    ),
-    *(
-        "--name -",
-        "--out",
-        "--tires all linear",
-        "--tires",
-        "--film gif",
-        "--scheduler tcp://[",
-    ),
-)
+    "--force", "--debug", "--help", "--version", "--no-check", "--paper", "--json", "--fmu",
+    "--no-noise", "--freeze nan", "--freeze 1e308 -5", "--replay log.csv", "--replay :::",
+    "--columns x", "--columns r=vy vy=r", "--columns t=vx", "--method linear", "--method none",
+    "--seed -1", "--weights axle.json", "--design integral.toml", "--speed 1e999%",
+    "--area 1e999 3", "--area x", "--steering-ratio 0", "--speed 0.9", "--mu nan",
+    "--mu-drop 1e308:1", "--mu-drop ::", "--fault v_y:biased:0:inf:1e308", "--fault r:lost:nan:1",
+    "--fault all:noisy:0:1:inf", "--delay 1e9", "--bandwidth 1e-300", "--slip 1e-300",
+    "--friction 1e300", "--noise-v-y 1e300", "--speed 1e-300", "--phase-margin 89.999",
+    "--phase-margin 180", "--name class", "--name 9", "--name -", "--out", "--tires all linear",
+    "--tires", "--film gif", "--scheduler tcp://[",
+)  # fmt: skip
 
 
 def words_mutated(rng: random.Random, words: list[str]) -> list[str]:

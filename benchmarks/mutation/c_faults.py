@@ -6,6 +6,7 @@ fault that leaves the sequence of tokens as it was is none.
 
 import re
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from typing import NamedTuple
 
 from benchmarks.mutation.faults import Fault
@@ -37,6 +38,7 @@ SIGNS = {
 BINARY = {"+": "-", "-": "+", "*": "/", "/": "*"}
 CALLS = {"fmin": "fmax", "fmax": "fmin", "sin": "cos", "cos": "sin", "floor": "ceil"}
 CALLS |= {"SQRT": "", "FABS": "", "fabs": "", "sqrt": "", "break": "continue"}
+TRUTH = {"true": "false", "false": "true"}
 JUMPS = {"return", "goto", "typedef", "extern", "static", "const", "else", "struct", "case"}
 
 
@@ -139,23 +141,20 @@ def _numbers(read: list[Token]) -> Iterator[Change]:
 def _words(names: set[str]) -> Callable[[list[Token]], Iterator[Change]]:
     def rule(read: list[Token]) -> Iterator[Change]:
         """Call something near; take the other axle's; turn a truth."""
-        for token in read:
-            if token.kind != "word":
-                continue
+        for token in (token for token in read if token.kind == "word"):
             other = AXLES.sub(lambda found: OTHER_AXLE[found.group()], token.text)
             if other != token.text and other in names:
                 yield "front and rear", token.start, token.end, other
             if token.text in CALLS:
                 yield "near function", token.start, token.end, CALLS[token.text]
-            if token.text in ("true", "false"):
-                new = "false" if token.text == "true" else "true"
-                yield "truth", token.start, token.end, new
+            if token.text in TRUTH:
+                yield "truth", token.start, token.end, TRUTH[token.text]
 
     return rule
 
 
 def _statements(read: list[Token]) -> Iterator[Change]:
-    """Forget an assignment or a call, take one side of `?` always, drop a factor or term."""
+    """Forget an assignment or a call."""
     begin = 0
     for k, token in enumerate(read):
         if token.text in ("{", "}") or (token.text == ")" and _ends_head(read, k)):
@@ -182,14 +181,13 @@ def _is_action(statement: list[Token]) -> bool:
     if not statement or (statement[0].kind != "word" and statement[0].text != "*"):
         return False
     texts = [token.text for token in statement]
-    if texts[0] in JUMPS or "?" in texts[:1]:
+    if texts[0] in JUMPS:
         return False
-    if any(sign in texts for sign in ("=", "+=", "-=", "*=", "/=")):
-        at = next(k for k, text in enumerate(texts) if text in ("=", "+=", "-=", "*=", "/="))
-        words = [
-            token
-            for token, before in zip(statement[:at], [None, *statement[:at]], strict=False)
-            if token.kind == "word" and (before is None or before.kind == "word")
-        ]
-        return len(words) == 1  # two words in a row declare
+    at = next((k for k, text in enumerate(texts) if text in _ASSIGNED), None)
+    if at is not None:  # two words in a row declare
+        kinds = ["word", *(token.kind for token in statement[:at])]
+        return sum(pair == ("word", "word") for pair in pairwise(kinds)) == 1
     return len(texts) > 2 and texts[1] == "(" and texts[-1] == ")"
+
+
+_ASSIGNED = {"=", "+=", "-=", "*=", "/="}

@@ -57,21 +57,27 @@ OTHER_AXLE = {"front": "rear", "rear": "front", "f": "r", "r": "f"}
 
 # Offsets inside f-strings are not those of the file before Python 3.12.
 LEFT_ALONE = (ast.Import, ast.ImportFrom, ast.Delete, ast.JoinedStr)
-SPOKEN = {"warn", "warning", "info", "debug", "error", "exception", "say", "print"}
-SPOKEN |= {"add_parser", "add_argument_group", "ArgumentParser"}
+SPOKEN = {
+    "warn", "warning", "info", "debug", "error", "exception", "say", "print", "add_parser",
+    "add_argument_group", "ArgumentParser",
+}  # fmt: skip
 HELP = {"help", "description", "metavar", "epilog", "title", "usage"}
 SAME = {"encoding", "strict"}  # UTF-8 is the default here; zip(strict=) guards, it does not compute
 DRAWINGS = ("tireid/figures/",)
-PLACED = {"set_ylim", "set_xlim", "tick_params", "legend", "margins", "subplots_adjust", "annotate"}
-PLACED |= {"align_ylabels", "set_title", "set_xlabel", "set_ylabel", "set_label", "set_visible"}
-PLACED |= {"set_position", "set_yticks", "set_xticks", "set_yticklabels", "set_xticklabels"}
-PLACED |= {"text", "axhline", "axvline", "set_animated", "set_alpha", "set_linewidth", "new_figure"}
-PLACED |= {"grid", "locator_params", "set_aspect", "legend_above", "add_artist", "rc_context"}
-LOOKS = {"color", "colors", "linewidth", "linewidths", "linestyle", "alpha", "zorder", "fontsize"}
-LOOKS |= {"size", "marker", "markersize", "markerfacecolor", "markeredgewidth", "ha", "va", "loc"}
-LOOKS |= {"facecolor", "edgecolor", "pad", "labelpad", "rotation", "dpi", "figsize", "label", "lw"}
-LOOKS |= {"xlabel", "ylabel", "xlim", "ylim", "aspect"}
-LOOKS |= {"transform", "clip_on", "height_ratios", "width_ratios", "hspace", "wspace", "fontweight"}
+PLACED = {
+    "set_ylim", "set_xlim", "tick_params", "legend", "margins", "subplots_adjust", "annotate",
+    "align_ylabels", "set_title", "set_xlabel", "set_ylabel", "set_label", "set_visible",
+    "set_position", "set_yticks", "set_xticks", "set_yticklabels", "set_xticklabels", "text",
+    "axhline", "axvline", "set_animated", "set_alpha", "set_linewidth", "new_figure", "grid",
+    "locator_params", "set_aspect", "legend_above", "add_artist", "rc_context",
+}  # fmt: skip
+LOOKS = {
+    "color", "colors", "linewidth", "linewidths", "linestyle", "alpha", "zorder", "fontsize",
+    "size", "marker", "markersize", "markerfacecolor", "markeredgewidth", "ha", "va", "loc",
+    "facecolor", "edgecolor", "pad", "labelpad", "rotation", "dpi", "figsize", "label", "lw",
+    "xlabel", "ylabel", "xlim", "ylim", "aspect", "transform", "clip_on", "height_ratios",
+    "width_ratios", "hspace", "wspace", "fontweight",
+}  # fmt: skip
 
 
 def python_faults(file: str, source: bytes) -> list[Fault]:

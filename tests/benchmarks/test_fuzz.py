@@ -4,6 +4,7 @@ import os
 import random
 import signal
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -27,10 +28,10 @@ def session(tmp_path, monkeypatch):
     """A session whose seeds are those of one door."""
     monkeypatch.setattr(server, "CPU", 2)
     monkeypatch.setattr(server, "SILENCE", 1.0)
-    car, design = sedan(), design_text(PaperIdentifier.for_vehicle(sedan()))
-    car.to_toml(tmp_path / "whole.toml")
-    car = (tmp_path / "whole.toml").read_text().partition("[chassis]")[0]
-    seeds = {"car.toml": car.encode(), "integral.toml": design.encode()}
+    design = design_text(PaperIdentifier.for_vehicle(sedan()))
+    car = tmp_path / "whole.toml"
+    replace(sedan(), chassis=None).to_toml(car)
+    seeds = {"car.toml": car.read_bytes(), "integral.toml": design.encode()}
     return Session(tmp_path, seeds, {}, 0.0)
 
 

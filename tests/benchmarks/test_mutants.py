@@ -203,6 +203,14 @@ def test_every_fault_that_was_written_down_follows_the_code():
     assert len({written_fault(entry).kind for entry in entries}) == len(entries)
 
 
+def test_every_test_that_is_named_beside_a_fault_is_there():
+    entries = tomllib.loads(PLANTED.read_text(encoding="utf-8"))["fault"]
+    for named in {name for entry in entries for name in entry["tests"]}:
+        file, _, test = named.partition("::")
+        source = (ROOT / file).read_text(encoding="utf-8")
+        assert not test or f"\ndef {test.partition('[')[0]}(" in source, named
+
+
 def test_a_fault_that_was_written_down_must_match_its_file_once(tmp_path):
     (tmp_path / "toy.py").write_text("a = 1\nb = 1\n")
     entry = {"name": "b", "file": "toy.py", "old": "b = 1", "new": "b = 2"}

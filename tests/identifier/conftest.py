@@ -1,6 +1,7 @@
 """A small car and a drive whose axle forces are known exactly."""
 
 import json
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -16,6 +17,7 @@ from models.maneuvers import RandomSteer, Slalom
 from models.plant import Plant
 from models.recordings import Recording, read_recording
 from models.vehicle import Vehicle, sedan
+from tests.refused import line_about
 
 CAR = Vehicle(
     mass=1500.0, yaw_inertia=2500.0, l_f=1.15, l_r=1.55, cornering_stiffness_front=1.4e5,
@@ -168,10 +170,7 @@ def refused_in_one_line(tmp_path):
     def check(data, said):
         path = tmp_path / "weights.json"
         path.write_text(json.dumps(data))
-        with pytest.raises(FrozenModelError, match=said) as error:
-            load_model(path)
-        assert str(error.value).startswith(str(path))
-        assert "\n" not in str(error.value)
+        assert re.search(said, line_about(path, FrozenModelError, load_model))
 
     return check
 

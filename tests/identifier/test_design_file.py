@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from identifier.paper.design import DesignFileError, PaperIdentifier, design_text, read_design
+from tests.refused import line_about
 
 
 def test_a_design_comes_back_from_its_file(car, tmp_path):
@@ -27,15 +28,13 @@ def test_a_design_comes_back_from_its_file(car, tmp_path):
         ("eta_W = ", "eta = ", "gains.eta is unknown"),
         ("forgetting = ", "# forgetting = ", "gains.forgetting is missing"),
         ("[gains]", "gains = 3\n[other]", "gains must be a table"),
-        ('law = "integral"', "law = 5", "law must be a text"),
         ('law = "integral"', 'law = "magic"', "law must be one of"),
         ("seed = 0", "seed = 0.5", "seed must be a whole number"),
         ("forgetting = ", "forgetting = -", "forgetting must be positive"),
         ("lead = 0.0", "lead = -1.0", "lead must not be negative"),
         ("lead = 0.0", "lead = nan", "lead must not be negative"),
         ("seed = 0", 'integrator = "rk4"', "integrator is unknown"),
-        ("A_d = [[-", "A_d = [[", "must be Hurwitz"),
-        ("hidden = 10", "hidden = true", "network.hidden must be a whole number"),
+        ("A_d = [[-", "A_d = [[", "must be Hurwitz, its eigenvalues are"),
         ("dt = 0.01", "dt = [", "cannot be read as TOML"),
     ],
 )
@@ -44,7 +43,4 @@ def test_a_wrong_file_is_refused_by_its_key(car, tmp_path, old, new, said):
     assert old in text
     path = tmp_path / "design.toml"
     path.write_text(text.replace(old, new))
-    with pytest.raises(DesignFileError, match=said) as error:
-        read_design(path)
-    assert str(error.value).startswith(str(path))
-    assert "\n" not in str(error.value)
+    assert said in line_about(path, DesignFileError, read_design)

@@ -18,18 +18,16 @@ from identifier.evidence import (
     noise_variance,
     road_push,
 )
-from models.recordings import Recording
 from models.recordings.evidence import Windows
 from models.vehicle import GRAVITY, sedan
+from tests.made import made
 
 CAR, DT = sedan(), 0.01
 T = np.arange(2000) * DT
 
 
 def recording(**others):
-    still = np.zeros(T.size)
-    signals = {"v_x": still + 15.0, "v_y": still, "r": still, "delta_f": still, "delta_r": still}
-    return Recording(name="made", t=T, **{**signals, **others})
+    return made(T, **{"v_x": np.full(T.size, 15.0), **others})
 
 
 def test_windows_overlap_by_half_and_lie_in_what_counts():

@@ -53,6 +53,11 @@ def tiled(recording, times):
     )
 
 
+def assert_same(expected, found, at=()):
+    for port, values in expected.items():
+        np.testing.assert_array_equal(values, np.asarray(found[port])[at], err_msg=port)
+
+
 @pytest.mark.sweep("axle", "integral")
 @pytest.mark.parametrize("method", ["axle", "integral", "lagged_ekf"])
 def test_a_run_in_blocks_has_the_bits_of_one_in_a_piece(whole, method, request):
@@ -64,9 +69,8 @@ def test_a_run_in_blocks_has_the_bits_of_one_in_a_piece(whole, method, request):
     assert len(blocks.state.run.parts) > 10
     np.testing.assert_array_equal(piece.axle_force, blocks.axle_force)
     assert list(piece.state) == list(blocks.state)
-    for kind in ("state", "outputs"):
-        for port, values in getattr(piece, kind).items():
-            np.testing.assert_array_equal(values, getattr(blocks, kind)[port], err_msg=port)
+    assert_same(piece.state, blocks.state)
+    assert_same(piece.outputs, blocks.outputs)
     for k, track in enumerate(piece.tracks_over(next(piece.blocks()))):
         parts = [blocks.tracks_over(block)[k].values for block in blocks.blocks()]
         np.testing.assert_array_equal(track.values, np.concatenate(parts))
@@ -80,9 +84,7 @@ def test_a_freeze_within_a_block_or_at_its_ends_is_that_of_one_piece(whole, requ
     blocks = identify(whole, CAR, design)
     for index in (0, 1, 127, 128, 129, 699, 700, 701, len(whole) - 2, len(whole) - 1):
         t = float(whole.t[index])
-        expected, found = piece.state_at(t), blocks.state_at(t)
-        for port, value in expected.items():
-            np.testing.assert_array_equal(value, found[port], err_msg=f"{port} at {index}")
+        assert_same(piece.state_at(t), blocks.state_at(t))
     assert blocks.freeze(7.0).to_dict() == model.to_dict()
     assert learn(whole, CAR, design, t=7.0).to_dict() == model.to_dict()
     np.testing.assert_array_equal(model.predict(whole), piece.freeze(7.0).predict(whole))
@@ -96,20 +98,17 @@ def test_the_parts_of_a_run_over_two_logs_are_those_of_one_in_a_piece(whole, met
     run = identify(drive, CAR, design)
     pieces = run.parts(logs)
     assert len(run.state.run.parts) == 1
-    for port, values in identify(logs[0], CAR, design).state.items():  # the first, as if alone
-        np.testing.assert_array_equal(values, pieces[0].state[port], err_msg=port)
+    assert_same(identify(logs[0], CAR, design).state, pieces[0].state)  # the first, as if alone
     frozen = [one.freeze().to_dict() for one in pieces]
     request.getfixturevalue("in_blocks")
     blocks = identify(drive, CAR, design).parts(logs)
     for one, other, log in zip(pieces, blocks, logs, strict=True):
         assert len(other.state.run.parts) > 10
         np.testing.assert_array_equal(one.axle_force, other.axle_force)
-        for kind in ("state", "outputs"):
-            for port, values in getattr(one, kind).items():
-                np.testing.assert_array_equal(values, getattr(other, kind)[port], err_msg=port)
+        assert_same(one.state, other.state)
+        assert_same(one.outputs, other.outputs)
         for run in (one, other):  # after the last sample, not after the rest before the next log
-            for port, value in run.state_at(float(log.t[-1])).items():
-                np.testing.assert_array_equal(value, one.state[port][-1], err_msg=port)
+            assert_same(run.state_at(float(log.t[-1])), one.state, -1)
     assert [one.freeze().to_dict() for one in blocks] == frozen
 
 

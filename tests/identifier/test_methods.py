@@ -1,13 +1,11 @@
 """Methods of other distributions are found by entry points, made, run and refused by name."""
 
-import sys
 from importlib import metadata
 
 import numpy as np
 import pytest
 
 import tireid as ti
-from codegen.plugins import installed as installed_names
 from identifier import methods
 from identifier.baselines import LinearBaseline
 from tireid.cli import build_parser
@@ -33,18 +31,8 @@ def odd(vehicle, seed):
 
 
 @pytest.fixture
-def installed(tmp_path, monkeypatch):
-    """A distribution beside tireid that names methods, as pip would write it."""
-    folder = tmp_path / "its_methods-1.0.dist-info"
-    folder.mkdir()
-    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: its-methods\nVersion: 1.0\n")
-    (folder / "entry_points.txt").write_text(POINTS)
-    (tmp_path / "its_methods.py").write_text(CODE)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    installed_names.cache_clear()
-    yield
-    installed_names.cache_clear()
-    sys.modules.pop("its_methods", None)
+def installed(distribution):
+    distribution(POINTS, its_methods=CODE)
 
 
 @pytest.mark.usefixtures("installed")

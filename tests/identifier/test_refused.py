@@ -62,19 +62,6 @@ def test_a_gap_of_refused_samples_costs_less_than_two_percent(name, slalom):
         assert not online.stale
 
 
-def test_a_gap_that_does_not_count_as_time_costs_more(slalom):
-    """What the rule is for: the same samples left out, so that two far ones follow each other."""
-    rows, truth = rows_of(slalom), slalom.axle_force
-    method = AxleIdentifier.for_vehicle(CAR)
-    clean, worst = driven(method, rows)[0], 0.0
-    for begin in range(BEGIN, BEGIN + 200, 25):
-        left_out = driven(method, np.delete(rows, slice(begin, begin + 50), axis=0))[0]
-        after = slice(begin + 50 + RESTART, len(rows))
-        cost = error(left_out[begin + RESTART :], truth[after]) - error(clean[after], truth[after])
-        worst = max(worst, cost)
-    assert worst > 0.005
-
-
 @pytest.mark.sweep("nan-*", "1e+308-0", "-inf-2")
 @pytest.mark.parametrize("channel", range(5))
 @pytest.mark.parametrize("broken", BROKEN)

@@ -60,7 +60,6 @@ def test_replay_compares_with_truth_and_with_what_was_said_online(history):
     assert (result.against_truth.front, result.against_truth.rear) == pytest.approx(by_hand)
     online = np.sqrt(np.mean((result.axle_force - history.axle_force) ** 2, axis=0))
     assert (result.against_online.front, result.against_online.rear) == pytest.approx(online)
-    assert result.against_truth.both == pytest.approx(np.sqrt(np.mean(by_hand**2)))
 
 
 @pytest.mark.parametrize(("rests", "since"), [(True, None), (False, 4.0)])

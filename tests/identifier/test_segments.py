@@ -11,7 +11,7 @@ from identifier.evidence import brisk_windows, motion_error
 from identifier.methods import METHODS, make_method
 from identifier.refused import GATE
 from identifier.run import identify
-from models.recordings import Recording, RecordingError, Repair, joined
+from models.recordings import Recording, RecordingError, joined
 from models.recordings.evidence import windows
 
 CAR = ti.sedan()
@@ -135,12 +135,3 @@ def test_no_window_reaches_over_a_gap(cut) -> None:
     assert rest is not None and rest.lateral == 0.0
     jump = motion_error(np.zeros((len(cut), 2)), glued(exact), CAR, counted)
     assert jump is not None and jump.lateral > 5.0 * dt
-
-
-def test_a_repair_keeps_to_each_segment(log, cut) -> None:
-    late = Repair(delay={"r": 0.05})
-    mended, _ = late.apply(cut, CAR)
-    assert len(mended.segments) == 2 and len(mended) == len(cut) - 10
-    for piece, source in zip(mended.segments, cut.segments, strict=True):
-        alone, _ = late.apply(cut.taken(source), CAR)
-        assert np.array_equal(mended.r[piece], alone.r)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.recordings import Recording
 from models.recordings.evidence import STRIDE, WINDOW, correlation, least_squares, windows
+from tests.made import made
 
 DT = 0.01
 
@@ -54,15 +54,7 @@ def turning(dt=DT):
     """A car that turns as a sine, with sideslip in proportion."""
     t = np.arange(0.0, 20.0, dt)
     r = 0.5 * np.sin(2.0 * t)
-    return Recording(
-        name="turning",
-        t=t,
-        v_x=np.full(t.size, 10.0),
-        v_y=0.3 * r,
-        r=r,
-        delta_f=0.1 * np.sin(2.0 * t),
-        delta_r=0.0 * t,
-    )
+    return made(t, v_x=0.0 * t + 10.0, v_y=0.3 * r, r=r, delta_f=0.1 * np.sin(2.0 * t))
 
 
 @pytest.mark.parametrize("dt", [0.002, 0.01, 0.04])

@@ -25,7 +25,7 @@ from models.maneuvers import RandomSteer
 from models.plant import Plant
 from models.recordings import Recording
 from models.recordings.record import CHANNELS
-from models.tires import DugoffTire, FialaTire
+from models.tires import FialaTire
 from models.vehicle import GRAVITY, sedan
 
 CAR = sedan()
@@ -125,18 +125,3 @@ def test_a_banked_recording_keeps_slip_and_obeys_newton_with_the_slope(drive):
     inertial = m * (np.gradient(shown.v_y, shown.dt) + shown.v_x * shown.r)
     rest = inertial - drive.axle_force.sum(axis=1) - m * slope
     assert np.abs(rest[2:-2]).max() < 0.02 * m * np.abs(slope).max()
-
-
-# Banked roads, wind and other tires behind, on the plant.
-
-
-def test_rear_wheels_may_have_tires_of_their_own():
-    """Force over slip of each axle, at small slip, is the stiffness of its own two tires."""
-    rear = DugoffTire(C_alpha=80e3, C_kappa=80e3, friction=1.0)
-    gentle = replace(STEER, amplitude=0.005)
-    run = Plant(CAR, TIRE, rear_tire=rear).simulate(gentle, speed=20.0)
-    late = run.t > 2.0
-    alpha = run.alpha[late].reshape(-1, 2, 2).mean(axis=2)
-    force = run.axle_force[late]
-    stiffness = np.sum(alpha * force, axis=0) / np.sum(alpha**2, axis=0)
-    np.testing.assert_allclose(stiffness, [100e3, 160e3], rtol=0.08)

@@ -133,11 +133,6 @@ def test_a_car_that_reverses_for_a_while_keeps_its_heading():
     np.testing.assert_allclose(found.v_x.values[900:1300], -V_X[900:1300], atol=5e-3)
 
 
-def test_a_heading_of_something_else_is_refused():
-    with pytest.raises(RecordingError, match="must go along with the direction of travel"):
-        motion_of(posed(psi=3.0 * np.sin(T)))
-
-
 def test_gaps_of_a_pose_are_not_bridged():
     there = (T < 10.0) | (T > 11.0)
     motion = motion_of(posed(X[there], Y[there], PSI[there], T[there]))

@@ -10,22 +10,26 @@ from hypothesis import strategies as st
 
 from models.recordings import (
     LogMap,
-    Recording,
     RecordingError,
     read_recording,
     write_recording,
 )
+from tests.made import made as recorded
 
 N = 100
+SIGNALS = ("v_x", "v_y", "r", "delta_f", "delta_r")
 
 
 def recording(**change):
     t = 0.01 * np.arange(N)
-    signals: dict[str, object] = {
-        "name": "made", "t": t, "v_x": np.full(N, 20.0), "v_y": 0.1 * np.sin(t),
-        "r": 0.2 * np.sin(t), "delta_f": 0.03 * np.sin(t), "delta_r": np.zeros(N),
-    }  # fmt: skip
-    return Recording(**(signals | change))  # type: ignore[arg-type]
+    wave = np.sin(t)
+    return recorded(t, **{"v_y": 0.1 * wave, "r": 0.2 * wave, "delta_f": 0.03 * wave, **change})
+
+
+def noise(seed, t, *names, **more):
+    """A recording of numbers at random, of more signals than all have by name."""
+    rng = np.random.default_rng(seed)
+    return recorded(t, **{name: rng.normal(size=t.size) for name in (*SIGNALS, *names)}, **more)
 
 
 def test_signals_cannot_be_changed_and_do_not_follow_their_source():
@@ -141,19 +145,13 @@ def test_an_axle_that_rolls_without_slip_has_no_slip_angle():
     ending=st.sampled_from([".csv", ".csv.gz"]),
 )
 def test_what_is_written_reads_back_bit_for_bit(tmp_path_factory, seed, dt, start, full, ending):
-    rng = np.random.default_rng(seed)
-    made = Recording(
-        name="back",
-        t=start + dt * np.arange(N),
-        **{k: rng.normal(size=N) for k in ("v_x", "v_y", "r", "delta_f", "delta_r")},
-        a_y=rng.normal(size=N) if full else None,
-        a_x=rng.normal(size=N) if full else None,
-        axle_force=rng.normal(size=(N, 2)) if full else None,
-    )
+    more = ("a_y", "a_x") if full else ()
+    force = np.random.default_rng(seed + 1).normal(size=(N, 2)) if full else None
+    made = noise(seed, start + dt * np.arange(N), *more, axle_force=force)
     path = write_recording(made, tmp_path_factory.mktemp("back") / f"back{ending}")
     again = read_recording(path, dt=dt, check=False)
     assert again.name == "back"
-    for name in ("t", "v_x", "v_y", "r", "delta_f", "delta_r", "a_y", "a_x", "axle_force"):
+    for name in ("t", *SIGNALS, "a_y", "a_x", "axle_force"):
         assert np.array_equal(getattr(again, name), getattr(made, name))
     assert (again.a_x is None) is (again.a_y is None) is (not full)
 
@@ -172,13 +170,10 @@ def test_writing_leaves_one_file_and_refuses_other_endings(tmp_path):
 def test_segments_are_read_back_where_gaps_are_long_or_the_map_says_so(tmp_path, gap):
     t = 0.01 * np.arange(300)
     t[150:] += gap
-    columns = ("v_x", "v_y", "r", "delta_f", "delta_r")
-    rng = np.random.default_rng(2)
-    signals = {name: rng.normal(size=t.size) for name in columns}
-    made = Recording(name="gap", t=t, **signals, breaks=(150,))
+    made = noise(2, t, breaks=(150,))
     path = write_recording(made, tmp_path / "gap.csv")
     again = read_recording(path, check=False, log_map=LogMap(longest_gap=0.02))
-    for name in ("t", *columns):
+    for name in ("t", *SIGNALS):
         assert np.array_equal(getattr(again, name), getattr(made, name))
     assert again.breaks == made.breaks
     bridged = read_recording(path, check=False)
@@ -190,10 +185,7 @@ def test_segments_are_read_back_where_gaps_are_long_or_the_map_says_so(tmp_path,
 def test_a_long_recording_is_written_by_blocks_with_the_bytes_of_one_piece(
     tmp_path, monkeypatch, ending
 ):
-    n = 20_000
-    rng = np.random.default_rng(3)
-    signals = {k: rng.normal(size=n) for k in ("v_x", "v_y", "r", "delta_f", "delta_r")}
-    made = Recording(name="long", t=0.01 * np.arange(n), **signals)
+    made = noise(3, 0.01 * np.arange(20_000))
     piece = write_recording(made, tmp_path / f"piece{ending}").read_bytes()
     monkeypatch.setattr("codegen.arrays.LONG", 1000)
     monkeypatch.setattr("codegen.arrays.BLOCK", 500)

@@ -15,6 +15,7 @@ from models.recordings import (
     read_recording,
     runs,
 )
+from tests.made import made
 
 DEGREES = 180.0 / np.pi
 
@@ -191,17 +192,9 @@ def test_a_drift_with_opposite_lock_passes():
     t, v, r, beta = 0.01 * np.arange(1200), 12.0, 0.5, -0.5
     wobble = 1.0 + 0.05 * np.sin(2.0 * t)
     v_y = v * np.sin(beta) * wobble
-    made = Recording(
-        name="drift",
-        t=t,
-        v_x=np.full(t.size, v * np.cos(beta)),
-        v_y=v_y,
-        r=r * wobble,
-        delta_f=-0.2 * wobble,
-        delta_r=0 * t,
-        a_y=np.gradient(v_y, t) + v * np.cos(beta) * r * wobble,
-    )
-    check_physics(made)
+    v_x = np.full(t.size, v * np.cos(beta))
+    a_y = np.gradient(v_y, t) + v_x * r * wobble
+    check_physics(made(t, v_x=v_x, v_y=v_y, r=r * wobble, delta_f=-0.2 * wobble, a_y=a_y))
 
 
 def test_noise_bias_bank_and_roll_do_not_ring(rng):

@@ -8,7 +8,6 @@ import pytest
 
 from models.recordings import (
     LogMap,
-    Recording,
     RecordingError,
     Repair,
     read_recording,
@@ -16,6 +15,8 @@ from models.recordings import (
     split_log_argument,
     write_recording,
 )
+from tests.made import made
+from tests.refused import line_about
 
 HEADER = "t,vx,vy,r,delta_f"
 
@@ -31,12 +32,7 @@ def write(path, header, lines):
 
 
 def refusal(path, run=None):
-    with pytest.raises(RecordingError) as caught:
-        read_recording(path, run)
-    message = str(caught.value)
-    assert "\n" not in message
-    assert message.startswith(str(path))
-    return message.removeprefix(str(path))
+    return line_about(path, RecordingError, read_recording, run)
 
 
 def test_other_columns_order_spaces_quotes_and_byte_order_marks_do_not_matter(tmp_path):
@@ -218,16 +214,7 @@ def mirrored(tmp_path_factory):
     """A log whose accelerometer shows the other sign."""
     t = 0.01 * np.arange(1000)
     r = 0.3 * np.sin(2.0 * t)
-    drive = Recording(
-        name="mirrored",
-        t=t,
-        v_x=np.full(t.size, 20.0),
-        v_y=0.0 * t,
-        r=r,
-        delta_f=2.7 / 20.0 * r,
-        delta_r=0.0 * t,
-        a_y=-20.0 * r,
-    )
+    drive = made(t, name="mirrored", r=r, delta_f=2.7 / 20.0 * r, a_y=-20.0 * r)
     return write_recording(drive, tmp_path_factory.mktemp("logs") / "mirrored.csv")
 
 

@@ -17,14 +17,13 @@ from benchmarks.faults import (
     Together,
     WrongNumber,
     WrongUnit,
-    low_passed,
 )
 from models.faults import SensorFault
-from models.recordings import Recording, RecordingError, Repair
+from models.recordings import RecordingError, Repair
 from models.recordings.record import CHANNELS
-from models.recordings.repair import _without_low_pass
 from models.schema import Table
 from models.vehicle import VehicleError, sedan
+from tests.made import made
 
 CAR = sedan()
 
@@ -37,14 +36,12 @@ def drive():
     def swing(late):
         return np.sin(2.0 * np.pi * 0.4 * (t - late)) * np.sin(0.2 * (t - late))
 
-    return Recording(
-        name="swings",
-        t=t,
+    return made(
+        t,
         v_x=20.0 + 2.0 * np.sin(0.3 * t),
         v_y=0.5 * swing(0.15),
         r=0.3 * swing(0.1),
         delta_f=0.05 * swing(0.0),
-        delta_r=0.0 * t,
         a_y=6.0 * swing(0.1),
         axle_force=np.column_stack([swing(0.0), swing(0.1)]),
     )
@@ -288,18 +285,7 @@ def test_a_repair_of_a_segment_looks_at_no_other(drive, broken, name):
         np.testing.assert_array_equal(getattr(repaired, channel)[middle], getattr(alone, channel))
 
 
-# Low passes: by fine integration, by what they leave alone, and by going back.
-
-DT = 0.01
-T = DT * np.arange(400)
-SWING = np.sin(2.0 * np.pi * 0.7 * T) + 0.3
-
-
-def test_what_went_into_a_low_pass_comes_back_and_straight_lines_stay_to_the_ends():
-    behind = low_passed(SWING, 0.1, DT)
-    inside = slice(2, -2)
-    assert np.abs(behind - SWING).max() > 0.3
-    back = _without_low_pass(behind, 0.1, DT, 0)
-    np.testing.assert_allclose(back[inside], SWING[inside], atol=0.02)
-    line = _without_low_pass(3.0 * T + 1.0, 0.1, DT, 7)
-    np.testing.assert_allclose(line, 3.0 * T + 1.3, atol=1e-11)
+def test_behind_a_low_pass_a_straight_line_stays_one_to_its_ends(drive):
+    line = replace(drive, r=3.0 * drive.t + 1.0)
+    repaired, _ = Repair(lag={"r": 0.1}).apply(line, CAR)
+    np.testing.assert_allclose(repaired.r, line.r + 0.3, atol=1e-10)

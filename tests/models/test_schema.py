@@ -19,6 +19,7 @@ from models.schema import (
     read_toml,
     require_name,
 )
+from tests.refused import line_about
 
 
 class RefusedError(ValueError):
@@ -27,12 +28,8 @@ class RefusedError(ValueError):
 
 def refusal(read, path):
     """The one line that a door refuses a file with."""
-    with pytest.raises(RefusedError) as caught:
-        read(path, RefusedError)
-    message = str(caught.value)
-    assert message.startswith(f"{path}: ")
-    assert "\n" not in message
-    assert len(message) < 400
+    message = line_about(path, RefusedError, read, RefusedError)
+    assert message.startswith(": ") and len(message) < 300
     return message
 
 

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from models.recordings import Recording
 from models.recordings.samples import white_noise
 from models.sensors import Sensor, SensorError, Sensors
+from tests.made import made
 
 N = 20001
 T = 0.01 * np.arange(N)
@@ -15,9 +15,8 @@ T = 0.01 * np.arange(N)
 
 def exact(rear=0.0):
     wave = np.sin(2.0 * math.pi * 0.3 * T)
-    return Recording(
-        name="exact",
-        t=T,
+    return made(
+        T,
         v_x=20.0 + wave,
         v_y=0.5 * wave,
         r=0.3 * wave,

@@ -153,20 +153,3 @@ def test_what_wheels_cannot_be_is_refused_in_one_line(run, wheels, change, told,
     with pytest.raises(RecordingError) as caught:
         read_recording(data, columns=told)
     assert rule in str(caught.value) and "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "rule"),
-    [
-        ("radius = 5.0", "wheels: radius must lie between 0.01 and 2, it is 5"),
-        ('driven = "left"', "wheels: driven must be one of"),
-        ("radius = [[0.3]]", "radius must be a number or a list of numbers, it is a list of 1"),
-        ("radii = 0.3", "wheels.radii is unknown, known are radius, track, wheelbase"),
-    ],
-)
-def test_what_no_map_says_of_wheels_is_refused_with_its_file(tmp_path, text, rule):
-    path = tmp_path / "log.toml"
-    path.write_text(f"[wheels]\n{text}\n")
-    with pytest.raises(RecordingError) as caught:
-        LogMap.from_toml(path)
-    assert str(caught.value).startswith(str(path)) and rule in str(caught.value)

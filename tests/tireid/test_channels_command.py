@@ -116,14 +116,6 @@ def test_a_rear_or_right_wheel_is_not_taken_for_the_front_axle(log, tmp_path):
     assert np.array_equal(told.delta_f, log.delta_f)
 
 
-def test_sideslip_is_read_in_place_of_lateral_velocity(log):
-    columns = columns_of(log)
-    del columns["vy"]
-    columns["Schwimmwinkel"] = np.degrees(np.arctan2(log.v_y, log.v_x))
-    told = ti.read_recording(columns, columns={"beta": "Schwimmwinkel [deg]"})
-    assert np.allclose(told.v_y, log.v_y, atol=1e-12)
-
-
 @pytest.mark.parametrize("cut_off", [1e-300, 1e-9, 0.0099, 50.0, 1e9])
 def test_a_filter_that_lets_nothing_pass_or_cannot_be_is_refused(log, cut_off):
     columns = columns_of(log)
@@ -192,7 +184,6 @@ def test_a_repair_of_the_map_is_taken_out_of_log_and_car_and_said(log, folder, t
         (["plain.csv", "--write", "log.json"], "must end in .toml"),
         (["plain.csv:lap"], "so no run 'lap'; leave it out"),
         (["plain.csv", "--columns", "speed=vx"], "'speed' is no column of ours"),
-        (["plain.csv", "--columns", "r=a", "r=b"], "gives r twice"),
         (["plain.csv", "--log", "nowhere.toml"], "nowhere.toml"),
     ],
 )
@@ -255,13 +246,6 @@ def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(f
     assert abs(read.v_y[~known] - log.v_y[single]) < 0.1, "v_y goes on as before for one sample"
     assert typed("channels", path, "--cut-holes") == 0
     assert "they are cut out, as given" in capsys.readouterr().out
-
-
-def test_a_map_says_refuse_or_cut_of_holes():
-    with pytest.raises(RecordingError, match="holes must be refuse or cut, not 'fill'"):
-        ti.LogMap(holes="fill")
-    with pytest.raises(RecordingError, match="order must be refuse or mend, not 'sort'"):
-        ti.LogMap(order="sort")
 
 
 def test_a_clock_is_mended_where_it_is_asked_for(folder, tmp_path, capsys):

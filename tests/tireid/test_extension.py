@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import tireid as ti
-from codegen.plugins import installed as installed_names
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.tires import LinearTire
@@ -55,20 +54,8 @@ def run(options):
 
 
 @pytest.fixture(autouse=True)
-def installed(tmp_path, monkeypatch):
-    """A distribution beside tireid, as pip would write it."""
-    folder = tmp_path / "theirs-1.0.dist-info"
-    folder.mkdir()
-    (folder / "METADATA").write_text("Metadata-Version: 2.1\nName: theirs\nVersion: 1.0\n")
-    (folder / "entry_points.txt").write_text(POINTS)
-    for name, text in {"tire": TIRE, "command": COMMAND}.items():
-        (tmp_path / f"their_{name}.py").write_text(text)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    installed_names.cache_clear()
-    yield
-    installed_names.cache_clear()
-    for name in ("tire", "command"):
-        sys.modules.pop(f"their_{name}", None)
+def installed(distribution):
+    distribution(POINTS, their_tire=TIRE, their_command=COMMAND)
 
 
 def test_a_tire_is_an_object_that_the_plant_takes():

@@ -189,7 +189,7 @@ def test_a_row_is_used_where_it_tells_something_that_is_not_rejected():
 # Watching.
 
 
-def drawn(seed, changes, *, cars=1, minutes=2, first=5):
+def drawn(seed, changes, *, cars=1, first=5):
     """Rows of cars, some logs a day: `first` days as ever, then days with changes of the tires.
 
     changes : factors of stiffness front and rear and of friction, a day each, of the last car.
@@ -199,7 +199,7 @@ def drawn(seed, changes, *, cars=1, minutes=2, first=5):
         for day in range(first + len(changes)):
             change = changes[day - first] if day >= first and car == cars - 1 else (1.0, 1.0, 1.0)
             today = np.array(change) * np.exp(rng.normal(scale=(0.01, 0.01, 0.03)))
-            for _ in range(minutes):
+            for _ in range(2):
                 told = told_of(tires(*today), rng, noise=1.0, seconds=300.0)
                 k = len(rows)
                 date = f"2026-{day // 28 + 1:02d}-{day % 28 + 1:02d}"

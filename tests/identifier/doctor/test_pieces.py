@@ -10,6 +10,7 @@ from codegen import arrays
 from identifier.doctor.pieces import driven_pieces, looked_at, segments_of, usual_speed
 from models.recordings import Recording, joined
 from models.vehicle import sedan
+from tests.made import made
 
 N, DT = 40_000, 0.01
 
@@ -18,7 +19,7 @@ N, DT = 40_000, 0.01
 def drive(rng) -> Recording:
     swing = np.repeat(rng.uniform(0.0, 0.5, N // 200), 200)
     signals = {name: swing * rng.standard_normal(N) for name in ("v_y", "r", "delta_f", "delta_r")}
-    return Recording(name="long", t=DT * np.arange(N), v_x=np.full(N, 20.0), **signals)
+    return made(DT * np.arange(N), **signals)
 
 
 def places(drive: Recording) -> list[float]:
@@ -50,11 +51,7 @@ def test_they_are_the_same_found_block_by_block_and_little_is_held(drive, monkey
 def test_of_a_long_log_pieces_all_over_it_are_looked_at_and_of_a_short_one_all(drive):
     (whole,) = looked_at(drive)
     assert whole is drive
-    n = 12 * 6000
-    long = Recording(
-        name="hours", t=DT * np.arange(n), v_x=np.full(n, 20.0), v_y=np.zeros(n), r=np.zeros(n),
-        delta_f=np.zeros(n), delta_r=np.zeros(n),
-    )  # fmt: skip
+    long = made(DT * np.arange(12 * 6000))
     pieces = looked_at(long)
     assert [len(one) for one in pieces] == [6000] * 10
     assert (pieces[0].t[0], pieces[-1].t[-1]) == (0.0, long.t[-1])

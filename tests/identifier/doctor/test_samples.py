@@ -8,9 +8,9 @@ import pytest
 from scipy.signal import lfilter
 
 from identifier.doctor.samples import CERTAIN, _is_late, sample_findings
-from models.recordings import Recording
 from models.recordings.evidence import computed_v_y
 from models.recordings.samples import Runs, resolution
+from tests.made import made
 
 DT = 0.01
 T = np.arange(3000) * DT
@@ -27,24 +27,15 @@ def swing(rng, width=0.8):
 def smooth():
     rng = np.random.default_rng(5)
     r, v_x = swing(rng, 0.2), 20.0 + swing(rng, 1.0)
-    return Recording(
-        name="made",
-        t=T,
-        v_x=v_x,
-        v_y=swing(rng, 0.4),
-        r=r,
-        delta_f=swing(rng, 0.03),
-        delta_r=np.zeros(T.size),
-        a_y=v_x * r + swing(rng, 0.3),
-    )
+    v_y, delta_f = swing(rng, 0.4), swing(rng, 0.03)
+    return made(T, v_x=v_x, v_y=v_y, r=r, delta_f=delta_f, a_y=v_x * r + swing(rng, 0.3))
 
 
 @pytest.fixture(scope="module")
 def noisy(smooth):
     rng = np.random.default_rng(6)
-    return replace(
-        smooth,
-        **{n: getattr(smooth, n) + s * rng.standard_normal(T.size) for n, s in NOISE.items()},
+    return made(
+        T, **{n: getattr(smooth, n) + s * rng.standard_normal(T.size) for n, s in NOISE.items()}
     )
 
 
@@ -102,8 +93,7 @@ def test_samples_that_are_repeated_now_and_then_are_counted(noisy):
 
 
 def test_samples_that_are_lost_are_counted_from_the_first_on(noisy):
-    base = replace(noisy, v_x=noisy.v_x)
-    found = only(changed(base, "v_x", [500, 501, 900, 901, 902], 0.0))
+    found = only(changed(noisy, "v_x", [500, 501, 900, 901, 902], 0.0))
     assert (found.code, found.channel, found.size) == ("dropout", "v_x", 5.0)
     assert "for 5 of 3000 samples, first at 5 s" in found.text and found.confidence == CERTAIN
 
@@ -130,9 +120,7 @@ def driven(to, lasts=60.0, dt=DT):
     exact = {n: x * np.interp(t - late, t, turn + waves) for n, (x, late) in motion.items()}
     exact["v_x"] = 20.0 + 0.002 * t
     exact["v_y"] = exact["v_y"] + 1.5 * exact["r"]  # the rear axle slips
-    return Recording(
-        name="made", t=t, delta_r=np.zeros(t.size), **{n: to(n, x) for n, x in exact.items()}
-    )
+    return made(t, **{n: to(n, x) for n, x in exact.items()})
 
 
 @pytest.mark.parametrize("per_unit", [1.0, 3.6])
@@ -184,27 +172,16 @@ def test_samples_that_come_late_at_random_are_late_by_as_much(smooth, noisy, mos
     assert sample_findings(alone) == [], "noise of v_y may grow with slip"
 
 
-def test_a_clock_that_jumps_is_told_where_and_by_how_much(smooth, noisy):
-    names = ("v_x", "v_y", "r", "delta_f", "a_y")
-    kept = np.r_[0:1500, 1540:3000]
-    missing = replace(
-        noisy,
-        t=T[: kept.size],
-        delta_r=np.zeros(kept.size),
-        **{name: getattr(noisy, name)[kept] for name in names},
-    )
-    found = only(missing)
+def test_a_clock_that_jumps_is_told_where_and_by_how_much(noisy):
+    def of(kept):
+        return made(DT * np.arange(kept.size), **{n: getattr(noisy, n)[kept] for n in NOISE})
+
+    found = only(of(np.r_[0:1500, 1540:3000]))
     assert (found.code, found.unit) == ("clock", "s")
     assert found.size == pytest.approx(0.4, rel=0.3) and found.deviation == 0.5 * found.size
     assert float(found.text.split("at once at ")[1].split(" s")[0]) == pytest.approx(15.0, abs=0.06)
-    again = np.r_[0:1500, 1450:3000]
-    twice = replace(
-        noisy,
-        t=np.arange(again.size) * DT,
-        delta_r=np.zeros(again.size),
-        **{name: getattr(noisy, name)[again] for name in names},
-    )
-    (found,) = [one for one in sample_findings(twice) if one.code == "clock"]
+    twice = sample_findings(of(np.r_[0:1500, 1450:3000]))
+    (found,) = [one for one in twice if one.code == "clock"]
     assert (found.size, found.deviation) == pytest.approx((-0.5, 0.0))
     assert found.confidence == CERTAIN
     assert "0.5 s before 15 s are logged twice" in found.text
@@ -250,7 +227,7 @@ def cornering(v_y=None):
     log |= {"delta_f": delta_f, "a_y": v_x * r + np.gradient(true, DT)}
     noise = NOISE | {"v_y": 0.002, "delta_f": 0.0002}
     shown = {n: x + noise[n] * rng.standard_normal(T.size) for n, x in log.items()}
-    return Recording(name="made", t=T, delta_r=0.0 * T, **shown)
+    return made(T, **shown)
 
 
 @pytest.mark.parametrize(

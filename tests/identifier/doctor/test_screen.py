@@ -6,15 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks import doctor_cases
 from benchmarks.everyday_drives import everyday_log
 from benchmarks.fault_cases import StraightOnly
-from benchmarks.faults import (
-    Held,
-    Mirrored,
-    SensorElsewhere,
-    Together,
-    WrongUnit,
-)
+from benchmarks.faults import Held, SensorElsewhere, Together
 from benchmarks.random_cars import CLASSES, good_sensors, random_car, random_drive
 from benchmarks.recorded_cars import CARMAKER, DART
 from identifier.doctor import diagnose
@@ -71,20 +66,16 @@ def named(recording, car):
     return [f"{one.code} {one.channel}".strip() for one in screen(recording, car).findings]
 
 
-GROSS = {
-    "v_y flipped": (SensorFault(channel="v_y", kind="flipped"), "sign v_y"),
-    "r flipped": (SensorFault(channel="r", kind="flipped"), "sign r"),
-    "steering flipped": (SensorFault(channel="delta_f", kind="flipped"), "sign delta_f"),
-    "v_x flipped": (SensorFault(channel="v_x", kind="flipped"), "sign v_x"),
-    "a_y flipped": (SensorFault(channel="a_y", kind="flipped"), "sign a_y"),
-    "r and steering mirrored": (Mirrored(channels=("r", "delta_f")), "sign v_y"),
-    "v_y and a_y mirrored": (Mirrored(channels=("v_y", "a_y")), "sign v_y"),
-    "r in degrees": (WrongUnit(channel="r", unit="deg"), "unit r"),
-    "steering in degrees": (WrongUnit(channel="delta_f", unit="deg"), "unit delta_f"),
-    "v_x in km/h": (WrongUnit(channel="v_x", unit="km/h"), "unit v_x"),
-    "v_x in mph": (scaled("v_x", 1.0 / 0.44704), "unit v_x"),
-    "a_y in g": (WrongUnit(channel="a_y", unit="g"), "unit a_y"),
-}
+CHANNELS = ("v_x", "v_y", "r", "delta_f", "a_y")
+NAMES = (
+    *(f"{name} flipped" for name in CHANNELS),
+    *("r and steering mirrored", "v_y and a_y mirrored", "r in degrees", "steering in degrees"),
+    *("v_x in km/h", "a_y in g"),
+)
+GROSS = {"v_x in mph": (scaled("v_x", 1.0 / 0.44704), "unit v_x")}
+for name in NAMES:
+    case, right = doctor_cases.GROSS[name](sedan(), np.random.default_rng(0))
+    GROSS[name] = case.fault, " ".join(right[0])
 
 
 @pytest.mark.sweep("tenth", "compact")
@@ -135,7 +126,7 @@ def test_every_gross_fault_is_the_first_that_is_named_and_its_repair_gives_the_d
     if first.sure and not case.endswith("mirrored"):  # which mirrors the other channels, too
         mended, declared = found.repair.apply(broken, car)
         assert declared == car
-        for name in ("v_x", "v_y", "r", "delta_f", "a_y"):
+        for name in CHANNELS:
             np.testing.assert_allclose(getattr(mended, name), getattr(log, name), atol=1e-9)
 
 

@@ -12,9 +12,9 @@ from identifier.doctor.suspects import SUSPECTS, TURNING, usual_inertia
 from identifier.estimate.drive import gradient
 from identifier.measured import with_doubt
 from identifier.motion.model import SENSORS, true_signals
-from models.recordings import Recording
 from models.recordings.record import CHANNELS
 from models.vehicle import sedan
+from tests.made import made
 
 CAR = sedan()
 BY_NAME = {(one.code, one.channel): one for one in SUSPECTS}
@@ -31,10 +31,8 @@ def swing(t, *frequencies):
 def clean():
     t = 0.01 * np.arange(3000)
     r, v_x = 0.2 * swing(t, 0.23, 0.41), 20.0 + swing(t, 0.11)
-    return Recording(
-        name="made", t=t, v_x=v_x, r=r, v_y=0.4 * swing(t, 0.31, 0.37), a_y=v_x * r,
-        delta_f=0.03 * swing(t, 0.19, 0.47), delta_r=np.zeros(t.size),
-    )  # fmt: skip
+    v_y, delta_f = 0.4 * swing(t, 0.31, 0.37), 0.03 * swing(t, 0.19, 0.47)
+    return made(t, v_x=v_x, r=r, v_y=v_y, a_y=v_x * r, delta_f=delta_f)
 
 
 def planted(kind, sign):

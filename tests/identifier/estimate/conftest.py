@@ -7,10 +7,9 @@ import pytest
 
 from identifier.estimate.fit import fit
 from models.friction import Friction, FrictionChange
-from models.maneuvers import RandomSteer
-from models.plant import Plant
 from models.sensors import Sensor, Sensors
 from models.vehicle import sedan
+from tests.identifier.conftest import steered
 
 NOISE = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))
 DROP = 10.0  # s
@@ -19,13 +18,11 @@ DROP = 10.0  # s
 @cache
 def driven(seed, duration=20.0, scale=1.0, amplitude=0.07, swing=5.0):
     """Random steering at 17 m/s ± `swing`; from `DROP` on the friction is `scale` times as much."""
-    steering = RandomSteer(
-        amplitude=amplitude, frequency=0.6, seed=seed, onset=1.0, rate_limit=0.8, duration=duration
-    )
     wet = None if scale == 1.0 else Friction(changes=(FrictionChange(scale=scale, at_time=DROP),))
-    run = Plant(sedan()).simulate(
-        steering, speed=lambda t: 17.0 + swing * np.sin(0.4 * t), friction=wet, name=f"drive{seed}"
-    )
+    run = steered(
+        seed, duration, amplitude=amplitude, frequency=0.6, friction=wet,
+        speed=lambda t: 17.0 + swing * np.sin(0.4 * t),
+    )  # fmt: skip
     return NOISE.apply(run.recording(), np.random.default_rng(seed))
 
 

@@ -12,8 +12,8 @@ from identifier.estimate.priors import OF_CAR, Priors
 from identifier.estimate.solve import simulate
 from identifier.motion.model import SIGNALS
 from identifier.motion.parameters import INDEX
-from models.recordings import Recording
-from models.vehicle import GRAVITY, Vehicle, sedan
+from models.vehicle import GRAVITY, sedan
+from tests.made import made
 
 CAR = replace(sedan(), chassis=None)
 T = 0.01 * np.arange(3000)
@@ -21,14 +21,11 @@ SPEED = 20.0 + 3.0 * np.sin(T) + np.sin(2.5 * T)
 PULL = 3.0 * np.cos(T) + 2.5 * np.cos(2.5 * T)  # d v_x/dt
 
 
-def a_x_of(a_x: Array | None, car: Vehicle = CAR) -> Array:
+def a_x_of(a_x: Array | None) -> Array:
     """Return the a_x that the estimate takes of a drive through bends."""
     r = 0.2 * np.sin(0.7 * T)
-    delta = 0.03 * np.sin(0.7 * T)
-    drive = Recording(
-        name="bends", t=T, v_x=SPEED, v_y=0.0 * T, r=r, delta_f=delta, delta_r=0.0 * T, a_x=a_x
-    )
-    column: Array = Drive.of(drive, car).signals[:, SIGNALS.index("a_x")]
+    drive = made(T, v_x=SPEED, r=r, delta_f=0.15 * r, a_x=a_x)
+    column: Array = Drive.of(drive, CAR).signals[:, SIGNALS.index("a_x")]
     return column
 
 
@@ -49,8 +46,7 @@ def test_of_speed_alone_it_is_the_change_of_a_mean_over_a_longer_mean() -> None:
     """Of a wave the means of 0.15 s and 0.31 s, of the drive's smoothing before, keep a share."""
     omega = 8.0
     wave = np.sin(omega * T)
-    bends = {"v_y": 0.0 * T, "r": 0.01 * T / T[-1], "delta_f": 0.0 * T, "delta_r": 0.0 * T}
-    drive = Recording(name="wave", t=T, v_x=20.0 + wave, a_y=0.0 * T, **bends)
+    drive = made(T, v_x=20.0 + wave, r=0.01 * T / T[-1], a_y=0.0 * T)
     shares = [np.sin(x) / x for x in 0.5 * omega * np.array([0.15, 0.31])]
     smoothed = np.sin(0.5 * omega * 0.07) / (0.5 * omega * 0.07)
     found = Drive.of(drive, CAR).signals[200:-200, SIGNALS.index("a_x")]
@@ -65,10 +61,8 @@ def test_of_speed_alone_it_is_the_change_of_a_mean_over_a_longer_mean() -> None:
 def test_without_v_y_an_accelerometer_ahead_of_a_rear_that_swings_out_is_taken(turn: float) -> None:
     """v_y is l_r r there: what is felt is less than the speed gains, by l_r r²."""
     r = turn * np.sin(1.4 * T)
-    drive = Recording(
-        name="swings", t=T, v_x=SPEED, v_y=None, r=r, delta_f=0.1 * r, delta_r=0.0 * T,
-        a_y=SPEED * r, a_x=PULL - CAR.l_r * r**2,
-    )  # fmt: skip
+    a_x = PULL - CAR.l_r * r**2
+    drive = made(T, v_x=SPEED, v_y=None, r=r, delta_f=0.1 * r, a_y=SPEED * r, a_x=a_x)
     given = Nodes.of(drive, CAR).given
     assert (given[:, 4] == 0.0).all()
     assert (Nodes.of(replace(drive, a_x=None), CAR).given[:, 4] == 1.0).all()
@@ -91,12 +85,9 @@ def test_height_and_shares_move_what_is_believed() -> None:
 def test_tires_push_against_the_air_at_one_speed() -> None:
     """A drag of a tenth of the weight is an acceleration of a tenth of g."""
     area = 0.1 * CAR.weight / (0.6 * 30.0**2)
-    n = len(T)
-    flat = {
-        "name": "bend", "t": T, "v_y": np.full(n, -0.5), "r": np.full(n, 0.2),
-        "delta_f": np.full(n, 0.06), "delta_r": np.zeros(n), "v_x": np.full(n, 30.0),
-    }  # fmt: skip
-    drive = Drive.of(Recording(**flat), replace(CAR, drag_area=0.0))  # type: ignore[arg-type]
+    one = np.ones(len(T))
+    bend = made(T, v_x=30.0 * one, v_y=-0.5 * one, r=0.2 * one, delta_f=0.06 * one)
+    drive = Drive.of(bend, replace(CAR, drag_area=0.0))
     pushed = drive.signals.copy()
     pushed[:, SIGNALS.index("a_x")] += 0.1 * GRAVITY
     p = Priors.of(CAR).mean

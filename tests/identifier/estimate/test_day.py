@@ -20,8 +20,8 @@ from models.recordings import joined
 from models.recordings.portion import Portion
 from models.vehicle import Vehicle, sedan
 from mpc.tires import prediction_tire
+from tests.identifier.conftest import missed
 from tests.identifier.estimate.conftest import NOISE, driven
-from tests.identifier.estimate.test_fit import share_missed
 
 ZERO, BIAS = 0.02, 0.3  # rad, m/s
 
@@ -45,9 +45,9 @@ def test_zeros_of_another_day_are_found_and_do_not_reach_the_forces(tire):
     assert day.anew
     assert day["steering_zero"] == pytest.approx(ZERO, rel=0.2)
     assert day["v_y_bias"] + day.speed * day["v_y_angle"] == pytest.approx(BIAS, rel=0.1)
-    assert share_missed(tire, other).max() < share_missed(tire, clean).max() + 0.02
+    assert missed(tire, other).max() < missed(tire, clean).max() + 0.02
     held = tire.of_day(tire.on(clean))
-    assert share_missed(held, other).max() > 0.2  # as the sensors of a day without them read it
+    assert missed(held, other).max() > 0.2  # as the sensors of a day without them read it
 
 
 def test_a_verdict_names_zeros_that_are_large_and_stays_valid(tire):
@@ -117,7 +117,7 @@ def test_segments_without_v_y_are_read_with_the_zero_that_is_found(tire):
         logs.append(replace(shown, v_y=None, a_y=a_y))
     blind = joined(logs)
     blind = replace(blind, v_y=tire.estimated_v_y(blind).v_y, estimated=("v_y",))
-    assert share_missed(tire, blind).max() < 0.1
+    assert missed(tire, blind).max() < 0.1
 
 
 def test_parts_of_a_long_log_are_read_with_the_zeros_of_the_whole(tire, monkeypatch):
@@ -127,7 +127,7 @@ def test_parts_of_a_long_log_are_read_with_the_zeros_of_the_whole(tire, monkeypa
     assert (a, b) == (0, part.place(tire.days(days)[1][0])) and other is tire.days(days)[1][1]
     held = tire.held_on(days, part)
     monkeypatch.setattr("identifier.estimate.model.days_of", None)  # asked no more
-    assert share_missed(held, part.recording).max() < 0.1
+    assert missed(held, part.recording).max() < 0.1
 
 
 def test_the_tracker_reads_the_sensors_of_a_day(tire):

@@ -25,15 +25,11 @@ from models.recordings import Recording
 from models.tires import Tire
 from models.vehicle import estimate as estimated
 from models.vehicle import sedan
+from tests.identifier.conftest import missed
 from tests.identifier.estimate.conftest import DROP, NOISE, driven
 from tireid.driving.learn import sample_recording
 
 GRID = np.linspace(0.005, 0.06, 12)
-
-
-def share_missed(model, recording):
-    missed = model.predict(recording) - recording.axle_force
-    return np.sqrt(np.mean(missed**2, axis=0) / np.mean(recording.axle_force**2, axis=0))
 
 
 @pytest.fixture(scope="module")
@@ -50,12 +46,12 @@ def test_planted_errors_of_sensors_are_found_within_their_doubt(planted):
     for name, value in truth.items():
         assert abs(found.posterior[name] - value) < 3.0 * found.posterior.sd(name), name
         assert found.posterior.sd(name) < 0.3 * value, name
-    assert share_missed(found.model, planted).max() < 0.05
+    assert missed(found.model, planted).max() < 0.05
 
 
 def test_the_curve_predicts_a_drive_that_did_not_teach(learnt):
     other = driven(5)
-    assert share_missed(learnt.model, other).max() < 0.08
+    assert missed(learnt.model, other).max() < 0.08
     half = learnt.model.band.over(other)
     held = np.mean(np.abs(learnt.model.predict(other) - other.axle_force) <= half, axis=0)
     assert held.min() > 0.8
@@ -92,7 +88,7 @@ def test_two_logs_tell_more_than_one(learnt):
     both = fit([driven(3), driven(5)], sedan())
     for name in ("ln_stiffness_f", "ln_grip_r", "steering_gain", "v_y_bias"):
         assert both.posterior.sd(name) < learnt.posterior.sd(name), name
-    assert share_missed(both.model, driven(5)).max() < share_missed(learnt.model, driven(5)).max()
+    assert missed(both.model, driven(5)).max() < missed(learnt.model, driven(5)).max()
 
 
 def test_a_long_log_in_blocks_teaches_what_it_does_at_once(learnt):
@@ -188,8 +184,8 @@ def test_a_play_of_the_steering_is_found_and_its_curve_is_the_tires(seed):
     assert model["steering_play"] == pytest.approx(PLAY, rel=0.2)
     without = Priors.of(car.told).without(["steering_play"])
     firm = replace(model, p=estimate([Drive.of(log, car.told)], car.told, without).p)
-    assert (share_missed(model, other) < [0.05, 0.05]).all()
-    assert share_missed(model, other)[0] < 0.8 * share_missed(firm, other)[0]
+    assert (missed(model, other) < [0.05, 0.05]).all()
+    assert missed(model, other)[0] < 0.8 * missed(firm, other)[0]
     (note,) = (text for code, text in model.drives.notes if code == "steering_play")
     assert "deg of play" in note
     (found,) = (one for one in examine(log, car.told).findings)

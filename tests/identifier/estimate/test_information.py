@@ -90,8 +90,8 @@ def test_errors_of_a_drives_own_are_marginal(told):
     [
         ({"matrix": np.zeros((3, 3))}, "matrix must have shape"),
         ({"vector": np.zeros(3)}, "vector must have shape"),
-        ({"vector": np.full(SIZE, np.nan)}, "not finite"),
-        ({"seconds": -1.0}, "must not be negative"),
+        ({"vector": np.full(SIZE, np.nan)}, "vector holds a number that is not finite"),
+        ({"seconds": -1.0}, "seconds must not be negative, it is -1"),
         ({"seconds": np.inf}, "must not be negative"),
     ],
 )

@@ -25,9 +25,10 @@ from identifier.motion.model import DAMPING
 from identifier.motion.nodes import LATENT_NAMES
 from identifier.verdict import judge_prediction
 from identifier.verdict.verdict import WITHOUT_V_Y
-from models.recordings import Recording, RecordingError
+from models.recordings import RecordingError
 from models.recordings.record import joined
-from tests.identifier.conftest import steered
+from tests.identifier.conftest import missed, steered
+from tests.made import made
 
 CAR = ti.sedan()
 
@@ -228,9 +229,12 @@ def learnt(exact):
     return fit([blind(exact)], CAR).model
 
 
-def test_tires_that_are_known_tell_the_side_slip_of_another_drive(learnt):
+@pytest.mark.parametrize("degrees", [0.0, 1.0])
+def test_tires_that_are_known_tell_the_side_slip_of_another_drive(learnt, degrees):
+    """The zero of the steering is another in each log."""
     other = driven(9)
-    outcome = learnt.estimated_v_y(blind(other, seed=4))
+    turned = replace(other, delta_f=other.delta_f + np.radians(degrees))
+    outcome = learnt.estimated_v_y(blind(turned, seed=4))
     away = np.degrees((outcome.v_y - other.v_y) / other.v_x)
     assert np.sqrt(np.mean(away**2)) < 0.12
     assert np.mean(np.abs(outcome.v_y - other.v_y) < 2.0 * outcome.sd) > 0.9
@@ -246,13 +250,20 @@ def test_the_estimated_side_slip_goes_on_to_the_last_sample(learnt, exact, less)
         assert np.abs(np.diff(found[end])).max() < 0.1, found[end]
 
 
+def behind_a_filter(log, hertz):
+    return replace(log, a_y=lfilter(*butter(2, 2.0 * hertz * log.dt), log.a_y))
+
+
+def lateness_of(log):
+    return accelerometer_off(log, CAR, latent_priors(CAR, Priors.of(CAR))).late
+
+
 @pytest.mark.parametrize(("hertz", "late"), [(None, 0.0), (5.0, 0.045), (2.0, 0.112)])
 def test_an_accelerometer_behind_a_causal_filter_is_late(exact, hertz, late):
     log = blind(exact)
     if hertz is not None:
-        log = replace(log, a_y=lfilter(*butter(2, 2.0 * hertz * log.dt), log.a_y))
-    found = accelerometer_off(log, CAR, latent_priors(CAR, Priors.of(CAR))).late
-    assert found == pytest.approx(late, abs=0.02)
+        log = behind_a_filter(log, hertz)
+    assert lateness_of(log) == pytest.approx(late, abs=0.02)
 
 
 @pytest.mark.parametrize("ahead", [-1.6, 1.3])
@@ -265,9 +276,7 @@ def test_the_place_of_an_accelerometer_is_no_delay(exact, ahead):
     said = dict(model.drives.notes)["a_y_place"]
     assert ("behind" if ahead < 0.0 else "ahead of") in said
     assert ("ms early" in said and "cannot tell" in said) == (model.reach.a_y_instead < 0.0)
-    true = exact.axle_force
-    missed = np.sqrt(np.mean((model.predict(exact) - true) ** 2, axis=0) / np.mean(true**2, axis=0))
-    assert missed.max() < 0.08
+    assert missed(model, exact).max() < 0.08
     shown = replace(log, v_y=model.estimated_v_y(log).v_y, estimated=("v_y",))
     assert judge_prediction(model, shown).valid
 
@@ -275,7 +284,7 @@ def test_the_place_of_an_accelerometer_is_no_delay(exact, ahead):
 def test_an_a_y_that_was_computed_from_the_motion_is_on_time(exact):
     log = blind(exact)
     log = replace(log, a_y=np.gradient(exact.v_y, exact.dt) + exact.v_x * exact.r)
-    assert abs(accelerometer_off(log, CAR, latent_priors(CAR, Priors.of(CAR))).late) < 0.003
+    assert abs(lateness_of(log)) < 0.003
 
 
 def test_an_a_y_that_is_too_early_stays_and_may_be_measured_ahead(exact):
@@ -291,8 +300,6 @@ def test_an_a_y_that_is_too_early_stays_and_may_be_measured_ahead(exact):
 
 def test_a_delay_that_is_hardly_known_is_not_believed(exact, monkeypatch):
     """As after a single step of the steering."""
-    log = blind(exact)
-    log = replace(log, a_y=lfilter(*butter(2, 10.0 * log.dt), log.a_y))
     outcome = _Latent.spread
 
     def doubtful(*given):
@@ -300,15 +307,7 @@ def test_a_delay_that_is_hardly_known_is_not_believed(exact, monkeypatch):
         return covariance, 400.0 * P, slopes
 
     monkeypatch.setattr(_Latent, "spread", doubtful)
-    assert accelerometer_off(log, CAR, latent_priors(CAR, Priors.of(CAR))).late == 0.0
-
-
-def test_the_zero_of_the_steering_is_another_in_each_log(learnt):
-    other = driven(9)
-    turned = replace(other, delta_f=other.delta_f + np.radians(1.0))
-    outcome = learnt.estimated_v_y(blind(turned, seed=4))
-    away = np.degrees((outcome.v_y - other.v_y) / other.v_x)
-    assert np.sqrt(np.mean(away**2)) < 0.12
+    assert lateness_of(behind_a_filter(blind(exact), 5.0)) == 0.0
 
 
 def test_a_model_keeps_what_it_says_of_its_log(learnt, tmp_path):
@@ -365,13 +364,9 @@ def test_a_side_slip_that_is_hardly_known_judges_no_model(learnt, wider, refused
 
 
 def test_of_a_long_log_the_hardest_part_teaches():
-    n = 40_000
-    t = 0.1 * np.arange(n)
+    t = 0.1 * np.arange(40_000)
     r = np.where((t > 1000.0) & (t < 1300.0), 0.3, 0.01) * np.sin(0.5 * t)
-    log = Recording(
-        name="long", t=t, v_x=np.full(n, 20.0), v_y=None, r=r, delta_f=0.1 * r, delta_r=0.0 * t,
-        a_y=20.0 * r,
-    )  # fmt: skip
+    log = made(t, v_y=None, r=r, delta_f=0.1 * r, a_y=20.0 * r)
     part = hardest(log, 300.0)
     assert part.stop - part.start == 3000 and abs(t[part.start] - 1000.0) < 10.0
     assert hardest(log.between(0.0, 100.0), 300.0) == slice(0, len(log.between(0.0, 100.0)))

@@ -29,9 +29,10 @@ from identifier.estimate.solve import (
     starts,
 )
 from identifier.motion.parameters import INDEX, NAMES
-from models.recordings import Recording, joined
+from models.recordings import joined
 from models.vehicle import GRAVITY, estimate, sedan
 from tests.identifier.estimate.conftest import driven
+from tests.made import made
 
 CAR = sedan()
 PRIORS = Priors.of(CAR)
@@ -179,10 +180,7 @@ def test_what_is_believed_alone_settles_at_its_mean_with_its_covariance():
 def test_straights_show_where_to_begin():
     t = 0.01 * np.arange(2000)
     r = np.where(t > 10.0, 0.3 * np.sin(t), 0.0)
-    drive = Recording(
-        name="straight", t=t, v_x=np.full(t.size, 20.0), v_y=0.4 - r, r=r, delta_f=0.02 + 0.1 * r,
-        delta_r=0.0 * t,
-    )  # fmt: skip
+    drive = made(t, v_y=0.4 - r, r=r, delta_f=0.02 + 0.1 * r)
     plain, bias, angle = starts(Problem([Drive.of(drive, CAR)], CAR, PRIORS))
     np.testing.assert_array_equal(plain, PRIORS.mean)
     names = ("steering_zero", "v_y_bias", "v_y_angle")
@@ -379,10 +377,7 @@ def test_a_bank_is_what_motion_shows_and_no_accelerometer_but_for_roll_and_level
     t = 0.01 * np.arange(4000)
     r, fall = 0.1 * np.sin(2.0 * t), 0.06 * np.exp(-(((t - 20.0) / 4.0) ** 2))
     motion = 20.0 * r
-    drive = Recording(
-        name="bank", t=t, v_x=np.full(t.size, 20.0), v_y=0.0 * t, r=r, delta_f=0.1 * r,
-        delta_r=0.0 * t, a_y=1.05 * (motion - GRAVITY * fall) + 0.03,
-    )  # fmt: skip
+    drive = made(t, r=r, delta_f=0.1 * r, a_y=1.05 * (motion - GRAVITY * fall) + 0.03)
     outcome = Drive.of(drive, CAR).signals[:, 6] / GRAVITY
     middle = (np.abs(t - 20.0) < 2.0) & (np.abs(np.sin(2.0 * t)) < 2.0)
     np.testing.assert_allclose(outcome[middle], fall[middle], atol=0.012)

@@ -111,14 +111,14 @@ def curve(slip, ln):
     return np.exp(ln) * np.tanh(10.0 * slip / np.exp(ln))
 
 
-def from_windows(ln, zero=0.0, noise=0.02, variance=None):
+def from_windows(ln, zero=0.0, variance=0.02**2):
     """What windows tell of a road of some friction, the slip of both axles off by a zero."""
     rng = np.random.default_rng(1)
-    true = curve(SLIP, ln) + noise * rng.standard_normal(SLIP.size)
+    true = curve(SLIP, ln) + 0.02 * rng.standard_normal(SLIP.size)
     away = np.array([true - curve(SLIP - zero, each) for each in GRID])
     slope = np.array([10.0 / np.cosh(10.0 * (SLIP - zero) / np.exp(each)) ** 2 for each in GRID])
     both = [np.repeat(one[..., None], 2, axis=2) for one in (away, slope)]
-    return filtered(WINDOWS, GRID, *both, np.full((SLIP.size, 2), variance or noise**2))
+    return filtered(WINDOWS, GRID, *both, np.full((SLIP.size, 2), variance))
 
 
 @pytest.mark.parametrize("ln", [-0.5, 0.0, 0.4])

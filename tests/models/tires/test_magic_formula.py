@@ -79,19 +79,6 @@ def test_every_term_and_scaling_factor_is_that_of_the_textbook(rng):
         assert ours == pytest.approx(textbook(LOPSIDED.coefficients, a, k, g, F_z, mu), abs=1e-7)
 
 
-@pytest.mark.parametrize("tire", [SEDAN, LOPSIDED, LOPSIDED.mirrored()])
-@pytest.mark.parametrize("F_z", [-100.0, 0.0, 1e-9, 300.0, 4000.0, 9000.0])
-def test_stiffnesses_are_the_derivatives_of_the_forces(tire, F_z):
-    alpha, kappa = ca.SX.sym("alpha"), ca.SX.sym("kappa")
-    F = tire.forces(alpha, kappa, 0.0, F_z)
-    slopes = ca.Function(
-        "slopes", [alpha, kappa], [ca.jacobian(F.F_x, kappa), ca.jacobian(F.F_y, alpha)]
-    )
-    F_x_kappa, F_y_alpha = (float(value) for value in slopes(0.0, 0.0))
-    assert tire.slip_stiffness(F_z) == pytest.approx(F_x_kappa, rel=1e-9, abs=1e-12)
-    assert tire.cornering_stiffness(F_z) == pytest.approx(F_y_alpha, rel=1e-9, abs=1e-12)
-
-
 def test_peak_of_the_curve_is_D():
     """Peak friction PDY1 + PDY2 df_z and PDX1 + PDX2 df_z, found by search."""
     for F_z, mu in ((2000.0, 1.0), (4000.0, 0.5), (8000.0, 1.0)):
@@ -151,17 +138,3 @@ def test_curvature_is_at_most_one(name):
         return replace(SEDAN, coefficients=c).forces(0.2, -0.3, 0.0, 4000.0)
 
     assert force(3.0) == force(1.0) != force(0.9)
-
-
-@pytest.mark.parametrize("kind", [ca.SX, ca.MX, ca.DM])
-def test_symbols_and_floats_give_the_same_force(kind):
-    point = (0.06, -0.04, 0.03, 3500.0, 0.8)
-    if kind is ca.DM:
-        result = LOPSIDED.forces(*(ca.DM(value) for value in point))
-        values = [float(value) for value in result]
-    else:
-        x = [kind.sym(name) for name in ("alpha", "kappa", "gamma", "F_z", "mu")]
-        result = LOPSIDED.forces(*x)
-        values = [float(v) for v in ca.Function("f", x, list(result)).call(list(point))]
-    assert all(isinstance(value, kind) for value in result)
-    assert values == pytest.approx(LOPSIDED.forces(*point), rel=1e-13)

@@ -6,6 +6,7 @@ from math import atan, cos, inf, radians, sin
 import pytest
 
 from models.tires import MagicFormula, TirError, read_tir
+from tests.refused import line_about
 
 ESSENTIAL = {
     "FNOMIN": "4000", "PCX1": "1.6", "PDX1": "1.1", "PKX1": "22", "PCY1": "1.3", "PDY1": "1.0",
@@ -32,14 +33,9 @@ def edited(**changes):
 
 def complaint(folder, text):
     """The one line about a file, without its path."""
-    path = written(folder, text)
-    with pytest.raises(TirError) as error:
-        MagicFormula.from_tir(path)
-    message = str(error.value)
-    assert isinstance(error.value, ValueError)
-    assert message.startswith(f"{path}: ")
-    assert "\n" not in message
-    return message.removeprefix(f"{path}: ")
+    message = line_about(written(folder, text), TirError, MagicFormula.from_tir)
+    assert message.startswith(": ") and issubclass(TirError, ValueError)
+    return message[2:]
 
 
 def test_eight_coefficients_are_a_tire(tmp_path):
