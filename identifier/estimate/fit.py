@@ -13,7 +13,7 @@ import numpy as np
 
 from codegen.arrays import Array, one_thread
 from identifier.day import ENOUGH as ENOUGH_DRIVEN
-from identifier.estimate.day import days_apart
+from identifier.estimate.day import days_apart, steering_zeros
 from identifier.estimate.drive import FASTEST, Drive, hardest
 from identifier.estimate.information import CHANGES, Information
 from identifier.estimate.latent import Learnt, accelerometer_off, latent_priors, learn_latent
@@ -143,6 +143,7 @@ def fit(
         found = replace(found, p=p, covariance=covariance)
     beliefs = before if found is None else _after(before, found)
     for blind in (one for one in recordings if one.logged_v_y is None):
+        blind = replace(blind, delta_f=blind.delta_f - steering_zeros(blind, vehicle))
         try:
             off = accelerometer_off(blind, vehicle, latent_priors(vehicle, beliefs))
             nodes = Nodes.of(
