@@ -670,10 +670,7 @@ def estimate_v_y(
         variance = found.covariance[:, 0, 0] + np.einsum("ni,ij,nj->n", tires, doubt, tires)
         variance += np.einsum("ni,ij,nj->n", free, found.P, free)
         if nodes.counts.sum() > longest:
-            longest, k = (
-                nodes.counts.sum(),
-                int(np.flatnonzero(problem.moves == zero)[0]),
-            )
+            longest, k = nodes.counts.sum(), np.searchsorted(problem.moves, zero)
             found_v_y.steering_zero[:] = found.p[zero], np.sqrt(found.P[k, k])
         bias, roll = (found.p[LATENT_NAMES.index(name)] for name in ("a_y_bias", "roll"))
         turning = np.gradient(found.z[:, 1], nodes.dt)

@@ -338,12 +338,10 @@ def _found(kept: deque[Any], find: Callable[..., _Found], log: Recording, *given
 
 def _steered(recording: Recording, vehicle: Vehicle, day: Day) -> tuple[tuple[int, Day], ...]:
     """Return the days of a log, of which the first is known and others have other zeros."""
-    if recording.logged_v_y is not None or not day.anew:
-        return ((0, day),)
-    zeros, k = steering_zeros(recording, vehicle), NUMBERS.index("steering_zero")
-    firsts = (0, *(int(k) + 1 for k in np.flatnonzero(np.diff(zeros))))
-    known, gain, sd = day["steering_zero"], 1.0 + day["steering_gain"], float(day.sd[k])
-    return tuple((at, day.steered(known + gain * (zeros[0] - zeros[at]), sd)) for at in firsts)
+    zeros = steering_zeros(recording, vehicle)
+    moved = (1.0 + day["steering_gain"]) * (np.array(NUMBERS) == "steering_zero")
+    firsts = [0, *(np.flatnonzero(np.diff(zeros)) + 1).tolist()]
+    return tuple((k, replace(day, value=day.value + moved * (zeros[0] - zeros[k]))) for k in firsts)
 
 
 def _driven(

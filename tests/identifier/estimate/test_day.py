@@ -8,6 +8,7 @@ import pytest
 from identifier.compare.zeros import replayed, zeros
 from identifier.day import NUMBERS, Day, sideways
 from identifier.doctor import diagnose
+from identifier.estimate.day import steering_zeros
 from identifier.estimate.fit import fit
 from identifier.measured import with_doubt
 from identifier.methods import make_method
@@ -91,15 +92,28 @@ def test_without_v_y_a_zero_of_the_steering_is_found_and_no_error_of_v_y_is_take
     assert day["steering_zero"] == pytest.approx(ZERO, abs=0.006)
 
 
-def test_segments_without_v_y_are_read_with_the_zero_that_is_found(tire):
+@pytest.mark.parametrize("sign", [1.0, -1.0, 0.0])
+def test_logs_without_v_y_are_read_with_a_zero_each_and_teach_what_equal_ones_do(tire, sign):
     logs = []
-    for seed in (5, 6):
-        shown = of_another_day(driven(seed))
+    for seed, of in ((5, 1.0), (6, sign)):
+        shown = of_another_day(driven(seed), of)
         a_y = smooth(np.gradient(driven(seed).v_y, shown.dt) + shown.v_x * shown.r)
         logs.append(replace(shown, v_y=None, a_y=a_y))
     blind = joined(logs)
+    found = fit([blind] if sign else logs, sedan()).model
+    assert abs(found["steering_gain"]) < 0.1
+    np.testing.assert_allclose(found.stiffness, tire.stiffness, rtol=0.15)
     blind = replace(blind, v_y=tire.estimated_v_y(blind).v_y, estimated=("v_y",))
+    days = [(at, day["steering_zero"]) for at, day in tire.days(blind)]
+    expected = [(0, ZERO), (len(logs[0]), sign * ZERO)][: 1 + (sign < 1.0)]
+    np.testing.assert_allclose(days, expected, atol=0.006)
     assert share_missed(tire, blind).max() < 0.1
+
+
+def test_a_zero_is_another_only_where_turns_to_both_sides_tell_it(tire):
+    one, ring = driven(5), driven(6)
+    ring = replace(ring, r=np.abs(ring.r), delta_f=1.2 * np.abs(ring.delta_f))
+    assert not steering_zeros(joined([one, ring, one]), sedan()).any()
 
 
 def test_parts_of_a_long_log_are_read_with_the_zeros_of_the_whole(tire, monkeypatch):
