@@ -72,16 +72,16 @@ def days_of(
     Of several logs in a row each long segment has a day of its own where they differ clearly, and
     short ones have that of the one before; else there is one.
     """
-    given, long = (vehicle, p, covariance), long_segments(recording, vehicle)
+    long, z = long_segments(recording, vehicle), slice(0, _ZEROS)
     if len(long) > 1:
-        each, z = [day_of(recording.taken(one), *given) for one in long], slice(0, _ZEROS)
+        each = [day_of(recording.taken(one), vehicle, p, covariance) for one in long]
         weights = [np.linalg.inv(one.covariance[z, z]) for one in each]
         pulls = [W @ one.value[z] for W, one in zip(weights, each, strict=True)]
         mean = np.linalg.solve(np.sum(weights, axis=0), np.sum(pulls, axis=0))
         away = [one.value[z] - mean for one in each]
         if max(float(d @ W @ d) for W, d in zip(weights, away, strict=True)) > _ANOTHER:
             return tuple(zip([0, *(one.start for one in long[1:])], each, strict=True))
-    return ((0, day_of(recording, *given)),)
+    return ((0, day_of(recording, vehicle, p, covariance)),)
 
 
 def steering_zeros(recording: Recording, vehicle: Vehicle) -> Array:
@@ -91,13 +91,13 @@ def steering_zeros(recording: Recording, vehicle: Vehicle) -> Array:
     long segment; other ones have that of the one before. Tires need not be known.
     """
     L, slowest, rows, starts = vehicle.wheelbase, SLOW * vehicle.froude_speed, [], []
-    every = max(round(_SLOWLY * float(np.sqrt(L / SEDAN)) / recording.dt), 1)
+    every = max(round(_SLOWLY * np.sqrt(L / SEDAN) / recording.dt), 1)
     for one in long_segments(recording, vehicle):
         signals = recording.v_x, recording.r, recording.delta_f
         v_x, r, delta = (thinned(signal[one], every) for signal in signals)
         on = (v_x > slowest) & (np.abs(v_x * r) < _GENTLE * GRAVITY)
         ideal = L * r / np.maximum(v_x, slowest)
-        if abs(ideal[on].sum()) < _ONE_SIDED * np.count_nonzero(on):
+        if abs(ideal[on].sum()) < _ONE_SIDED * on.sum():
             rows.append(np.column_stack([delta - ideal, v_x * r, np.gradient(r)])[on])
             starts.append(one.start)
     if len(rows) < 2:

@@ -144,8 +144,8 @@ def fit(
         beliefs, blind = before if found is None else _after(before, found), joined(blinds)
         blind = replace(blind, delta_f=blind.delta_f - steering_zeros(blind, vehicle))
         off = accelerometer_off(blind, vehicle, latent_priors(vehicle, beliefs))
-        late, sway = max(off.late, 0.0), float(beliefs.mean[INDEX["ln_sway"]])
-        nodes = Nodes.of(blind, vehicle, hardest(blind, _BLIND), a_y_late=late, ln_sway=sway)
+        sway, hard = float(beliefs.mean[INDEX["ln_sway"]]), hardest(blind, _BLIND)
+        nodes = Nodes.of(blind, vehicle, hard, max(off.late, 0.0), sway)
         reach = reach.with_(Reach(a_y_late=off.late, a_y_place=off.place, a_y_instead=off.instead))
         if nodes.counts.any():
             learnt = learn_latent(nodes, vehicle, beliefs, off)
@@ -159,8 +159,10 @@ def fit(
         if loose.posterior.p[_PLAY] > _SURELY * loose.posterior.sd(NAMES[_PLAY]):
             return loose
     if days == "found" and sum(len(_alone(one, vehicle)) for one in measured) > 1:
-        alike = len({one.dt for one in measured}) == 1
-        apart = alike and len(days_of(joined(measured), vehicle, model.p, model.covariance)) > 1
+        apart = (
+            len({one.dt for one in measured}) == 1
+            and len(days_of(joined(measured), vehicle, model.p, model.covariance)) > 1
+        )
         share = 0.0 if apart else _missed(measured, model)
         if apart or share > _NOTHING_FITS:  # then tires tell no zeros apart
             each = fit(recordings, vehicle, priors, block=block, coarse=coarse, days="each")

@@ -303,14 +303,6 @@ def test_a_delay_that_is_hardly_known_is_not_believed(exact, monkeypatch):
     assert accelerometer_off(log, CAR, latent_priors(CAR, Priors.of(CAR))).late == 0.0
 
 
-def test_the_zero_of_the_steering_is_another_in_each_log(learnt):
-    other = driven(9)
-    turned = replace(other, delta_f=other.delta_f + np.radians(1.0))
-    outcome = learnt.estimated_v_y(blind(turned, seed=4))
-    away = np.degrees((outcome.v_y - other.v_y) / other.v_x)
-    assert np.sqrt(np.mean(away**2)) < 0.12
-
-
 def test_a_model_keeps_what_it_says_of_its_log(learnt, tmp_path):
     doubtful = replace(learnt, reach=learnt.reach._replace(parted=2.0 * TRUST.parted, a_y_late=0.1))
     doubtful.save(tmp_path / "weights.json")
