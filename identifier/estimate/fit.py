@@ -12,13 +12,12 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from codegen.arrays import Array, one_thread
-from identifier.day import ENOUGH as ENOUGH_DRIVEN
-from identifier.estimate.day import days_apart
+from identifier.estimate.day import days_of, long_segments, steering_zeros
 from identifier.estimate.drive import FASTEST, Drive, hardest
 from identifier.estimate.information import CHANGES, Information
 from identifier.estimate.latent import Learnt, accelerometer_off, latent_priors, learn_latent
 from identifier.estimate.model import FittedModel
-from identifier.estimate.nodes import Nodes, TooShortError
+from identifier.estimate.nodes import Nodes
 from identifier.estimate.posterior import Posterior, Reach, Segment
 from identifier.estimate.priors import SEDAN, Priors
 from identifier.estimate.roads import Roads, with_roads
@@ -112,7 +111,7 @@ def fit(
 
     measured = [one for one in recordings if one.logged_v_y is not None]
     if days == "each":
-        measured = [part for one in measured for part in _alone(one)]
+        measured = [part for one in measured for part in _alone(one, vehicle)]
     for drives in _blocks(measured, vehicle, block, coarse=coarse, alone=days == "each"):
         if not any(one.counts.any() for one in drives):
             continue
@@ -141,41 +140,34 @@ def fit(
     if found is not None and len(parts) > 1:
         p, covariance = settled(before.after(known.counted(share)), found.p)
         found = replace(found, p=p, covariance=covariance)
-    beliefs = before if found is None else _after(before, found)
-    for blind in (one for one in recordings if one.logged_v_y is None):
-        try:
-            off = accelerometer_off(blind, vehicle, latent_priors(vehicle, beliefs))
-            nodes = Nodes.of(
-                blind,
-                vehicle,
-                hardest(blind, _BLIND),
-                a_y_late=max(off.late, 0.0),
-                ln_sway=float(beliefs.mean[INDEX["ln_sway"]]),
-            )
-        except TooShortError:
-            if len(recordings) == 1:
-                raise
-            continue
+    if blinds := [one for one in recordings if one.logged_v_y is None]:
+        beliefs, blind = before if found is None else _after(before, found), joined(blinds)
+        blind = replace(blind, delta_f=blind.delta_f - steering_zeros(blind, vehicle))
+        off = accelerometer_off(blind, vehicle, latent_priors(vehicle, beliefs))
+        sway, hard = float(beliefs.mean[INDEX["ln_sway"]]), hardest(blind, _BLIND)
+        nodes = Nodes.of(blind, vehicle, hard, max(off.late, 0.0), sway)
         reach = reach.with_(Reach(a_y_late=off.late, a_y_place=off.place, a_y_instead=off.instead))
         if nodes.counts.any():
             learnt = learn_latent(nodes, vehicle, beliefs, off)
             found, reach = learnt.posterior, reach.with_(_reach_of_states(learnt))
-            beliefs = _after(beliefs, found)
         went_on(blind.duration)
     if found is None:
-        name = recordings[0].name
-        raise ValueError(f"{name}: no sample is fast enough to learn from")
+        raise ValueError(f"{recordings[0].name}: no sample is fast enough to learn from")
     model = FittedModel(vehicle=vehicle, p=found.p, covariance=found.covariance, reach=reach)
     soft = softness(found.p)[0][0] < -_SOFT  # as of wheels with play, or of zeros that differ
-    if days == "found" and sum(len(_alone(one)) for one in measured) > 1:
-        apart = len({one.dt for one in measured}) == 1
-        apart = apart and bool(days_apart(joined(measured), vehicle, model.p, model.covariance))
+    if days == "found" and sum(len(_alone(one, vehicle)) for one in measured) > 1:
+
+        def are_apart(by: FittedModel) -> bool:
+            one_rate = len({one.dt for one in measured}) == 1
+            return one_rate and len(days_of(joined(measured), vehicle, by.p, by.covariance)) > 1
+
+        apart = are_apart(model)
         share = 0.0 if apart else _missed(measured, model)
         if apart or soft or share > _NOTHING_FITS:  # then tires tell no zeros apart
             each = fit(recordings, vehicle, priors, block=block, coarse=coarse, days="each")
             if apart or _missed(measured, each.model) < _MUCH_LESS * share:
                 return each
-            if soft and days_apart(joined(measured), vehicle, each.model.p, each.model.covariance):
+            if soft and are_apart(each.model):
                 return each
     if soft and not before.moves[_PLAY]:
         loose = fit(recordings, vehicle, before.with_play(), block=block, coarse=coarse, days=days)
@@ -187,27 +179,21 @@ def fit(
 def _missed(recordings: Sequence[Recording], model: FittedModel) -> float:
     """Return the share of the force in the motion that tires miss of the worst axle and log."""
     shares = [0.0]
-    for one in (part for whole in recordings for part in _alone(whole)):
+    for one in (part for whole in recordings for part in _alone(whole, model.vehicle)):
         drive = Drive.of(one, model.vehicle)
         v_x, r = drive.signals[drive.counts][:, [0, 2]].T
         rms = float(np.sqrt(np.mean((v_x * r / GRAVITY) ** 2))) if v_x.size else 0.0
         if rms <= _FORCELESS:
             continue
-        for day in (None, model.on):  # its own zeros only where those of all do not do
-            p = model.p if day is None else day(one).on(model.p)
-            e = simulate(drive, p, model.vehicle)["residual"][drive.counts]
-            share = float(np.sqrt(np.mean(e**2, axis=0)).max()) / rms
-            if share <= _NOTHING_FITS:
-                break
-        shares.append(share)
+        p = model.on(one).on(model.p)
+        e = simulate(drive, p, model.vehicle)["residual"][drive.counts]
+        shares.append(float(np.sqrt(np.mean(e**2, axis=0)).max()) / rms)
     return max(shares)
 
 
-def _alone(recording: Recording) -> list[Recording]:
+def _alone(recording: Recording, vehicle: Vehicle) -> list[Recording]:
     """Return the segments of a log that are long enough for a day of their own, or the log."""
-    long = [
-        one for one in recording.segments if (one.stop - one.start) * recording.dt >= ENOUGH_DRIVEN
-    ]
+    long = long_segments(recording, vehicle)
     return [recording.taken(one) for one in long] if len(long) > 1 else [recording]
 
 

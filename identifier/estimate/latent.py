@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from codegen import Scan
 from codegen.arrays import Array, one_thread
+from identifier.estimate.day import steering_zeros
 from identifier.estimate.drive import hardest
 from identifier.estimate.nodes import JERKS, Nodes, earlier, low_passed
 from identifier.estimate.posterior import Posterior
@@ -116,7 +117,7 @@ TRUST = _Trust()
 class LateralVelocity(NamedTuple):
     """v_y at each sample and its standard deviation [m/s], whether it is known, and what the
     accelerometer shows beside forces of tires [weights], (n,).
-    steering_zero : found with it, and its standard deviation [rad], (2,).
+    steering_zero : at the first, found with it, and its standard deviation [rad], (2,).
     """
 
     v_y: Array
@@ -652,6 +653,8 @@ def estimate_v_y(
         np.array([0.0, OF_CAR["steering_zero"].sd]),
     )
     longest, zero = 0, INDEX["steering_zero"]
+    zeros = steering_zeros(recording, vehicle)
+    recording = replace(recording, delta_f=recording.delta_f - zeros)
     off = accelerometer_off(recording, vehicle, fixed())
     for outer, inner in _blocks(recording):
         sway = float(p[INDEX["ln_sway"]])
@@ -667,10 +670,7 @@ def estimate_v_y(
         variance = found.covariance[:, 0, 0] + np.einsum("ni,ij,nj->n", tires, doubt, tires)
         variance += np.einsum("ni,ij,nj->n", free, found.P, free)
         if nodes.counts.sum() > longest:
-            longest, k = (
-                nodes.counts.sum(),
-                int(np.flatnonzero(problem.moves == zero)[0]),
-            )
+            longest, k = nodes.counts.sum(), np.searchsorted(problem.moves, zero)
             found_v_y.steering_zero[:] = found.p[zero], np.sqrt(found.P[k, k])
         bias, roll = (found.p[LATENT_NAMES.index(name)] for name in ("a_y_bias", "roll"))
         turning = np.gradient(found.z[:, 1], nodes.dt)
@@ -679,6 +679,7 @@ def estimate_v_y(
     for one in recording.segments if off.late > 0.0 else ():
         felt = recording.needed("a_y")[one]
         found_v_y.beside[one] += (felt - earlier(felt, off.late / recording.dt)) / GRAVITY
+    found_v_y.steering_zero[0] -= (1.0 + p[INDEX["steering_gain"]]) * zeros[0]
     for values in found_v_y:
         values.setflags(write=False)
     return found_v_y

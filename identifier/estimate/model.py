@@ -16,10 +16,10 @@ from identifier.axle.curve import Curve
 from identifier.axle.dynamics import lagged_force, series_compliance
 from identifier.axle.gate import GateState, Plausibility
 from identifier.axle.slip import SHORTEST, Sway
-from identifier.day import Day
+from identifier.day import NUMBERS, Day
 from identifier.estimate import report
 from identifier.estimate.band import FittedBand
-from identifier.estimate.day import day_of, days_of
+from identifier.estimate.day import day_of, days_of, steering_zeros
 from identifier.estimate.drive import Drive
 from identifier.estimate.latent import LateralVelocity, estimate_v_y
 from identifier.estimate.posterior import Reach
@@ -189,9 +189,9 @@ class FittedModel(TireModel):
     def days(self, recording: Recording) -> tuple[tuple[int, Day], ...]:
         if self.held is not None:
             return self.held
-        if not recording.breaks or recording.logged_v_y is None:
-            return _found(_LAST, _one, recording, self.on(recording))
-        return self._known(recording, days_of)
+        if recording.breaks and recording.logged_v_y is not None:
+            return self._known(recording, days_of)
+        return _found(_LAST, _steered, recording, self.vehicle, self.on(recording))
 
     def of_day(self, day: Day) -> Self:
         """Return the tires read by sensors with these errors: every log, the tracker, C."""
@@ -336,9 +336,12 @@ def _found(kept: deque[Any], find: Callable[..., _Found], log: Recording, *given
     return found
 
 
-def _one(recording: Recording, day: Day) -> tuple[tuple[int, Day], ...]:
-    del recording
-    return ((0, day),)
+def _steered(recording: Recording, vehicle: Vehicle, day: Day) -> tuple[tuple[int, Day], ...]:
+    """Return the days of a log, of which the first is known and others have other zeros."""
+    zeros = steering_zeros(recording, vehicle)
+    moved = (1.0 + day["steering_gain"]) * (np.array(NUMBERS) == "steering_zero")
+    firsts = [0, *(np.flatnonzero(np.diff(zeros)) + 1).tolist()]
+    return tuple((k, replace(day, value=day.value + moved * (zeros[0] - zeros[k]))) for k in firsts)
 
 
 def _driven(

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array
-from codegen.errors import TireidError
 from identifier.axle.slip import Sway
 from identifier.estimate.drive import (
     ALONG,
@@ -24,7 +23,7 @@ from identifier.estimate.drive import (
 )
 from identifier.estimate.priors import SEDAN
 from identifier.motion.model import DAMPING
-from models.recordings import Recording
+from models.recordings import Recording, RecordingError
 from models.recordings.record import ALL
 from models.vehicle import Vehicle
 
@@ -33,10 +32,6 @@ _LEAST_BETWEEN = 0.02  # [s] that it is at least
 _ROLLS = 5.0  # Hz of a sedan, below which a_y rolls the body
 JERKS = 3.0  # Hz of a sedan, below which a_y is differentiated
 _FEWEST_NODES = 3  # nodes of a segment
-
-
-class TooShortError(TireidError, ValueError):
-    """A log has too few samples for states of its own."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,7 +65,7 @@ class Nodes:
         Raises
         ------
         RecordingError
-            Where there is no a_y.
+            Where there is no a_y, or too few samples.
         """
         between = max(_BETWEEN * vehicle.froude_time, _LEAST_BETWEEN)
         every = max(1, round(between / recording.dt))
@@ -85,7 +80,7 @@ class Nodes:
                 felt = earlier(a_y[first:last], a_y_late / recording.dt)[: count * every]
                 pieces.append(_piece(recording, some, vehicle, every, felt, ln_sway))
         if not pieces:
-            raise TooShortError(f"{recording.name}: too short to learn from without v_y")
+            raise RecordingError(f"{recording.name}: too short to learn from without v_y")
         t, given, measured, counts, goes = (
             np.concatenate(parts) for parts in zip(*pieces, strict=True)
         )

@@ -40,7 +40,7 @@ _ITERATIONS = 25  # of a descent, at most
 ENOUGH = 0.02  # [nats] of improvement, below which it ends
 _COARSE = 0.045  # [s] of a sedan, between samples of the problem that starts are tried in
 _COARSELY = 0.2  # [nats] of improvement, below which a descent there ends
-_SAME_SLOPES = 0.2  # of what the first step on slopes gained, that another on them must gain
+_SAME_SLOPES = 0.2  # of what steps on slopes gained, that another on them must gain
 _SETTLED_MEMORY = 0.1  # |ln| by which T changes where the descent may end
 _SETTLING = 60  # iterations at most where no drive is looked at
 _SETTLED = 1e-4  # [nats] of improvement, below which these end
@@ -357,27 +357,27 @@ def descend(
     p, damping = start.copy(), 1e-3 if memory is None else 1e-6  # then it is near
     # Far from the optimum all residuals are correlated: by their T they would count for nothing.
     T = np.full(2, _SHORTEST_MEMORY) if memory is None else memory
-    settled, ended, moved, first = memory is not None, False, True, 0.0
-    now, taken = problem.residuals(p), 1  # slopes; `first` of the steps on them gained so much
+    settled, ended, moved, total = memory is not None, False, True, 0.0
+    now, taken = problem.residuals(p), 1  # slopes; steps on them gained so much: `total`
     for look in itertools.count():
         S2 = problem.scale(now.e)
         if memory is None and look:
             found = problem.memory(now.e)
             before, T = T, np.sqrt(T * found) if moved else found
             settled = bool(np.abs(np.log(T / before)).max() < _SETTLED_MEMORY) or not moved
-        p, e, damping, gained = _better(problem, now, p, (S2, T), damping, enough, once=first > 0.0)
+        p, e, damping, gained = _better(problem, now, p, (S2, T), damping, enough, once=total > 0.0)
         now = now._replace(e=e)
-        if gained > max(_SAME_SLOPES * first, enough):
-            first, moved = first or gained, True
-        elif not (first or gained or settled):
+        if gained > max(_SAME_SLOPES * total, enough):
+            total, moved = total + gained, True
+        elif not (total or gained or settled):
             moved = False  # T alone does
         else:
-            ended = not first and settled
+            ended = not total and settled
             if not (ended and not gained):
                 now = problem.residuals(p)
             if ended or taken == iterations:
                 break
-            taken, moved, first = taken + 1, True, 0.0
+            taken, moved, total = taken + 1, True, 0.0
     S2, T = problem.scale(now.e), problem.memory(now.e) if memory is None else memory
     H, gradient = normal(problem, now, S2, T)
     slope, curvature = _of_drives(problem, H, gradient)

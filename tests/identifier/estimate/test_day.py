@@ -8,6 +8,7 @@ import pytest
 from identifier.compare.zeros import replayed, zeros
 from identifier.day import NUMBERS, Day, sideways
 from identifier.doctor import diagnose
+from identifier.estimate.day import steering_zeros
 from identifier.estimate.fit import fit
 from identifier.measured import with_doubt
 from identifier.methods import make_method
@@ -99,25 +100,31 @@ def test_zeros_that_differ_on_gentle_bends_are_no_play_and_no_ratio():
     assert abs(found["steering_gain"]) < 0.1
 
 
-def test_without_v_y_a_zero_of_the_steering_is_found_and_no_error_of_v_y_is_taken_off(tire):
-    model = replace(tire, p=replace(tire.on(driven(5)), value=np.full(5, 0.01)).on(tire.p))
-    shown = driven(5)
-    a_y = np.gradient(shown.v_y, shown.dt) + shown.v_x * shown.r
-    blind = replace(of_another_day(shown), v_y=None, a_y=smooth(a_y), axle_force=None)
-    day = model.on(replace(blind, v_y=model.estimated_v_y(blind).v_y, estimated=("v_y",)))
-    assert day["v_y_bias"] == day["v_y_angle"] == day["v_y_lever"] == 0.0
-    assert day["steering_zero"] == pytest.approx(ZERO, abs=0.006)
-
-
-def test_segments_without_v_y_are_read_with_the_zero_that_is_found(tire):
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_each_log_without_v_y_has_a_zero_of_its_own_and_no_error_of_v_y(tire, sign):
     logs = []
-    for seed in (5, 6):
-        shown = of_another_day(driven(seed))
+    for seed, of in ((5, 1.0), (6, sign)):
+        shown = of_another_day(driven(seed), of)
         a_y = smooth(np.gradient(driven(seed).v_y, shown.dt) + shown.v_x * shown.r)
         logs.append(replace(shown, v_y=None, a_y=a_y))
-    blind = joined(logs)
-    blind = replace(blind, v_y=tire.estimated_v_y(blind).v_y, estimated=("v_y",))
-    assert missed(tire, blind).max() < 0.1
+    found, blind = fit(logs, sedan()).model, joined(logs)
+    assert abs(found["steering_gain"]) < 0.1
+    np.testing.assert_allclose(found.stiffness, tire.stiffness, rtol=0.15)
+    model = replace(tire, p=replace(tire.on(driven(5)), value=np.full(5, 0.01)).on(tire.p))
+    blind = replace(blind, v_y=model.estimated_v_y(blind).v_y, estimated=("v_y",))
+    (_, day), *_ = days = model.days(blind)
+    assert day["v_y_bias"] == day["v_y_angle"] == day["v_y_lever"] == 0.0
+    expected = [(0, ZERO), (len(logs[0]), -ZERO)][: len({1.0, sign})]
+    np.testing.assert_allclose(
+        [(at, one["steering_zero"]) for at, one in days], expected, atol=0.006
+    )
+    assert missed(model, blind).max() < 0.1
+
+
+def test_a_zero_is_another_only_where_turns_to_both_sides_tell_it():
+    one, still = driven(5), np.ones(len(driven(5)))
+    ring = replace(one, v_x=10.0 * still, r=0.15 * still, delta_f=0.055 * still)
+    assert not steering_zeros(joined([one, ring, one]), sedan()).any()
 
 
 def test_parts_of_a_long_log_are_read_with_the_zeros_of_the_whole(tire, monkeypatch):

@@ -114,6 +114,11 @@ def test_a_descent_ends_where_no_parameter_gains_and_tells_its_curvature(problem
     np.testing.assert_allclose(found.slope[problem.index], g, rtol=1e-9)
 
 
+def test_a_descent_that_gains_as_much_for_ever_ends_at_its_limit(problem, monkeypatch):
+    monkeypatch.setattr(solve, "_better", lambda _, now, p, *a, **k: (p, now.e, 1e-3, 1.0))
+    assert not descend(problem, PRIORS.mean).ended
+
+
 def test_scale_is_that_of_students_t_and_what_is_better_is_not_believed(problem, rng):
     m = problem.weight.size
     many = Problem(problem.drives * 20, CAR, PRIORS)
