@@ -171,10 +171,7 @@ def windows(recording: Recording) -> Means:
 
     No window reaches from one segment into the next.
     """
-    every = max(round(STRIDE / recording.dt), 1) * thinning(len(recording))
-    counts = recording.v_x >= moving(recording.v_x)
-    w = Windows.where(counts, recording, WINDOW, every)
-    v_y = recording.logged_v_y
+    w, v_y = _windows(recording), recording.logged_v_y
 
     def mean(signal: Array | None) -> Array | None:
         return None if signal is None else w.mean(signal)
@@ -191,6 +188,11 @@ def windows(recording: Recording) -> Means:
         a_y=mean(recording.a_y),
         force=mean(recording.axle_force),
     )
+
+
+def _windows(recording: Recording) -> Windows:
+    every = max(round(STRIDE / recording.dt), 1) * thinning(len(recording))
+    return Windows.where(recording.v_x >= moving(recording.v_x), recording, WINDOW, every)
 
 
 def least_squares(X: Array, y: Array) -> Fit:
@@ -341,15 +343,8 @@ def computed_v_y(recording: Recording) -> str | None:
     noise. What the formula leaves then goes with nothing that moves: else v_y has another unit, or
     is an angle.
     """
-    y, v_x, r, a_y, dt = (
-        recording.logged_v_y,
-        recording.v_x,
-        recording.r,
-        recording.a_y,
-        recording.dt,
-    )
-    every = max(round(STRIDE / dt), 1) * thinning(len(recording))
-    w = Windows.where(v_x >= moving(v_x), recording, WINDOW, every)
+    w, y, a_y = _windows(recording), recording.logged_v_y, recording.a_y
+    v_x, r, dt = recording.v_x, recording.r, recording.dt
     if y is None or len(w) < _FEWEST or not np.ptp(r) > 0.0:
         return None
     from scipy.optimize import minimize_scalar  # takes long to import
@@ -360,11 +355,11 @@ def computed_v_y(recording: Recording) -> str | None:
         return np.asarray(lfilter([share], [1.0, share - 1.0], x, zi=[(1.0 - share) * x[0]])[0])
 
     def rest(of: Array, *beside: Array) -> Array:
-        q, _ = np.linalg.qr(np.column_stack([np.ones(len(w)), w.mean(v_x), *map(w.mean, beside)]))
-        return np.asarray(of - q @ (q.T @ of))
+        q, _ = np.linalg.qr(np.column_stack([np.ones(len(w)), *map(w.mean, (v_x, *beside))]))
+        return w.mean(of) - q @ (q.T @ w.mean(of))
 
-    def left(signal: Array, *beside: Array) -> float:
-        return float(np.std(rest(w.mean(signal), *beside)))
+    def left(*signals: Array) -> float:
+        return float(np.std(rest(*signals)))
 
     turn = w.mean(v_x, r)
     slope = 1.0 if a_y is None else float(w.mean(a_y) @ turn / (turn @ turn))
@@ -378,22 +373,22 @@ def computed_v_y(recording: Recording) -> str | None:
     tau = minimize_scalar(
         lambda tau: left(y, behind(r, tau)), bounds=(0.0, _BEHIND), method="bounded"
     ).x
-    formulas = ("r", r), ("r", behind(r, float(tau))), ("vx delta_f", v_x * recording.delta_f)
+    formulas = ("r", r), ("r", behind(r, tau)), ("vx delta_f", v_x * recording.delta_f)
     needed = min(left(y + one, r) for one in slips)
     of, x = min(formulas, key=lambda one: left(y, one[1]))
     beside = [x] if left(y) > _COMPUTED * needed else []
-    e, missed = rest(w.mean(y), *beside), left(y, *beside)
-    moved = [*slips[::3], v_x * slips[3], behind(r, 0.2), behind(r, 0.4)]  # not r: its own noise
-    moved += [] if beside else [r, v_x * recording.delta_f]
-    random = np.std(rest(e, *beside, *moved)) ** 2 > (1.0 - _AT_RANDOM) * missed**2
+    missed = left(y, *beside)
+    moved = [*slips[::3], v_x * slips[3], behind(r, 0.2), behind(r, 0.4)]
+    moved += beside or [r, v_x * recording.delta_f]  # else not r: its own noise
+    random = left(y, *moved) ** 2 > (1.0 - _AT_RANDOM) * missed**2
+    random &= not beside or missed < _FOLLOWS * left(y)
     exact = missed < _EXACTLY * min(needed, left(y))
     angle = min(left(v_x * y + one, v_x * r) for one in slips)
-    random &= not beside or missed < _FOLLOWS * left(y)
     if missed > _COMPUTED * needed or not (random or exact) or left(v_x * y, v_x * x) > angle:
         return None
     how = f"is held near zero, within {missed:.1g} m/s, as by a filter"
     if beside:
-        along = rest(w.mean(x))
+        along = rest(x)
         factor = float(along @ w.mean(y) / (along @ along))
         how = f"is computed from {of} (v_y = {factor:#.3g} {of})"
     remedy = "and give ay" if a_y is None else "of the log: ay is there"
