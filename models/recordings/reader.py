@@ -174,7 +174,7 @@ def _judged(
 
 def _lateral(log: LogFile, recording: Recording, given: LogMap, run: str | None) -> str:
     """Return which channel is the lateral acceleration where a_y is none; "" where it is one."""
-    if recording.a_y is None or abs(_turning(recording)[1]) > _UNLIKE:
+    if abs(_turning(recording)[1]) > _UNLIKE:
         return ""
     for one in log.headings()[:_MOST_TRIED]:
         read = given.with_signals({"a_y": Signal(channel=(one.name,))})
@@ -191,9 +191,10 @@ def _lateral(log: LogFile, recording: Recording, given: LogMap, run: str | None)
 def _turning(recording: Recording) -> tuple[float, float]:
     """Return the slope of a_y on v_x r, and their correlation; 1 where nothing turns."""
     w = windows(recording)
-    both = pair(w.v_x_r, w.v_x_r if w.a_y is None else w.a_y)
-    slope = least_squares(w.v_x_r[:, None], w.a_y).theta[0] if w.a_y is not None else 1.0
-    return float(slope), both.correlation if both.seconds >= 2.0 else 1.0
+    felt = w.v_x_r if w.a_y is None else w.a_y
+    both = pair(w.v_x_r, felt)
+    slope = float(least_squares(w.v_x_r[:, None], felt).theta[0])
+    return slope, both.correlation if both.seconds >= 2.0 else 1.0
 
 
 def runs(path: str | Path) -> list[str]:
