@@ -71,6 +71,10 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
     kept = ~np.isnan(channel.values)
     if kept.all() or not kept.any() or (not cut and holes(channel).size):
         return channel
+    return _kept(channel, kept)
+
+
+def _kept(channel: Channel, kept: NDArray[np.bool_]) -> Channel:
     t, values, rows = channel.t[kept], channel.values[kept], channel.rows[kept]
     return replace(channel, t=t, values=values, rows=rows)
 
@@ -92,9 +96,8 @@ def without_codes(channel: Channel) -> tuple[Channel, str]:
     rest = np.where(np.isin(values, ends), np.nan, values)
     step = np.fmax.reduce(np.abs(np.diff(rest)), initial=0.0)
     codes = [one for one in ends if np.fmin.reduce(np.abs(rest - one)) > _FAR * step > 0.0]
-    kept = ~np.isin(values, codes)
-    t, rows, said = channel.t[kept], channel.rows[kept], ", ".join(f"{one:.9g}" for one in codes)
-    return replace(channel, t=t, values=values[kept], rows=rows) if codes else channel, said
+    said = ", ".join(f"{one:.9g}" for one in codes)
+    return _kept(channel, ~np.isin(values, codes)) if codes else channel, said
 
 
 def _are_codes(numbers: Array) -> NDArray[np.bool_]:
