@@ -404,5 +404,4 @@ def _low_pass(name: str, signal: Array, cut_off: float, dt: float) -> Array:
 
     b, a = butter(2, cut_off, fs=1.0 / dt)
     filtered, _ = lfilter(b, a, signal, zi=lfilter_zi(b, a) * signal[0])
-    smooth: Array = filtered
-    return smooth
+    return filtered

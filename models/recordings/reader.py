@@ -73,9 +73,11 @@ def read_recording(
         One line: file and run, column, rule, value, remedy.
     """
     given = with_columns(map_of(log_map), columns)
-    if not isinstance(source, str | PathLike):
+    if isinstance(source, str | PathLike):
+        name, log = name or _stem(Path(source)), given.opened(source)
+    else:
         name = name or "recording"
-        arrays = open_arrays(
+        log = open_arrays(
             name,
             source,
             given.clock,
@@ -83,10 +85,8 @@ def read_recording(
             mend=given.order == MEND,
             rate=given.rate or 0.0,
         )
-        return _judged(arrays, name, replace(given, clock=""), run=run, dt=dt, check=check)
-    path = Path(source)
-    log = given.opened(path)
-    return _judged(log, name or _stem(path), given, run=run, dt=dt, check=check)
+        given = replace(given, clock="")
+    return _judged(log, name, given, run=run, dt=dt, check=check)
 
 
 def read_repaired(

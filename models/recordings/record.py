@@ -104,11 +104,12 @@ class Recording:
         if not set(self.estimated) <= {"v_y"}:
             raise RecordingError(f"{self.name}: estimated may name v_y, not {self.estimated}")
         for piece in self.segments:
-            if min(piece.stop, n) - piece.start < MINIMUM_SAMPLES:
+            count = min(piece.stop, n) - piece.start
+            if count < MINIMUM_SAMPLES:
                 whole = "a recording" if not self.breaks else "each segment of a recording"
                 raise RecordingError(
                     f"{self.name}: {whole} needs at least {MINIMUM_SAMPLES} samples, it has "
-                    f"{max(min(piece.stop, n) - piece.start, 0)}"
+                    f"{max(count, 0)}"
                 )
         for name in _SIGNALS:
             value = getattr(self, name)
@@ -168,8 +169,7 @@ class Recording:
         """
         breaks = np.array(self.breaks, dtype=np.intp)
         first, last = (np.searchsorted(breaks, at, side="right") for at in (starts, starts + n))
-        inside: NDArray[np.bool_] = first == last
-        return inside
+        return first == last
 
     @property
     def x(self) -> Array:
@@ -254,15 +254,14 @@ class Recording:
         slack = 1e-6 * self.dt
         first = int(np.searchsorted(self.t, t0 - slack, side="left"))
         last = int(np.searchsorted(self.t, t1 + slack, side="right"))
-        keep = slice(first, max(first, last))
-        count = keep.stop - keep.start
+        count = max(last - first, 0)
         if count < MINIMUM_SAMPLES:
             raise RecordingError(
                 f"{self.name}: between {t0:g} and {t1:g} s there are {count} "
                 f"samples, at least {MINIMUM_SAMPLES} are needed; the recording runs from "
                 f"{self.t[0]:g} to {self.t[-1]:g} s"
             )
-        return self.taken(keep)
+        return self.taken(slice(first, last))
 
     def __getitem__(self, times: slice) -> "Recording":
         """Return the part between two times [s], both included, as label slices of pandas have it.
@@ -564,5 +563,4 @@ def _integral(t: Array, value: Array, total: Array, at: Array) -> Array:
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
     ahead = at - t[k]
     slope = (value[k + 1] - value[k]) / (t[k + 1] - t[k])
-    area: Array = total[k] + ahead * (value[k] + slope * ahead / 2.0)
-    return area
+    return total[k] + ahead * (value[k] + slope * ahead / 2.0)

@@ -198,8 +198,7 @@ def spikes(signal: Array, white: float) -> NDArray[np.intp]:
     beside = np.stack([signal[:-4], signal[1:-3], signal[3:-1], signal[4:]])
     off = np.abs(signal[2:-2] - np.median(beside, axis=0))
     around = np.maximum(0.05 * swing(signal), 3.0 * np.ptp(beside, axis=0))
-    found: NDArray[np.intp] = np.flatnonzero(off > np.maximum(_SPIKE * white, around)) + 2
-    return found
+    return np.flatnonzero(off > np.maximum(_SPIKE * white, around)) + 2
 
 
 def lateness(signal: Array, dt: float, step: float) -> tuple[float, float] | None:
@@ -240,8 +239,7 @@ def lateness(signal: Array, dt: float, step: float) -> tuple[float, float] | Non
 def _variance(X: Array, y: Array) -> Array:
     """Return the variance that a first fit says each sample has."""
     theta, *_ = np.linalg.lstsq(X, y, rcond=None)
-    variance: Array = np.maximum(X @ theta, 0.1 * float(np.mean(y)))
-    return variance
+    return np.maximum(X @ theta, 0.1 * float(np.mean(y)))
 
 
 # The clock: all signals at once.

@@ -61,15 +61,14 @@ class Wheels:
     acceleration: float = 12.0
 
     def __post_init__(self) -> None:
-        for name, sizes, words in (
-            ("radius", (0, 1, 2, 4), "one number, one per axle or one per wheel"),
-            ("track", (0, 1, 2), "one number or one per axle"),
+        for name, sizes, words, ends in (
+            ("radius", (0, 1, 2, 4), "one number, one per axle or one per wheel", _RADII),
+            ("track", (0, 1, 2), "one number or one per axle", _LENGTHS),
         ):
             given = getattr(self, name)
             if len(given) not in sizes:
                 raise RecordingError(f"wheels: {name} must be {words}, not {len(given)} numbers")
-        for name, ends in (("radius", _RADII), ("track", _LENGTHS)):
-            for one in getattr(self, name):
+            for one in given:
                 require_within(RecordingError, *ends, **{f"wheels: {name}": one})
         if self.wheelbase is not None:
             require_within(RecordingError, *_LENGTHS, **{"wheels: wheelbase": self.wheelbase})
@@ -85,11 +84,10 @@ class Wheels:
         """Return the radius of a wheel [m], of `wheel` that of the rear axle; None: unknown."""
         if not self.radius:
             return None
-        k = WHEELS.index(name) if name in WHEELS[:4] else 2
-        if len(self.radius) == 4:
-            one = self.radius[2:] if name not in WHEELS[:4] else self.radius[k : k + 1]
-            return sum(one) / len(one)
-        return self.radius[min(k // 2, len(self.radius) - 1)]
+        k, size = WHEELS.index(name), len(self.radius)
+        corners = [self.radius[corner * size // 4] for corner in range(4)]
+        some = corners[k : k + 1] or corners[2:]
+        return sum(some) / len(some)
 
     def completed(self, vehicle: Vehicle) -> "Wheels":
         """Return it, completed by what the vehicle declares."""
