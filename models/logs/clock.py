@@ -181,23 +181,17 @@ def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]
 
     A channel speaks for one interval after each of its samples, but not into a gap.
     """
-    spans = [(-np.inf, np.inf)]
+    begins, ends = [], []
     for t in times:
         cuts = gaps(t, longest)
-        first = t[np.concatenate([[0], cuts])]
-        last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - _ON_STEP) * _interval(t)
-        intervals = list(zip(first.tolist(), last.tolist(), strict=True))
-        found, i, j = [], 0, 0
-        while i < len(spans) and j < len(intervals):
-            begin, end = max(spans[i][0], intervals[j][0]), min(spans[i][1], intervals[j][1])
-            if begin < end:
-                found.append((begin, end))
-            if spans[i][1] < intervals[j][1]:
-                i += 1
-            else:
-                j += 1
-        spans = found
-    return spans
+        begins.append(t[np.concatenate([[0], cuts])])
+        ends.append(t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - _ON_STEP) * _interval(t))
+    edges = np.concatenate(begins + ends)
+    order = np.argsort(edges, kind="stable")
+    there = np.cumsum(np.where(order < edges.size // 2, 1, -1))
+    k, edges = np.flatnonzero(there == len(times)), edges[order]
+    spans = zip(edges[k].tolist(), edges[k + 1].tolist(), strict=True)
+    return [(begin, end) for begin, end in spans if begin < end]
 
 
 def sampled(raw: Raw, grid: Array, dt: float) -> Array:

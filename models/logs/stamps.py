@@ -414,8 +414,7 @@ def _in_digits(text: str) -> str:
         word = found["month"].lower() if found else ""
         month = _MONTHS.get(word, _MONTHS.get(word[:3]))
         if found and month:
-            year = int(found["year"]) + 2000 * (len(found["year"]) == 2)
-            return f"{year}-{month:02d}-{int(found['day']):02d} {found['time'] or ''}".strip()
+            return f"{found['day']}.{month}.{found['year']} {found['time'] or ''}".strip()
     return ""
 
 
@@ -564,16 +563,16 @@ def since(t: Array, first: float) -> Array:
 
 def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
     """Return stamps in seconds, (n,); those of the calendar from the first on."""
-    first, values = values[0], np.cumsum(values) if clock.summed else values
     per_second = PER_SECOND.get(clock.unit, 1.0)
+    first, values = 0, np.cumsum(values) if clock.summed else values
     if clock.unit == "instant":
-        return filled(values.size, lambda part: (values[part] - first) / 1e9)
+        first, per_second = values[0], 1e9
     if clock.unit == "hhmmss":
         start = float(_of_digits(values[:1])[0])
         return filled(values.size, lambda part: np.round(_of_digits(values[part]) - start, 6))
     if per_second == 1.0:
         return values
-    return filled(values.size, lambda part: values[part] / per_second)
+    return filled(values.size, lambda part: (values[part] - first) / per_second)
 
 
 def started(clock: Clock, cell: str) -> float:
