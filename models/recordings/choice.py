@@ -196,9 +196,9 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
     found = {}
     for name in QUANTITIES:
         column = column_of(name)
-        if f"{column} (2)" in names and name in SPARED:
-            continue
         if f"{column} (2)" in names:
+            if name in SPARED:
+                continue
             raise RecordingError(f"{log.path}: column {column} appears more than once")
         if column in names and name not in (BETA, *POSE):
             found[name] = Signal(channel=(column,))

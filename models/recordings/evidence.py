@@ -369,7 +369,7 @@ def computed_v_y(recording: Recording) -> str | None:
     tau = minimize_scalar(
         lambda tau: left(y, behind(r, tau)), bounds=(0.0, _BEHIND), method="bounded"
     ).x
-    formulas = ("r", behind(r, tau)), ("vx delta_f", v_x * recording.delta_f)
+    formulas = ("r", r), ("r", behind(r, tau)), ("vx delta_f", v_x * recording.delta_f)
     needed = min(left(y + one, r) for one in slips)
     of, x = min(formulas, key=lambda one: left(y, one[1]))
     beside = [x] if left(y) > _COMPUTED * needed else []

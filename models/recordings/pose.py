@@ -72,7 +72,8 @@ def with_pose(
     gyro = parts["r"][0] if "r" in parts else None
     slow = typical_step(motion.r.t) > _SLOW
     of_pose = {"v_x": motion.v_x, "v_y": motion.v_y}
-    of_pose |= {} if slow and gyro is not None else {"r": motion.r}
+    if gyro is None or not slow:
+        of_pose["r"] = motion.r
     what = "vx, vy and r" if "r" in of_pose else "vx and vy"
     said = [f"{what} are taken from the pose{motion.said}"]
     late = None if gyro is None else _lateness(gyro, motion.r)

@@ -171,9 +171,8 @@ class Repair:
             name: _added(getattr(self, name), getattr(other, name))
             for name in ("offset", "delay", "lag")
         }
-        factor = dict(self.factor)
-        for key, value in other.factor.items():
-            factor[key] = factor.get(key, 1.0) * value
+        one, more = self.factor, other.factor
+        factor = {key: one.get(key, 1.0) * more.get(key, 1.0) for key in {**one, **more}}
         places = {name: getattr(self, name) + getattr(other, name) for name in _SCALARS}
         return Repair(
             factor=factor,

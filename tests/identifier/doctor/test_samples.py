@@ -126,7 +126,7 @@ def driven(to, lasts=60.0, dt=DT):
     turn = np.interp(t, [5.0, 15.0, 18.0, 20.0], [0.0, 1.0, 1.0, 0.0])
     turn = np.convolve(np.convolve(turn, smooth, "same"), smooth, "same")
     waves = np.clip((t - 25.0) / 5.0, 0.0, 1.0) ** 2 * np.sin(2.0 * math.pi * (t - 25.0) / 7.0)
-    motion = dict(v_y=(0.05, 0.2), r=(0.2, 0.1), delta_f=(0.03, 0.0), a_y=(4.0, 0.12))
+    motion = dict(v_y=(-0.3, 0.2), r=(0.2, 0.1), delta_f=(0.03, 0.0), a_y=(4.0, 0.12))
     exact = {n: x * np.interp(t - late, t, turn + waves) for n, (x, late) in motion.items()}
     exact["v_x"] = 20.0 + 0.002 * t
     return Recording(
