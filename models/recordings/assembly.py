@@ -111,14 +111,11 @@ def recording_of(
     try:
         signals, parts, posed, segments = on_one_clock(signals)
     except RecordingError as error:
-        needed = {
-            key: one
-            for key, one in signals.items()
-            if key not in (*SPARED, *POSE) or key in log_map.signals
-        }
-        if len(needed) == len(signals) or missing_signals(needed):
+        spare = {*SPARED, *POSE} & set(signals) - set(log_map.signals)
+        needed = {key: one for key, one in signals.items() if key not in spare}
+        if not spare or missing_signals(needed):
             raise
-        left = ", ".join(column_of(key) for key in signals if key not in needed)
+        left = ", ".join(column_of(key) for key in signals if key in spare)
         spared = f"{left} is left aside: {error}"
         signals, parts, posed, segments = on_one_clock(needed)
     rolls = ""
@@ -222,8 +219,8 @@ def _segments(
 ) -> _Segments:
     """Return the signals on one clock, in the segments between gaps; at least one."""
     raws = {f"{name}/{k}": raw for name, listed in parts.items() for k, raw in enumerate(listed)}
-    first = next(iter(raws.values()))
-    span = (max(raw.t[-1] for raw in raws.values()) - min(raw.t[0] for raw in raws.values())) / dt
+    every = list(raws.values())
+    span = (max(raw.t[-1] for raw in every) - min(raw.t[0] for raw in every)) / dt
     require_few(RecordingError, label, span, "samples", f"steps of {dt:g} s")
 
     def combined(values: Mapping[str, Array]) -> dict[str, Array]:
@@ -234,8 +231,8 @@ def _segments(
             for name, signal in signals.items()
         }
 
-    if are_one_clock(list(raws.values())):
-        found, t = [], first.t
+    if are_one_clock(every):
+        found, t = [], every[0].t
         columns = combined({key: raw.values for key, raw in raws.items()})
         for begin, end in pairwise([0, *gaps(t, log_map.longest_gap).tolist(), t.size]):
             if end - begin > 1:
@@ -339,10 +336,9 @@ def wheel_scales(
     """Return how wheels roll by the v_x that is logged as well, by name of the wheel.
     signals : v_x, wheels, and r where it is there; others are not looked at.
     """
-    headings = log.headings()
     of_wheels = {name: signals[name] for name in ("v_x", "r", *WHEELS) if name in signals}
     parts = _channels(log, str(log.path), of_wheels, log_map, run)
-    return identified_scales(parts, of_wheels, wheel_units(headings, of_wheels))
+    return identified_scales(parts, of_wheels, wheel_units(log.headings(), of_wheels))
 
 
 def _scale_note(

@@ -363,8 +363,8 @@ def computed_v_y(recording: Recording) -> str | None:
         return None  # units
     usual = float(np.sqrt(np.mean(v_x**2)))
     slips = [
-        v_x * (behind(v_x * r, T) * (T / usual) - recording.delta_r)
-        for T in usual / (GRAVITY * _LOADS_PER_RAD)
+        v_x * (behind(v_x * r, usual / push) / push - recording.delta_r)
+        for push in GRAVITY * _LOADS_PER_RAD
     ]
     tau = minimize_scalar(
         lambda tau: left(y, behind(r, tau)), bounds=(0.0, _BEHIND), method="bounded"

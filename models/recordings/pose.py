@@ -215,8 +215,7 @@ def _in_axes(
     x_dot, y_dot, r = np.concatenate([piece.rates for piece in pieces]).T
     v = x_dot + 1j * y_dot
     heading = np.concatenate([piece.heading for piece in pieces])
-    most = float(np.abs(v).max())
-    if not most > _STANDS:
+    if not (most := np.abs(v).max()) > _STANDS:
         raise RecordingError(f"{label}: the pose must move, its largest speed is {most:.3g} m/s")
     ways = [(sign, unit) for unit in (1.0, math.pi / 180.0) for sign in (1.0, -1.0)]
     turned = [v * np.exp(-1j * sign * unit * heading) for sign, unit in ways]

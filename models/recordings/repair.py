@@ -80,7 +80,7 @@ class Repair:
         VehicleError
             Where the numbers of the car are those of no car.
         """
-        declared = {name for name in _TABLES if name != "vehicle" for name in getattr(self, name)}
+        declared = {name for table in _TABLES[:-1] for name in getattr(self, table)}
         if self.acceleration_sensor_x:
             declared.add("a_y")
         turned = self.velocity_sensor_angle or self.velocity_sensor_x

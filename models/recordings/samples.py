@@ -182,7 +182,7 @@ def dropouts(signal: Array, white: float) -> NDArray[np.intp]:
         return np.empty(0, dtype=np.intp)
     kept = np.abs(np.concatenate([[0.0], signal[~zero], [0.0]]))
     place = np.cumsum(~zero)
-    beside = np.minimum(kept[place], kept[np.minimum(place + 1, kept.size - 1)])
+    beside = np.minimum(kept[place], kept[place + 1])
     steps = np.abs(np.diff(signal[~zero]))
     step = float(np.percentile(steps[steps > 0.0], 90)) if steps.any() else math.inf
     found = np.flatnonzero(zero & (beside > 10.0 * max(white, step)))

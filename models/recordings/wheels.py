@@ -159,17 +159,14 @@ def identified_scales(
     v_x, r = at("v_x"), at("r") if "r" in parts else np.zeros(t.size)
     found = {}
     for name in WHEELS:
-        if name not in parts:
-            continue
-        given = _identified_scale(t, v_x, r, at(name))
+        given = _identified_scale(t, v_x, r, at(name)) if name in parts else None
         if given is None:
             continue
         value, seconds = given
-        unit, (low, high) = units[name], _SPEEDS
-        speed = low <= value <= high and (not is_given(unit) or quantity_of(name, unit) == SPEED)
-        turns = not speed and (not is_given(unit) or quantity_of(name, unit) != SPEED)
-        if speed or (turns and _RADII[0] <= value <= _RADII[1]):
-            found[name] = Scale(value, turns, seconds)
+        shown = quantity_of(name, units[name]) if is_given(units[name]) else ""
+        speed = shown in ("", SPEED) and _SPEEDS[0] <= value <= _SPEEDS[1]
+        if speed or (shown != SPEED and _RADII[0] <= value <= _RADII[1]):
+            found[name] = Scale(value, not speed, seconds)
     return found
 
 
