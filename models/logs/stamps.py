@@ -210,10 +210,11 @@ def clocks_of_channels(
     on: what a receiver tells of the same rows has another name and the same steps. What stands
     behind a time that is none of its own has the first.
     """
-    found = {}
-    for k, name in enumerate(names):
-        if _plain(name) in NAMES and (clock := _clock(k, name, units[k], head(k), _rises)):
-            found[k] = clock
+    found = {
+        k: clock
+        for k, name in enumerate(names)
+        if _plain(name) in NAMES and (clock := _clock(k, name, units[k], head(k), _rises))
+    }
     if first.column != 0 or len(found) < 2 or any(k - 1 in found for k in found):
         return {}
     times = {
@@ -697,11 +698,9 @@ def _even_step(t: Array, tick: float) -> float | None:
     if not slope > 0.0:
         return None
     per_second = max(round(1.0 / slope), 1)
-    few = [round(slope, digits) for digits in range(2, 5)]
-    for dt in (*few, 1.0 / per_second, *(round(slope, digits) for digits in range(5, 8)), slope):
-        if dt > 0.0 and np.ptp(t - dt * k) <= _slack(tick, t):
-            return dt
-    return None
+    rounded, slack = [round(slope, digits) for digits in range(2, 8)], _slack(tick, t)
+    tried = (*rounded[:3], 1.0 / per_second, *rounded[3:], slope)
+    return next((dt for dt in tried if dt > 0.0 and np.ptp(t - dt * k) <= slack), None)
 
 
 @np.errstate(all="ignore")
