@@ -374,7 +374,7 @@ def computed_v_y(recording: Recording) -> str | None:
     of, x = min(formulas, key=lambda one: left(y, one[1]))
     beside = [x] if left(y) > _COMPUTED * needed else []
     missed = left(y, *beside)
-    moved = [slips[3], v_x * slips[3], behind(r, 0.3)]
+    moved = [*slips[::3], v_x * slips[3], behind(r, 0.2), behind(r, 0.4)]
     moved += beside or [r, v_x * recording.delta_f]  # else not r: its own noise
     random = left(y, *moved) ** 2 > (1.0 - _AT_RANDOM) * missed**2
     exact = missed < _EXACTLY * min(needed, left(y))

@@ -191,9 +191,10 @@ def _lateral(log: LogFile, recording: Recording, given: LogMap, run: str | None)
 def _turning(recording: Recording) -> tuple[float, float]:
     """Return the slope of a_y on v_x r, and their correlation; 1 where nothing turns."""
     w = windows(recording)
-    felt = w.v_x_r if w.a_y is None else w.a_y
-    both = pair(w.v_x_r, felt)
-    slope = float(least_squares(w.v_x_r[:, None], felt).theta[0])
+    if w.a_y is None or not w.r.size:
+        return 1.0, 1.0
+    both = pair(w.v_x_r, w.a_y)
+    slope = float(least_squares(w.v_x_r[:, None], w.a_y).theta[0])
     return slope, both.correlation if both.seconds >= 2.0 else 1.0
 
 
