@@ -83,13 +83,13 @@ def _let_go() -> None:
             mapped.madvise(mmap.MADV_DONTNEED)
 
 
-def filled(n: int, compute: Callable[[slice], Array]) -> Array:
-    """Return values of samples, computed block by block, on disk where they are many (n,).
+def filled(n: int, compute: Callable[[slice], Array], *shape: int) -> Array:
+    """Return values of samples, computed block by block, on disk where they are many (n, ...).
 
     Nobody may write them.
-    compute : returns the values of a part of them (k,).
+    compute : returns the values of a part of them (k, ...).   shape : of a sample's values.
     """
-    values = large((n,))
+    values = large((n, *shape))
     for part in blocks(n):
         values[part] = compute(part)
     values.setflags(write=False)

@@ -8,9 +8,8 @@ v_y = l_r r - v_x tan α_r,   δ = α_f + atan((v_y + l_f r)/v_x).
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.export.understeer import SLIPS
+from identifier.export.understeer import SLIPS, slips, weights
 from identifier.tire_model import TireModel, brisk_speed
-from models.vehicle import GRAVITY
 
 _SPEEDS = 64  # columns up to the fastest speed that was driven
 _ANGLES = np.concatenate([np.arange(0.0, 0.1, 0.0025), np.arange(0.1, 0.425, 0.01)])  # rad; 24 deg
@@ -30,14 +29,9 @@ def steady_text(model: TireModel) -> str:
 def _accelerations(model: TireModel, v_x: float) -> Array:
     """Return a_y [m/s²] at `_ANGLES`, NaN where there is no steady state."""
     car, force = model.vehicle, model.force(SLIPS)
-    ends = force.argmax(axis=0)
-    weights = np.array(car.axle_loads) / (GRAVITY * car.load_ratio(v_x))  # N/(m/s²), as pressed
-    most = min(force[end, i] / weights[i] for i, end in enumerate(ends))
-    a_y = np.linspace(0.0, most, _ACCELERATIONS)
-    alpha_f, alpha_r = (
-        np.interp(weights[i] * a_y, force[: end + 1, i], SLIPS[: end + 1])
-        for i, end in enumerate(ends)
-    )
+    needed = weights(car, v_x)
+    a_y = np.linspace(0.0, float((force.max(axis=0) / needed).min()), _ACCELERATIONS)
+    alpha_f, alpha_r = (slips(force[:, i], needed[i] * a_y) for i in range(2))
     r = a_y / v_x
     v_y = car.l_r * r - v_x * np.tan(alpha_r)
     delta = alpha_f + np.arctan((v_y + car.l_f * r) / v_x)

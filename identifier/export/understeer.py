@@ -13,7 +13,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.tire_model import TireModel, brisk_speed, require_band
-from models.vehicle import GRAVITY
+from models.vehicle import GRAVITY, Vehicle
 
 _STEP = 1.0  # m/s², of the lateral acceleration
 _SPEEDS = 3  # at which gradients are given of a car with downforce
@@ -60,7 +60,7 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
     v_x = np.unique([float(f"{one:.4g}") for one in v_x])  # as it is printed
     force = model.force(SLIPS)
     reached = np.array([np.interp(known[i], SLIPS, force[:, i]) for i in range(2)])
-    most = reached * car.load_ratio(v_x) / np.array(car.axle_loads) * GRAVITY  # (n, 2)
+    most = reached / weights(car, v_x)  # (n, 2)
     a_y = np.arange(0.0, most.min(axis=1).max(), _STEP)
     found = _gradients(model, force, v_x, a_y)
     spread = np.array([_gradients(one, one.force(SLIPS), v_x, a_y) for one in drawn])
@@ -75,17 +75,25 @@ def _gradients(model: TireModel, force: Array, v_x: Array, a_y: Array) -> Array:
     """Return K [rad/(m/s²)], (n, k): infinite where the front axle is at its end, else minus it.
     force : at `SLIPS` under static loads, (s, 2) [N].
     """
-    masses = np.array(model.vehicle.axle_loads) / GRAVITY
-    pressed = model.vehicle.load_ratio(v_x)
     gradient = np.zeros((v_x.size, a_y.size))
     for i, sign in ((1, -1.0), (0, 1.0)):
-        curve = force[:, i]
-        slope, peak = np.gradient(curve, SLIPS), int(curve.argmax())
-        for k, ratio in enumerate(pressed[:, i]):
-            needed = masses[i] * a_y / ratio
-            alpha = np.interp(needed, curve[: peak + 1], SLIPS[: peak + 1])
-            stiff = np.interp(alpha, SLIPS, slope)
-            share = masses[i] / (ratio * np.maximum(stiff, 1e-9))
-            ended = (needed >= curve[peak]) | (stiff <= 0.0)
-            gradient[k] = np.where(ended, sign * np.inf, gradient[k] + sign * share)
+        curve, weight = force[:, i], weights(model.vehicle, v_x)[:, i, None]
+        needed = weight * a_y
+        stiff = np.interp(slips(curve, needed), SLIPS, np.gradient(curve, SLIPS))
+        ended = (needed >= curve.max()) | (stiff <= 0.0)
+        share = weight / np.maximum(stiff, 1e-9)
+        gradient = np.where(ended, sign * np.inf, gradient + sign * share)
     return gradient
+
+
+def weights(car: Vehicle, v_x: float | Array) -> Array:
+    """Return the force under static loads [N] of each axle per m/s² of a_y, (2,) or (n, 2)."""
+    return np.array(car.axle_loads) / (GRAVITY * car.load_ratio(v_x))
+
+
+def slips(curve: Array, force: Array) -> Array:
+    """Return at which of `SLIPS` an axle has a force [N], up to its largest.
+    curve : its forces at all of them [N].
+    """
+    end = int(curve.argmax()) + 1
+    return np.interp(force, curve[:end], SLIPS[:end])

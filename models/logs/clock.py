@@ -71,6 +71,10 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
     kept = ~np.isnan(channel.values)
     if kept.all() or not kept.any() or (not cut and holes(channel).size):
         return channel
+    return _kept(channel, kept)
+
+
+def _kept(channel: Channel, kept: NDArray[np.bool_]) -> Channel:
     t, values, rows = channel.t[kept], channel.values[kept], channel.rows[kept]
     return replace(channel, t=t, values=values, rows=rows)
 
@@ -92,9 +96,8 @@ def without_codes(channel: Channel) -> tuple[Channel, str]:
     rest = np.where(np.isin(values, ends), np.nan, values)
     step = np.fmax.reduce(np.abs(np.diff(rest)), initial=0.0)
     codes = [one for one in ends if np.fmin.reduce(np.abs(rest - one)) > _FAR * step > 0.0]
-    kept = ~np.isin(values, codes)
-    t, rows, said = channel.t[kept], channel.rows[kept], ", ".join(f"{one:.9g}" for one in codes)
-    return replace(channel, t=t, values=values[kept], rows=rows) if codes else channel, said
+    said = ", ".join(f"{one:.9g}" for one in codes)
+    return _kept(channel, ~np.isin(values, codes)) if codes else channel, said
 
 
 def _are_codes(numbers: Array) -> NDArray[np.bool_]:
@@ -178,23 +181,17 @@ def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]
 
     A channel speaks for one interval after each of its samples, but not into a gap.
     """
-    spans = [(-np.inf, np.inf)]
+    begins, ends = [], []
     for t in times:
         cuts = gaps(t, longest)
-        first = t[np.concatenate([[0], cuts])]
-        last = t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - _ON_STEP) * _interval(t)
-        intervals = list(zip(first.tolist(), last.tolist(), strict=True))
-        found, i, j = [], 0, 0
-        while i < len(spans) and j < len(intervals):
-            begin, end = max(spans[i][0], intervals[j][0]), min(spans[i][1], intervals[j][1])
-            if begin < end:
-                found.append((begin, end))
-            if spans[i][1] < intervals[j][1]:
-                i += 1
-            else:
-                j += 1
-        spans = found
-    return spans
+        begins.append(t[np.concatenate([[0], cuts])])
+        ends.append(t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - _ON_STEP) * _interval(t))
+    edges = np.concatenate(begins + ends)
+    order = np.argsort(edges, kind="stable")
+    there = np.cumsum(np.where(order < edges.size // 2, 1, -1))
+    k, edges = np.flatnonzero(there == len(times)), edges[order]
+    spans = zip(edges[k].tolist(), edges[k + 1].tolist(), strict=True)
+    return [(begin, end) for begin, end in spans if begin < end]
 
 
 def sampled(raw: Raw, grid: Array, dt: float) -> Array:

@@ -142,22 +142,21 @@ def _load(path: Path, name: str, shape: tuple[int, int], turned: bool) -> Array:
     values, at = np.empty(shape[::-1] if turned else shape), 0
     along = values if values.shape[0] >= values.shape[1] else values.T
     for piece in each(RecordingError, path, values.nbytes, _pieces, path, name):
-        end = at + piece.size // max(along.shape[1], 1)
-        part = along[at:end] if along is values else along[at:end].T
-        part[...] = piece.reshape(part.shape)
-        at = end
+        along[at : at + len(piece)] = piece.reshape(len(piece), -1)
+        at += len(piece)
     return values.T if turned else values
 
 
 def _pieces(path: Path, name: str) -> Iterator[Any]:
-    """Yield the numbers of a dataset along its longest axis, in whole chunks."""
+    """Yield the numbers of a dataset along its longest axis, made the first, in whole chunks."""
     with need(path, "h5py", "MATLAB 7.3 or HDF5", "mat").File(path, "r") as file:
         node = file[name]
         axis = int(np.argmax(node.shape)) if node.shape else 0
         size, chunk = (*node.shape, 1)[axis], (node.chunks or (1, 1))[axis]
         step = max(1, _AT_ONCE * size // max(node.size, 1) // chunk) * chunk
         for k in range(0, size, step):
-            yield node[(slice(None),) * axis + (slice(k, k + step),)] if node.shape else node[()]
+            piece = node[(slice(None),) * axis + (slice(k, k + step),)] if node.shape else node[()]
+            yield np.moveaxis(np.atleast_1d(piece), axis, 0)
 
 
 def _chunk(node: Any) -> int:

@@ -126,13 +126,12 @@ def alike_clocks(
     names: Sequence[str], units: Sequence[str], head: _Head, clock: Clock
 ) -> list[Clock]:
     """Return other columns that rise by the steps of a clock, as that of a drive by a lap's."""
+
+    def step(one: Clock) -> float:
+        return float(np.median(np.diff(_times(one, head(one.column)))))
+
     others = _even(names, units, head, [clock.column])
-    own, *steps = (np.diff(_times(one, head(one.column))) for one in (clock, *others))
-    return [
-        one
-        for one, step in zip(others, steps, strict=True)
-        if abs(np.median(step) - np.median(own)) < _ALIKE * np.median(own)
-    ]
+    return [one for one in others if abs(step(one) - step(clock)) < _ALIKE * step(clock)]
 
 
 def no_clock(names: Sequence[str], units: Sequence[str], head: _Head) -> str:
@@ -158,14 +157,13 @@ def _even(
     names: Sequence[str], units: Sequence[str], head: _Head, named: Sequence[int]
 ) -> list[Clock]:
     """Return the columns that rise evenly and count neither samples nor the way; a time first."""
-    found = []
-    for k, name in enumerate(names):
-        if k in named or (units[k] and not time_unit(units[k])) or _is_way(name, ""):
-            continue
-        if not units[k] and _counts(name, head(k)):
-            continue
-        if (clock := _clock(k, name, units[k], head(k), _rises_evenly)) is not None:
-            found.append(clock)
+    found = [
+        clock
+        for k, (name, unit) in enumerate(zip(names, units, strict=True))
+        if k not in named and not _is_way(name, "")
+        if (time_unit(unit) if unit else not _counts(name, head(k)))
+        if (clock := _clock(k, name, unit, head(k), _rises_evenly))
+    ]
     return sorted(found, key=lambda one: not time_unit(units[one.column]))
 
 
@@ -198,10 +196,11 @@ def clocks_of_channels(
     on: what a receiver tells of the same rows has another name and the same steps. What stands
     behind a time that is none of its own has the first.
     """
-    found = {}
-    for k, name in enumerate(names):
-        if _plain(name) in NAMES and (clock := _clock(k, name, units[k], head(k), _rises)):
-            found[k] = clock
+    found = {
+        k: clock
+        for k, name in enumerate(names)
+        if _plain(name) in NAMES and (clock := _clock(k, name, units[k], head(k), _rises))
+    }
     if first.column != 0 or len(found) < 2 or any(k - 1 in found for k in found):
         return {}
     times = {
@@ -221,10 +220,9 @@ def _is_beside(
 ) -> bool:
     """Return whether a time is that of other samples than the first one's, of the same drive."""
     times = [_times(clock, cells), _times(first, first_cells)]
-    if min(t.size for t in times) < _FEWEST:
-        return False
     if (
-        any((np.diff(t) <= 0.0).any() for t in times)
+        min(t.size for t in times) < _FEWEST
+        or any((np.diff(t) <= 0.0).any() for t in times)
         or abs(times[0][0] - times[1][0]) > _SAME_DRIVE
     ):
         return False
@@ -276,7 +274,7 @@ def _clock(
     t = np.array([value for value in values if value is not None], dtype=np.float64)
     advice, plain = time_unit(unit), _plain(name)
     summed = not kind and (fits is _is_any or plain in _CALLED)
-    summed = summed and _are_intervals(t, advice, alike=plain in _INTERVALS)
+    summed &= _are_intervals(t, advice, alike=plain in _INTERVALS)
     t = np.cumsum(t) if summed else t
     if not fits(np.diff(t)):
         return None
@@ -450,17 +448,15 @@ def seconds(
         return Stamps(np.empty(0), ())
     require_times(label, clock, values, rows, place)
     t = in_seconds(clock, values)
-    fall, said = _first_step(t, lambda step: step < 0.0), list[str]()
-    if fall is not None:
-        t, said = _gone_on(t, calendar=clock.unit in ("instant", "hhmmss"))
-        fall = _first_step(t, lambda step: step < 0.0)
-    said = [f"{clock.name} {one}" for one in said]
-    repeat = None if fall is not None else _first_step(t, lambda step: step == 0.0)
-    even = None if fall is not None else _even_clock(t)
-    if even is not None:
-        return even._replace(notes=(*said, f"{clock.name} {even.notes[0]}"))
-    if fall is None and repeat is None:
-        return Stamps(t, tuple(said))
+    said: tuple[str, ...] = ()
+    if _first_step(t, np.less) is not None:
+        t, over = _gone_on(t, calendar=clock.unit in ("instant", "hhmmss"))
+        said = (f"{clock.name} {over}",) * bool(over)
+    if _first_step(t, np.less) is None:
+        if even := _even_clock(t):
+            return even._replace(notes=(*said, f"{clock.name} {even.notes[0]}"))
+        if _first_step(t, np.equal) is None:
+            return Stamps(t, said)
     mended = _in_order(t, restarts=restarts) if mend else None
     if mended is None:
         wrong = not_rising(t, rows, place, restarts=restarts)
@@ -469,7 +465,7 @@ def seconds(
 
 
 @np.errstate(all="ignore")
-def _gone_on(t: Array, *, calendar: bool) -> tuple[Array, list[str]]:
+def _gone_on(t: Array, *, calendar: bool) -> tuple[Array, str]:
     """Return stamps over midnight, or of a counter that is full, as if they went on; and a note.
 
     A run begins at zero, too, and may last a round number of seconds.
@@ -484,8 +480,8 @@ def _gone_on(t: Array, *, calendar: bool) -> tuple[Array, list[str]]:
         if calendar or (min(times, 4) * period > _FULL * usual and not is_run):
             t = np.round(t + period * np.concatenate([[0.0], np.cumsum(falls)]), 9)
             said = f"begins again each {period:.9g} s, as a counter that is full: taken as going on"
-            return t, [] if calendar else [f"{said} ({times} times)"]
-    return t, []
+            return t, "" if calendar else f"{said} ({times} times)"
+    return t, ""
 
 
 def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
@@ -505,24 +501,20 @@ def _in_order(t: Array, *, restarts: bool) -> Stamps | None:
     for first, end in pairwise([*begins, t.size]):
         piece = t[first:end]
         late += int(np.count_nonzero(piece < np.maximum.accumulate(piece)))
-        order = np.argsort(piece, kind="stable")
-        risen = piece[order]
-        single = np.concatenate([[True], np.diff(risen) > 0.0])
-        orders.append(first + order[single])
-        times.append(risen[single] + (times[-1][-1] + PAUSE - risen[0] if times else 0.0))
+        risen, order = np.unique(piece, return_index=True)
+        orders.append(first + order)
+        times.append(risen + (times[-1][-1] + PAUSE - risen[0] if times else 0.0))
     found = np.concatenate(times)
     twice = t.size - found.size
     if t.size >= _SHARED * found.size:
         return None  # rounded, or written twice throughout: who leaves them out leaves out too much
-    notes = []
-    if late:
-        notes.append(f"samples out of order are sorted: {late}")
-    if twice:
-        notes.append(f"samples that share their stamp with one before are left out: {twice}")
-    if len(begins) > 1:
-        back = f"times it goes back by {_BACK:g} s or more, and on {PAUSE:g} s later"
-        notes.append(f"{back}: {len(begins) - 1}")
-    return Stamps(found, tuple(notes), np.concatenate(orders))
+    counted = {
+        "samples out of order are sorted": late,
+        "samples that share their stamp with one before are left out": twice,
+        f"times it goes back by {_BACK:g} s or more, and on {PAUSE:g} s later": len(begins) - 1,
+    }
+    notes = tuple(f"{what}: {count}" for what, count in counted.items() if count)
+    return Stamps(found, notes, np.concatenate(orders))
 
 
 def typical_rate(t: Array) -> float:
@@ -541,16 +533,16 @@ def since(t: Array, first: float) -> Array:
 
 def in_seconds(clock: Clock, values: NDArray[Any]) -> Array:
     """Return stamps in seconds, (n,); those of the calendar from the first on."""
-    first, values = values[0], np.cumsum(values) if clock.summed else values
     per_second = PER_SECOND.get(clock.unit, 1.0)
+    first, values = 0, np.cumsum(values) if clock.summed else values
     if clock.unit == "instant":
-        return filled(values.size, lambda part: (values[part] - first) / 1e9)
+        first, per_second = values[0], 1e9
     if clock.unit == "hhmmss":
         start = float(_of_digits(values[:1])[0])
         return filled(values.size, lambda part: np.round(_of_digits(values[part]) - start, 6))
     if per_second == 1.0:
         return values
-    return filled(values.size, lambda part: values[part] / per_second)
+    return filled(values.size, lambda part: (values[part] - first) / per_second)
 
 
 def started(clock: Clock, cell: str) -> float:
@@ -574,8 +566,9 @@ def _first(values: NDArray[Any], wrong: Callable[[NDArray[Any]], NDArray[Any]]) 
     return None
 
 
-def _first_step(t: Array, wrong: Callable[[Array], NDArray[Any]]) -> int | None:
-    return _first(t, lambda part: wrong(np.diff(part)))
+def _first_step(t: Array, wrong: np.ufunc) -> int | None:
+    """Return the first step that is wrong against 0."""
+    return _first(t, lambda part: wrong(np.diff(part), 0.0))
 
 
 # Rounded stamps of an even clock.
@@ -587,19 +580,14 @@ def _even_clock(t: Array) -> Stamps | None:
     Its note goes on after the name of the column.
     t : stamps [s] that never fall, (n,).
     """
-    if t.size < 10 or not t[-1] > t[0]:
-        return None
     head = t[:LONGEST_IN_MEMORY]
     steps = np.diff(head)
     moves = steps[steps > 0.0]
-    if moves.size < 3:
-        return None
-    shared = steps.size / moves.size
     tick = _tick(head)
-    if tick is None or tick > 1.0:
+    if t.size < 10 or moves.size < 3 or tick is None or tick > 1.0:
         return None
     repeats = bool(moves.size < steps.size)
-    if repeats and shared < _SHARED:
+    if repeats and steps.size < _SHARED * moves.size:
         return _unjittered(t)
     usual = float(np.median(moves))
     near = moves[moves < usual + 1.5 * tick]
@@ -679,11 +667,9 @@ def _even_step(t: Array, tick: float) -> float | None:
     if not slope > 0.0:
         return None
     per_second = max(round(1.0 / slope), 1)
-    few = [round(slope, digits) for digits in range(2, 5)]
-    for dt in (*few, 1.0 / per_second, *(round(slope, digits) for digits in range(5, 8)), slope):
-        if dt > 0.0 and np.ptp(t - dt * k) <= _slack(tick, t):
-            return dt
-    return None
+    rounded, slack = [round(slope, digits) for digits in range(2, 8)], _slack(tick, t)
+    tried = (*rounded[:3], 1.0 / per_second, *rounded[3:], slope)
+    return next((dt for dt in tried if dt > 0.0 and np.ptp(t - dt * k) <= slack), None)
 
 
 @np.errstate(all="ignore")
@@ -691,7 +677,7 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
     """Return the rule that stamps break which fall or repeat, with value and remedy.
     t : stamps [s], one of which is not above the one before, (n,).
     """
-    k = _first_step(t, lambda step: ~(step > 0.0))
+    k = _first_step(t, np.less_equal)
     assert k is not None
     said = f"must increase, {place} {rows[k + 1]} has {t[k + 1]:.9g} after {t[k]:.9g}; "
     if t[k + 1] < t[k]:

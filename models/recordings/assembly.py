@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from numbers import Real
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -66,9 +66,6 @@ _FIELDS = {
 }
 
 
-_T = TypeVar("_T")
-
-
 class _Segments(NamedTuple):
     """Those that are kept, and how many are too short to be."""
 
@@ -94,7 +91,7 @@ def recording_of(
     if has_speed(signals):
         if has_wheels(signals):
             learnt = _scale_note(log, signals, log_map, run)
-        signals = _without_wheels(signals)
+        signals = {name: one for name, one in signals.items() if name not in WHEELS}
     spared = ""
 
     def on_one_clock(
@@ -103,20 +100,22 @@ def recording_of(
         channels = _channels(log, label, chosen, log_map, run)
         named, raws, said = with_pose(label, chosen, channels, "heading" in log_map.signals)
         for raw in {id(raw.t): raw for listed in raws.values() for raw in listed}.values():
-            _judge_time(label, raw, log.clock)
+            if raw.t.size < MINIMUM_SAMPLES:
+                raise RecordingError(
+                    f"{label}: there are {raw.t.size} rows, at least {MINIMUM_SAMPLES} needed"
+                )
+            require_rising(label, raw)
+            require_often(label, raw.t, log.clock)
         return named, raws, said, _segments(label, named, raws, log_map, dt)
 
     try:
         signals, parts, posed, segments = on_one_clock(signals)
     except RecordingError as error:
-        needed = {
-            key: one
-            for key, one in signals.items()
-            if key not in (*SPARED, *POSE) or key in log_map.signals
-        }
-        if len(needed) == len(signals) or missing_signals(needed):
+        spare = {*SPARED, *POSE} & set(signals) - set(log_map.signals)
+        needed = {key: one for key, one in signals.items() if key not in spare}
+        if not spare or missing_signals(needed):
             raise
-        left = ", ".join(column_of(key) for key in signals if key not in needed)
+        left = ", ".join(column_of(key) for key in signals if key in spare)
         spared = f"{left} is left aside: {error}"
         signals, parts, posed, segments = on_one_clock(needed)
     rolls = ""
@@ -125,13 +124,13 @@ def recording_of(
         segments = segments._replace(kept=kept)
     of_pose = {column_of(name) for name, one in signals.items() if one.channel == ("pose",)}
     kept = (one for one in reading.notes if one.partition(" is taken from ")[0] not in of_pose)
-    notes = (*_notes(log), *kept)
-    notes += _hole_notes(parts)
-    notes += _gap_notes(segments.kept)
-    notes += tuple(note for note in (*posed, learnt, rolls, spared) if note)
-    if segments.short:
-        several = "s" if segments.short > 1 else ""
-        notes += (f"left out: {segments.short} segment{several} of less than {_shortest(dt):g} s",)
+    short = segments.short
+    holes, gaps = _hole_note(parts), _gap_note(segments.kept)
+    notes = *_notes(log), *kept, holes, gaps, *posed, learnt, rolls, spared
+    if short:
+        several = "s" if short > 1 else ""
+        notes += (f"left out: {short} segment{several} of less than {_shortest(dt):g} s",)
+    notes = tuple(filter(None, notes))
     recordings = [
         _recording(name if run is None else f"{name}:{run}", one, log_map, dt)
         for one in segments.kept
@@ -143,9 +142,9 @@ def recording_of(
 def _notes(log: LogFile) -> tuple[str, ...]:
     """Return what a format says of what it took or mended."""
     clock = log.clock
-    plain = clock is None or (clock.unit == "s" and ";" not in clock.words)
-    said = () if plain or clock is None else (f"time is {clock.words}",)
-    return (*said, *log.notes)
+    if clock is None or (clock.unit == "s" and ";" not in clock.words):
+        return tuple(log.notes)
+    return (f"time is {clock.words}", *log.notes)
 
 
 def _channels(
@@ -189,19 +188,16 @@ def _scaled(values: Array, factor: float) -> Array:
 
 
 def _require_finite(label: str, name: str, channel: Channel) -> None:
-    bad = np.flatnonzero(~np.isfinite(channel.values))
-    if bad.size:
-        raise RecordingError(
-            f"{label}: {name} must be finite, {bad.size} of {channel.values.size} values are "
-            f"empty, NaN or infinite, the first in {channel.place} {channel.rows[bad[0]]}; fill "
-            'them, or cut them out: --cut-holes, LogMap(holes="cut")'
-        )
-    bad = np.flatnonzero(~np.isfinite(channel.t))
-    if bad.size:
-        raise RecordingError(
-            f"{label}: t must be finite, {bad.size} of {channel.t.size} values are empty, NaN or "
-            f"infinite, the first in {channel.place} {channel.rows[bad[0]]}; fill or cut them out"
-        )
+    for what, values, remedy in (
+        (name, channel.values, 'fill them, or cut them out: --cut-holes, LogMap(holes="cut")'),
+        ("t", channel.t, "fill or cut them out"),
+    ):
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            raise RecordingError(
+                f"{label}: {what} must be finite, {bad.size} of {values.size} values are empty, "
+                f"NaN or infinite, the first in {channel.place} {channel.rows[bad[0]]}; {remedy}"
+            )
 
 
 def _require_of_a_car(label: str, name: str, values: Array, channel: Channel) -> None:
@@ -223,9 +219,8 @@ def _segments(
 ) -> _Segments:
     """Return the signals on one clock, in the segments between gaps; at least one."""
     raws = {f"{name}/{k}": raw for name, listed in parts.items() for k, raw in enumerate(listed)}
-    one_clock = are_one_clock(list(raws.values()))
-    first = next(iter(raws.values()))
-    span = (max(raw.t[-1] for raw in raws.values()) - min(raw.t[0] for raw in raws.values())) / dt
+    every = list(raws.values())
+    span = (max(raw.t[-1] for raw in every) - min(raw.t[0] for raw in every)) / dt
     require_few(RecordingError, label, span, "samples", f"steps of {dt:g} s")
 
     def combined(values: Mapping[str, Array]) -> dict[str, Array]:
@@ -236,13 +231,13 @@ def _segments(
             for name, signal in signals.items()
         }
 
-    if one_clock:
-        found = []
+    if are_one_clock(every):
+        found, t = [], every[0].t
         columns = combined({key: raw.values for key, raw in raws.items()})
-        for piece in _pieces(first.t, log_map.longest_gap):
-            if piece.stop - piece.start > 1:
-                cut = {name: values[piece] for name, values in columns.items()}
-                found.append(Segment(*resample(first.t[piece], cut, dt)))
+        for begin, end in pairwise([0, *gaps(t, log_map.longest_gap).tolist(), t.size]):
+            if end - begin > 1:
+                cut = {name: values[begin:end] for name, values in columns.items()}
+                found.append(Segment(*resample(t[begin:end], cut, dt)))
     else:
         separate = on_one_clock(raws, dt, log_map.longest_gap)
         found = [Segment(one.t, combined(one.signals)) for one in separate]
@@ -266,16 +261,6 @@ def _shortest(dt: float) -> float:
     return max(_SHORTEST, MINIMUM_SAMPLES * dt)
 
 
-def _judge_time(label: str, raw: Raw, clock: Clock | None) -> None:
-    """Refuse time that does not rise, is not in seconds, or too coarse."""
-    if raw.t.size < MINIMUM_SAMPLES:
-        raise RecordingError(
-            f"{label}: there are {raw.t.size} rows, at least {MINIMUM_SAMPLES} needed"
-        )
-    require_rising(label, raw)
-    require_often(label, raw.t, clock)
-
-
 def require_often(label: str, t: Array, clock: Clock | None) -> None:
     """Refuse samples that are too rare, and say in which unit of the time they were not.
     t : rising [s], (n,).
@@ -294,12 +279,7 @@ def require_often(label: str, t: Array, clock: Clock | None) -> None:
         )
 
 
-def _pieces(t: Array, longest: float) -> list[slice]:
-    ends = [0, *gaps(t, longest).tolist(), t.size]
-    return [slice(first, end) for first, end in pairwise(ends)]
-
-
-def _hole_notes(parts: Mapping[str, list[Raw]]) -> tuple[str, ...]:
+def _hole_note(parts: Mapping[str, list[Raw]]) -> str:
     """Return what is to be said of cells without a value that were cut out."""
     given = ", ".join(
         f"{raw.holes} of {column_of(name)}" + f" ({raw.codes} means no value)" * bool(raw.codes)
@@ -307,19 +287,17 @@ def _hole_notes(parts: Mapping[str, list[Raw]]) -> tuple[str, ...]:
         for raw in raws
         if raw.holes
     )
-    if not given:
-        return ()
-    return (f"cells without a value are cut out: {given}",)
+    return given and f"cells without a value are cut out: {given}"
 
 
-def _gap_notes(segments: list[Segment]) -> tuple[str, ...]:
+def _gap_note(segments: list[Segment]) -> str:
     if len(segments) < 2:
-        return ()
+        return ""
     times = [after.t[0] - before.t[-1] for before, after in pairwise(segments)]
     longest = int(np.argmax(times))
     return (
         f"gaps cut the log into {len(segments)} segments that are used as one drive; the "
-        f"longest lasts {times[longest]:.3g} s, after {segments[longest].t[-1]:.6g} s",
+        f"longest lasts {times[longest]:.3g} s, after {segments[longest].t[-1]:.6g} s"
     )
 
 
@@ -345,7 +323,7 @@ def _recording(name: str, segment: Segment, log_map: LogMap, dt: float) -> Recor
         v_y=signals.get("v_y"),
         r=signals["r"],
         delta_f=signals["delta_f"],
-        delta_r=signals["delta_r"] if "delta_r" in signals else np.zeros(t.size),
+        delta_r=signals.get("delta_r", np.zeros(t.size)),
         a_y=signals.get("a_y"),
         a_x=signals.get("a_x"),
         axle_force=force,
@@ -358,10 +336,9 @@ def wheel_scales(
     """Return how wheels roll by the v_x that is logged as well, by name of the wheel.
     signals : v_x, wheels, and r where it is there; others are not looked at.
     """
-    headings = log.headings()
     of_wheels = {name: signals[name] for name in ("v_x", "r", *WHEELS) if name in signals}
     parts = _channels(log, str(log.path), of_wheels, log_map, run)
-    return identified_scales(parts, of_wheels, wheel_units(headings, of_wheels))
+    return identified_scales(parts, of_wheels, wheel_units(log.headings(), of_wheels))
 
 
 def _scale_note(
@@ -383,10 +360,6 @@ def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> d
     }
 
 
-def _without_wheels(by_name: Mapping[str, _T]) -> dict[str, _T]:
-    return {name: one for name, one in by_name.items() if name not in WHEELS}
-
-
 def _on_wheels(
     label: str, segments: Sequence[Segment], log_map: LogMap, dt: float
 ) -> tuple[list[Segment], str]:
@@ -405,8 +378,8 @@ def _on_wheels(
             given = rolled(speeds, **turns, wheels=wheels, dt=dt)
         except RecordingError as error:
             raise RecordingError(f"{label}: {error}") from None
-        signals = {"v_x": given.v_x, **_without_wheels(one.signals)}
-        found.append(one._replace(signals=signals))
+        others = {name: values for name, values in one.signals.items() if name not in WHEELS}
+        found.append(one._replace(signals={"v_x": given.v_x, **others}))
         gated, untrusted, n = gated + given.gated, untrusted + given.untrusted, n + one.t.size
     names = ", ".join(name for name in WHEELS if name in segments[0].signals)
     return found, (
@@ -427,5 +400,4 @@ def _low_pass(name: str, signal: Array, cut_off: float, dt: float) -> Array:
 
     b, a = butter(2, cut_off, fs=1.0 / dt)
     filtered, _ = lfilter(b, a, signal, zi=lfilter_zi(b, a) * signal[0])
-    smooth: Array = filtered
-    return smooth
+    return filtered

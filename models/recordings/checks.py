@@ -64,15 +64,11 @@ def _refuse(recording: Recording, contradiction: str | None) -> None:
 
 def physics_contradiction(recording: Recording) -> str | None:
     """Return how a recording contradicts the laws of motion: column, rule, value and remedy."""
-    world = world_axes(recording)
-    if world is not None:
-        return world
     w = windows(recording)
-    found = _check_peaks(recording)
-    if found is not None or w.r.size * STRIDE < 2.0:
+    found = world_axes(recording) or _check_peaks(recording)
+    if found or w.r.size * STRIDE < 2.0:
         return found
-    found = _check_signs_are_there(recording)
-    if found is not None:
+    if found := _check_signs_are_there(recording):
         return found
     largest = float(np.percentile(np.abs(w.v_x_r), 95))
     if largest > _LARGEST_V_X_R:

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -90,9 +90,8 @@ def chosen_signals(
             unit = f" [{one.unit}]" if one.unit else ""
             unit += " with its sign turned" if one.factor < 0.0 else ""
             notes.append(f"{column_of(name)} is taken from {channels}{unit}, by its name")
-    if aside := aside_text(found, proposal):
-        notes.append(aside)
-    return _Reading(found, tuple(notes))
+    notes.append(aside(found, proposal)[0])
+    return _Reading(found, tuple(filter(None, notes)))
 
 
 def of_the_car(
@@ -103,21 +102,20 @@ def of_the_car(
     run : of the log; None its only one.
     """
     along, across, turns = (called(name, headings) for name in ("v_x", "v_y", "r"))
-    pairs, found = list(zip(along, across, strict=False))[: 2 if turns else 0], []
+    pairs, found = list(zip(along, across, turns[:1] * 2, strict=False)), {}
     with suppress(RecordingError):  # of channels that cannot be read
-        for pair in pairs if len(pairs) > 1 else ():
-            r, *both = log.read([turns[0], *pair], run)
-            x, y = (np.interp(r.t, one.t, one.values) for one in both)
-            rate = to_si(r.unit, RATE, r.name) * r.values
-            t, some = resample(r.t, {"v_x": x, "v_y": y, "r": rate}, _DT)
-            v_x, v_y, rate = some.values()
-            drive = Recording(
-                name="", t=t, v_x=v_x, v_y=v_y, r=rate, delta_f=0.0 * t, delta_r=0.0 * t
-            )
-            found.append((world_axes(drive) is not None, pair, np.hypot(x, y)))
-    if {turned for turned, *_ in found} != {True, False}:
+        for x, y, r in pairs * (len(pairs) > 1):
+            *both, turn = log.read([x, y, r], run)
+            v_x, v_y = (np.interp(turn.t, one.t, one.values) for one in both)
+            rate = to_si(turn.unit, RATE, r) * turn.values
+            motion = {"v_x": v_x, "v_y": v_y, "r": rate}
+            motion |= dict.fromkeys(("delta_f", "delta_r"), 0.0 * rate)
+            t, even = resample(turn.t, motion, _DT)
+            drive = Recording(name="", t=t, **dict[str, Any](even))
+            found[bool(world_axes(drive))] = (x, y), np.hypot(v_x, v_y)
+    if len(found) < 2:
         return headings, {}, ""
-    (_, ours, speed), (_, world, size) = sorted(found, key=lambda one: one[0])
+    (ours, speed), (world, size) = found[False], found[True]
     alike = np.mean(np.abs(speed - size)) < _SAME * np.mean(size) and all(map(signal_name, world))
     sure = {name: Signal(channel=(one,)) for name, one in zip(("v_x", "v_y"), ours, strict=True)}
     said = f"{world[0]} and {world[1]} are of the world's axes, as they turn with the car: "
@@ -198,9 +196,9 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
     found = {}
     for name in QUANTITIES:
         column = column_of(name)
-        if f"{column} (2)" in names and name in SPARED:
-            continue
         if f"{column} (2)" in names:
+            if name in SPARED:
+                continue
             raise RecordingError(f"{log.path}: column {column} appears more than once")
         if column in names and name not in (BETA, *POSE):
             found[name] = Signal(channel=(column,))
@@ -214,18 +212,21 @@ def standard_signals(log: LogFile, names: list[str]) -> dict[str, Signal]:
 
 def _in_struct(names: Sequence[str]) -> dict[str, Signal]:
     """Return the signals whose standard names are fields of structs; of two that of the fuller."""
-    found: dict[str, list[tuple[str, str]]] = {}
-    for one in names:
-        struct, dot, field = one.rpartition(".")
-        name = signal_name(field)
-        if dot and name and name not in (BETA, *POSE):
-            found.setdefault(name, []).append((struct, one))
-    count = Counter(struct for fields in found.values() for struct, _ in fields)
+    fields = [(*one.rpartition("."), one) for one in names]
+    known = {*QUANTITIES} - {BETA, *POSE}
+    found = [
+        (name, struct, one)
+        for struct, dot, field, one in fields
+        if dot and (name := signal_name(field)) in known
+    ]
+    count = Counter(struct for _, struct, _ in found)
     result = {}
-    for name, fields in found.items():
-        first, *rest = sorted(fields, key=lambda one: -count[one[0]])
-        if not rest or count[first[0]] > count[rest[0][0]]:
-            result[name] = Signal(channel=(first[1],))
+    for name, struct, one in found:
+        fuller = [
+            other for like, other, _ in found if like == name and count[other] >= count[struct]
+        ]
+        if len(fuller) == 1:
+            result[name] = Signal(channel=(one,))
     return result
 
 
@@ -254,27 +255,21 @@ def _listing(names: Sequence[str]) -> str:
     return f"columns found: '{some(names)}'" if names else "there is none but the time"
 
 
-def aside_text(found: Mapping[str, Signal], proposal: Proposal) -> str:
-    """Return which channel was left aside that may be v_y, or beside it a_y; empty where none."""
+def aside(found: Mapping[str, Signal], proposal: Proposal) -> tuple[str, list[str]]:
+    """Return what was left aside that may be v_y, or beside it a_y: in words, and the signals."""
     if has_v_y(found):
         a_y = proposal.guesses.get("a_y")
         if "a_y" in found or a_y is None or a_y.confidence < HINT:
-            return ""
-        likely, word = likely_text("a_y", proposal), column_word("a_y", proposal)
-        return f"ay is left aside, as it is not sure: {likely}; declare it by --columns {word}"
-    said = "no lateral velocity is read: vy is to be estimated"
-    name = next(iter(stand_ins("v_y", proposal)), "a_y")
-    if name == "a_y":
-        return said
-    likely, word = likely_text(name, proposal), column_word(name, proposal)
-    return f"{said}; if {likely} is one, declare it by --columns {word}"
-
-
-def aside_signals(found: Mapping[str, Signal], proposal: Proposal) -> list[str]:
-    """Return the signals that a channel may be and that are left aside, as `aside_text` says."""
-    if not aside_text(found, proposal):
-        return []
-    return ["a_y"] if has_v_y(found) else [x for x in stand_ins("v_y", proposal) if x != "a_y"]
+            return "", []
+        names, said = ["a_y"], "ay is left aside, as it is not sure: {};"
+    else:
+        names = [name for name in stand_ins("v_y", proposal) if name != "a_y"]
+        said = "no lateral velocity is read: vy is to be estimated"
+        if not names:
+            return said, []
+        said += "; if {} is one,"
+    said = said.format(likely_text(names[0], proposal))
+    return f"{said} declare it by --columns {column_word(names[0], proposal)}", names
 
 
 def stand_ins(name: str, proposal: Proposal) -> list[str]:

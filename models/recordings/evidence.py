@@ -30,7 +30,6 @@ _LOADS_PER_RAD = np.geomspace(4.0, 40.0, 7)  # stiffness of a rear axle: none is
 _BEHIND = 0.6  # [s], the slowest low pass that it may be behind
 _COMPUTED = 0.25  # of what the best tire misses of v_y, that a formula misses at most,
 _AT_RANDOM = 0.2  # and of what is then left, that goes with the motion at most,
-_FOLLOWS = 0.1  # and of v_y itself, that a formula of r or steering leaves at most,
 _EXACTLY = 0.01  # unless so little of both is left
 _FEWEST = 200  # windows that tell a formula
 _LARGEST_TURN = 30.0  # [m/s^2] of v_x r, and slope of a_y on it: else a unit is wrong
@@ -82,8 +81,7 @@ class Windows:
         signal = signal if by is None else signal * by
         steps = 0.5 * (signal[1:] + signal[:-1])
         total = np.concatenate([np.zeros((1, *steps.shape[1:])), np.cumsum(steps, axis=0)])
-        means: Array = (total[self.starts + self.n] - total[self.starts]) / self.n
-        return means
+        return (total[self.starts + self.n] - total[self.starts]) / self.n
 
     def rate(self, signal: Array) -> Array:
         """Return rates of change over the windows, (m,) or (m, k).
@@ -150,12 +148,13 @@ class Steering(NamedTuple):
 class Pair(NamedTuple):
     """How two channels that follow the same bends go together.
     correlation : from -1 to 1.   sign : 1 or -1 where that is beyond chance, else 0.   seconds : of
-    windows that turn.
+    windows that turn.   ratio : of the second's size there to the first's.
     """
 
     correlation: float
     sign: int
     seconds: float
+    ratio: float = 1.0
 
 
 def moving(speed: Array) -> float:
@@ -171,10 +170,7 @@ def windows(recording: Recording) -> Means:
 
     No window reaches from one segment into the next.
     """
-    every = max(round(STRIDE / recording.dt), 1) * thinning(len(recording))
-    counts = recording.v_x >= moving(recording.v_x)
-    w = Windows.where(counts, recording, WINDOW, every)
-    v_y = recording.logged_v_y
+    w, v_y = _windows(recording), recording.logged_v_y
 
     def mean(signal: Array | None) -> Array | None:
         return None if signal is None else w.mean(signal)
@@ -191,6 +187,11 @@ def windows(recording: Recording) -> Means:
         a_y=mean(recording.a_y),
         force=mean(recording.axle_force),
     )
+
+
+def _windows(recording: Recording) -> Windows:
+    every = max(round(STRIDE / recording.dt), 1) * thinning(len(recording))
+    return Windows.where(recording.v_x >= moving(recording.v_x), recording, WINDOW, every)
 
 
 def least_squares(X: Array, y: Array) -> Fit:
@@ -243,15 +244,15 @@ def pair(a: Array, b: Array, keep: NDArray[np.bool_] | None = None) -> Pair:
     rho = correlation(x, y)
     chance = rho**2 * max(seconds - 2.0, 0.5) / max(1.0 - rho**2, 1e-9)
     sure = abs(rho) > _ALIKE and chance > _BEYOND_CHANCE
-    return Pair(rho, int(np.sign(rho)) if sure else 0, seconds)
+    ratio = float(np.sqrt(float(y @ y) / (float(x @ x) + 1e-300)))
+    return Pair(rho, int(np.sign(rho)) if sure else 0, seconds, ratio)
 
 
 def _less_offset(signal: Array, some: NDArray[np.bool_]) -> Array:
     """Return a signal where the car turns, less its offset where it goes to both sides."""
     part = signal[some]
     both = float(np.std(part)) >= 0.5 * abs(float(np.mean(part)))
-    less: Array = part - np.mean(part) if both else part
-    return less
+    return part - np.mean(part) if both else part
 
 
 def course_rate(recording: Recording) -> tuple[Array, Array] | None:
@@ -326,10 +327,7 @@ def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
     moving = max(turned, felt, steered / _LONGEST)
     if together.sign == 0 or moving < _LEAST:
         return None
-    r, kinematic = r[keep], kinematic[keep]
-    some = turning(r, kinematic)
-    x, y = (_less_offset(one, some) for one in (r, kinematic))
-    return Steering(float(np.sqrt((y @ y) / (x @ x))), together.correlation)
+    return Steering(together.ratio, together.correlation)
 
 
 def computed_v_y(recording: Recording) -> str | None:
@@ -341,15 +339,8 @@ def computed_v_y(recording: Recording) -> str | None:
     noise. What the formula leaves then goes with nothing that moves: else v_y has another unit, or
     is an angle.
     """
-    y, v_x, r, a_y, dt = (
-        recording.logged_v_y,
-        recording.v_x,
-        recording.r,
-        recording.a_y,
-        recording.dt,
-    )
-    every = max(round(STRIDE / dt), 1) * thinning(len(recording))
-    w = Windows.where(v_x >= moving(v_x), recording, WINDOW, every)
+    w, y, a_y = _windows(recording), recording.logged_v_y, recording.a_y
+    v_x, r, dt = recording.v_x, recording.r, recording.dt
     if y is None or len(w) < _FEWEST or not np.ptp(r) > 0.0:
         return None
     from scipy.optimize import minimize_scalar  # takes long to import
@@ -360,11 +351,11 @@ def computed_v_y(recording: Recording) -> str | None:
         return np.asarray(lfilter([share], [1.0, share - 1.0], x, zi=[(1.0 - share) * x[0]])[0])
 
     def rest(of: Array, *beside: Array) -> Array:
-        q, _ = np.linalg.qr(np.column_stack([np.ones(len(w)), w.mean(v_x), *map(w.mean, beside)]))
-        return np.asarray(of - q @ (q.T @ of))
+        q, _ = np.linalg.qr(np.column_stack([np.ones(len(w)), *map(w.mean, (v_x, *beside))]))
+        return w.mean(of) - q @ (q.T @ w.mean(of))
 
-    def left(signal: Array, *beside: Array) -> float:
-        return float(np.std(rest(w.mean(signal), *beside)))
+    def left(*signals: Array) -> float:
+        return float(np.std(rest(*signals)))
 
     turn = w.mean(v_x, r)
     slope = 1.0 if a_y is None else float(w.mean(a_y) @ turn / (turn @ turn))
@@ -372,28 +363,27 @@ def computed_v_y(recording: Recording) -> str | None:
         return None  # units
     usual = float(np.sqrt(np.mean(v_x**2)))
     slips = [
-        v_x * (behind(v_x * r, T) * (T / usual) - recording.delta_r)
-        for T in usual / (GRAVITY * _LOADS_PER_RAD)
+        v_x * (behind(v_x * r, usual / push) / push - recording.delta_r)
+        for push in GRAVITY * _LOADS_PER_RAD
     ]
     tau = minimize_scalar(
         lambda tau: left(y, behind(r, tau)), bounds=(0.0, _BEHIND), method="bounded"
     ).x
-    formulas = ("r", r), ("r", behind(r, float(tau))), ("vx delta_f", v_x * recording.delta_f)
+    formulas = ("r", r), ("r", behind(r, tau)), ("vx delta_f", v_x * recording.delta_f)
     needed = min(left(y + one, r) for one in slips)
     of, x = min(formulas, key=lambda one: left(y, one[1]))
     beside = [x] if left(y) > _COMPUTED * needed else []
-    e, missed = rest(w.mean(y), *beside), left(y, *beside)
-    moved = [*slips[::3], v_x * slips[3], behind(r, 0.2), behind(r, 0.4)]  # not r: its own noise
-    moved += [] if beside else [r, v_x * recording.delta_f]
-    random = np.std(rest(e, *beside, *moved)) ** 2 > (1.0 - _AT_RANDOM) * missed**2
+    missed = left(y, *beside)
+    moved = [*slips[::3], v_x * slips[3], behind(r, 0.2), behind(r, 0.4)]
+    moved += beside or [r, v_x * recording.delta_f]  # else not r: its own noise
+    random = left(y, *moved) ** 2 > (1.0 - _AT_RANDOM) * missed**2
     exact = missed < _EXACTLY * min(needed, left(y))
     angle = min(left(v_x * y + one, v_x * r) for one in slips)
-    random &= not beside or missed < _FOLLOWS * left(y)
     if missed > _COMPUTED * needed or not (random or exact) or left(v_x * y, v_x * x) > angle:
         return None
     how = f"is held near zero, within {missed:.1g} m/s, as by a filter"
     if beside:
-        along = rest(w.mean(x))
+        along = rest(x)
         factor = float(along @ w.mean(y) / (along @ along))
         how = f"is computed from {of} (v_y = {factor:#.3g} {of})"
     remedy = "and give ay" if a_y is None else "of the log: ay is there"

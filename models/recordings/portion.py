@@ -57,12 +57,12 @@ def portion(recording: Recording, middle: int | None = None) -> Portion:
         sides = [(0, middle, count // 2), (middle, n, count // 2)]
     begins = [begin for side in sides for begin in _hardest(power, step, *side)]
     samples = np.unique(np.add.outer(begins, np.arange(_STEPS * step)))
-    samples = recording.without_scraps(samples[samples < n])
-    taken = recording.taken(samples)
+    taken = recording.taken(samples[samples < n])
     ends = np.array([piece.stop for piece in taken.segments])
     v_x = taken.v_x.copy()
     v_x[np.maximum(ends[:, None] - 1 - np.arange(round(_REST / recording.dt)), 0)] = 0.0
-    return Portion(replace(taken, v_x=v_x), samples)
+    samples = np.searchsorted(recording.t, taken.t)
+    return Portion(replace(taken, v_x=v_x, notes=recording.notes), samples)
 
 
 def _hardest(power: Array, step: int, first: int, last: int, count: int) -> list[int]:

@@ -6,9 +6,9 @@ v_x = ẋ cos ψ + ẏ sin ψ,  v_y = -ẋ sin ψ + ẏ cos ψ,  r = ψ̇.
 A heading may count clockwise, from north or in degrees: the direction of travel tells.
 """
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from models.logs.log import RecordingError
 from models.logs.signals import POSE, QUANTITIES, Signal
 from models.recordings.evidence import least_squares
 from models.recordings.map import LONGEST_GAP
+from models.recordings.record import resample
 
 _NO_SLIP = 2e-3  # v_y over v_x of a pose that is integrated along its heading
 _SLOW = 0.025  # [s] between poses from which a gyro tells the yaw rate
@@ -71,7 +72,8 @@ def with_pose(
     gyro = parts["r"][0] if "r" in parts else None
     slow = typical_step(motion.r.t) > _SLOW
     of_pose = {"v_x": motion.v_x, "v_y": motion.v_y}
-    of_pose |= {} if slow and gyro is not None else {"r": motion.r}
+    if gyro is None or not slow:
+        of_pose["r"] = motion.r
     what = "vx, vy and r" if "r" in of_pose else "vx and vy"
     said = [f"{what} are taken from the pose{motion.said}"]
     late = None if gyro is None else _lateness(gyro, motion.r)
@@ -134,9 +136,8 @@ def _motion_of(
     values = (x.values, parts["y"].values, np.unwrap(psi, period=period))
     of_pose = zip(POSE, values, strict=True)
     z = np.column_stack([np.interp(t, parts[name].t, one) for name, one in of_pose])
-    cuts = [0, *gaps(t, LONGEST_GAP).tolist(), t.size]
     pieces = []
-    for first, end in itertools.pairwise(cuts):
+    for first, end in pairwise([0, *gaps(t, LONGEST_GAP).tolist(), t.size]):
         if end - first >= _FEWEST_SAMPLES:
             pieces.append(_piece(t[first:end], z[first:end], x.rows[first:end]))
     if not pieces:
@@ -157,11 +158,10 @@ def _motion_of(
 
 
 class _Piece(NamedTuple):
-    """A piece without a gap: times and rows (n,), rates of x and y (n, 2), heading (n,), noise."""
+    """A piece without a gap: times and rows (n,), rates (n, 3), heading (n,), noise."""
 
     t: Array
     rows: NDArray[np.int64]
-    step: float
     rates: Array
     heading: Array
     noise: tuple[float, float]
@@ -169,12 +169,11 @@ class _Piece(NamedTuple):
 
 def _piece(t: Array, z: Array, rows: NDArray[np.int64]) -> _Piece:
     step = float((t[-1] - t[0]) / (t.size - 1))
-    even = t[0] + step * np.arange(t.size)
-    even = t if np.abs(even - t).max() < 1e-6 * step else even
-    z = np.column_stack([np.interp(even, t, column) for column in z.T])
+    even, pose = resample(t, dict(zip(POSE, z.T, strict=True)), step)
+    z = np.column_stack(list(pose.values()))
     (place, off), (heading, turned) = _smoothed(z[:, :2]), _smoothed(z[:, 2:])
-    rates = np.gradient(place, step, axis=0, edge_order=2)
-    return _Piece(even, rows, step, rates, heading[:, 0], (off, turned))
+    rates = np.gradient(np.column_stack([place, heading]), step, axis=0, edge_order=2)
+    return _Piece(even, rows, rates, heading[:, 0], (off, turned))
 
 
 def _smoothed(z: Array) -> tuple[Array, float]:
@@ -213,10 +212,10 @@ def _in_axes(
     The sense and unit count that leave the least velocity across the car.
     declared : whether somebody said how it counts, which holds where the drive does not tell.
     """
-    v = np.concatenate([piece.rates @ np.array([1.0, 1j]) for piece in pieces])
+    x_dot, y_dot, r = np.concatenate([piece.rates for piece in pieces]).T
+    v = x_dot + 1j * y_dot
     heading = np.concatenate([piece.heading for piece in pieces])
-    most = float(np.abs(v).max())
-    if not most > _STANDS:
+    if not (most := np.abs(v).max()) > _STANDS:
         raise RecordingError(f"{label}: the pose must move, its largest speed is {most:.3g} m/s")
     ways = [(sign, unit) for unit in (1.0, math.pi / 180.0) for sign in (1.0, -1.0)]
     turned = [v * np.exp(-1j * sign * unit * heading) for sign, unit in ways]
@@ -244,22 +243,19 @@ def _in_axes(
     whole = _TURN * round(away / _TURN)
     shift = whole if abs(away - whole) < _ALONG else away
     body = turned[best] * np.exp(-1j * shift)
-    r = (
-        sign
-        * unit
-        * np.concatenate([np.gradient(one.heading, one.step, edge_order=2) for one in pieces])
-    )
-    each = slice(None, None, max(1, round(_APART / pieces[0].step)))
+    r = sign * unit * r
+    each = slice(None, None, max(1, round(_APART / typical_step(pieces[0].t))))
     terms = np.column_stack([body.real, r, r * body.real**2])[each]  # turned, ahead and slip
     found = least_squares(terms, body.imag[each])
     both = abs(r.sum()) < _BOTH * np.abs(r).sum()  # else slip is to one side, too
     if both and abs(found.theta[0]) > max(_SURELY * found.error[0], _TURNED):
         shift += float(found.theta[0])
+        body *= np.exp(-1j * found.theta[0])
     said = ["its heading is clockwise"] if sign < 0 else []
     said += ["its heading is in degrees"] if unit != 1.0 else []
     said += [f"its heading lies {math.degrees(shift):.3g} deg off the travel"] if shift else []
     words = f" ({', '.join(said)})" if said else ""
-    return turned[best] * np.exp(-1j * shift), r, unit, words
+    return body, r, unit, words
 
 
 def _lateness(gyro: Raw, pose: Raw) -> float | None:

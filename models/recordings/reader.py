@@ -73,9 +73,11 @@ def read_recording(
         One line: file and run, column, rule, value, remedy.
     """
     given = with_columns(map_of(log_map), columns)
-    if not isinstance(source, str | PathLike):
+    if isinstance(source, str | PathLike):
+        name, log = name or _stem(Path(source)), given.opened(source)
+    else:
         name = name or "recording"
-        arrays = open_arrays(
+        log = open_arrays(
             name,
             source,
             given.clock,
@@ -83,10 +85,8 @@ def read_recording(
             mend=given.order == MEND,
             rate=given.rate or 0.0,
         )
-        return _judged(arrays, name, replace(given, clock=""), run=run, dt=dt, check=check)
-    path = Path(source)
-    log = given.opened(path)
-    return _judged(log, name or _stem(path), given, run=run, dt=dt, check=check)
+        given = replace(given, clock="")
+    return _judged(log, name, given, run=run, dt=dt, check=check)
 
 
 def read_repaired(
@@ -174,7 +174,7 @@ def _judged(
 
 def _lateral(log: LogFile, recording: Recording, given: LogMap, run: str | None) -> str:
     """Return which channel is the lateral acceleration where a_y is none; "" where it is one."""
-    if recording.a_y is None or abs(_turning(recording)[1]) > _UNLIKE:
+    if abs(_turning(recording)[1]) > _UNLIKE:
         return ""
     for one in log.headings()[:_MOST_TRIED]:
         read = given.with_signals({"a_y": Signal(channel=(one.name,))})
@@ -191,9 +191,11 @@ def _lateral(log: LogFile, recording: Recording, given: LogMap, run: str | None)
 def _turning(recording: Recording) -> tuple[float, float]:
     """Return the slope of a_y on v_x r, and their correlation; 1 where nothing turns."""
     w = windows(recording)
-    both = pair(w.v_x_r, w.v_x_r if w.a_y is None else w.a_y)
-    slope = least_squares(w.v_x_r[:, None], w.a_y).theta[0] if w.a_y is not None else 1.0
-    return float(slope), both.correlation if both.seconds >= 2.0 else 1.0
+    if w.a_y is None or not w.r.size:
+        return 1.0, 1.0
+    both = pair(w.v_x_r, w.a_y)
+    slope = float(least_squares(w.v_x_r[:, None], w.a_y).theta[0])
+    return slope, both.correlation if both.seconds >= 2.0 else 1.0
 
 
 def runs(path: str | Path) -> list[str]:

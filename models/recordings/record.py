@@ -11,6 +11,7 @@ import math
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import LONG, Array, blocks, large
+from codegen.arrays import LONG, Array, blocks, filled, large
 from models.bicycle import measured_slip
 from models.files import write_atomically
 from models.logs.log import RecordingError
@@ -103,11 +104,12 @@ class Recording:
         if not set(self.estimated) <= {"v_y"}:
             raise RecordingError(f"{self.name}: estimated may name v_y, not {self.estimated}")
         for piece in self.segments:
-            if min(piece.stop, n) - piece.start < MINIMUM_SAMPLES:
+            count = min(piece.stop, n) - piece.start
+            if count < MINIMUM_SAMPLES:
                 whole = "a recording" if not self.breaks else "each segment of a recording"
                 raise RecordingError(
                     f"{self.name}: {whole} needs at least {MINIMUM_SAMPLES} samples, it has "
-                    f"{max(min(piece.stop, n) - piece.start, 0)}"
+                    f"{max(count, 0)}"
                 )
         for name in _SIGNALS:
             value = getattr(self, name)
@@ -167,8 +169,7 @@ class Recording:
         """
         breaks = np.array(self.breaks, dtype=np.intp)
         first, last = (np.searchsorted(breaks, at, side="right") for at in (starts, starts + n))
-        inside: NDArray[np.bool_] = first == last
-        return inside
+        return first == last
 
     @property
     def x(self) -> Array:
@@ -236,12 +237,11 @@ class Recording:
         """
         names = ("v_x", "v_y", "r", "delta_f", "delta_r")
         signals = {name: self.needed(name)[part] for name in names}
-        slip = large((len(signals["r"]), 2))
-        for some in blocks(len(slip)):
-            one = {name: signal[some] for name, signal in signals.items()}
-            slip[some] = measured_slip(l_f, l_r, **one)
-        slip.setflags(write=False)
-        return slip
+
+        def slip(some: slice) -> Array:
+            return measured_slip(l_f, l_r, **{name: one[some] for name, one in signals.items()})
+
+        return filled(len(signals["r"]), slip, 2)
 
     def between(self, t0: float, t1: float) -> "Recording":
         """Return the part with t0 <= t <= t1; what it leaves of a segment as of `taken`.
@@ -254,15 +254,14 @@ class Recording:
         slack = 1e-6 * self.dt
         first = int(np.searchsorted(self.t, t0 - slack, side="left"))
         last = int(np.searchsorted(self.t, t1 + slack, side="right"))
-        keep = slice(first, max(first, last))
-        count = keep.stop - keep.start
+        count = max(last - first, 0)
         if count < MINIMUM_SAMPLES:
             raise RecordingError(
                 f"{self.name}: between {t0:g} and {t1:g} s there are {count} "
                 f"samples, at least {MINIMUM_SAMPLES} are needed; the recording runs from "
                 f"{self.t[0]:g} to {self.t[-1]:g} s"
             )
-        return self.taken(keep)
+        return self.taken(slice(first, last))
 
     def __getitem__(self, times: slice) -> "Recording":
         """Return the part between two times [s], both included, as label slices of pandas have it.
@@ -323,12 +322,6 @@ class Recording:
             notes += (f"left out: {scraps} segment{several} of under {MINIMUM_SAMPLES} samples",)
         return replace(self, **cut, breaks=tuple(int(k) for k in ends[:-1]), notes=notes)
 
-    def without_scraps(self, samples: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Return samples but for those of segments that `taken` would leave out."""
-        pieces = self._pieces(samples)
-        lengths = np.array([piece.stop - piece.start for piece in pieces], dtype=np.intp)
-        return samples[np.repeat(lengths >= MINIMUM_SAMPLES, lengths)]
-
     def _pieces(self, kept: slice | NDArray[np.intp]) -> list[slice]:
         """Return the segments that samples make, counted from the first of them."""
         if isinstance(kept, slice):
@@ -370,24 +363,21 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
     if len(recordings) == 1:
         return replace(first, name=name)
     t = large((sum(map(len, recordings)),))
-    n, breaks, notes = len(first), list(first.breaks), list(first.notes)
-    t[:n] = first.t
-    for one in recordings[1:]:
+    n, end, breaks, notes = 0, -math.inf, list[int](), list[str]()
+    for one in recordings:
         if abs(one.dt - first.dt) > _JITTER * first.dt / len(one):
             raise RecordingError(
                 f"{one.name} is sampled at {one.dt:g} s, {first.name} at {first.dt:g} s: logs that "
                 f"are used together need one sampling interval"
             )
-        end = float(t[n - 1])
         moved = 0.0 if one.t[0] > end + first.dt else end + _PAUSE - float(one.t[0])
-        t[n : n + len(one)] = one.t
-        if moved:
-            t[n : n + len(one)] += moved
+        np.add(one.t, moved, out=t[n : n + len(one)])
         breaks += [n, *(n + k for k in one.breaks)]
         notes += [note for note in one.notes if note not in notes]
         if moved:
             notes.append(f"the time of {one.name} is moved by {moved:.6g} s, to follow on")
         n += len(one)
+        end = float(t[n - 1])
     t.setflags(write=False)
     signals: dict[str, Any] = {
         name: _in_a_row([getattr(one, name) for one in recordings])
@@ -403,7 +393,7 @@ def joined(recordings: Sequence[Recording], name: str | None = None) -> Recordin
         name=name,
         t=t,
         **signals,
-        breaks=tuple(breaks),
+        breaks=tuple(breaks[1:]),
         notes=tuple(notes),
         estimated=tuple(sorted({signal for one in recordings for signal in one.estimated})),
         v_y_sd=max(one.v_y_sd for one in recordings),
@@ -420,11 +410,7 @@ def _in_a_row(signals: Sequence[Array]) -> Array:
 
 def _rows(signal: Array, kept: NDArray[np.intp]) -> Array:
     """Return some samples of a signal, as what nobody may write."""
-    rows = large((kept.size, *signal.shape[1:]))
-    for part in blocks(kept.size):
-        rows[part] = signal[kept[part]]
-    rows.setflags(write=False)
-    return rows
+    return filled(kept.size, lambda part: signal[kept[part]], *signal.shape[1:])
 
 
 def _read_only(value: object) -> Array:
@@ -450,10 +436,7 @@ def side_by_side(first: Array, second: Array) -> Array:
     """Return two signals as columns that nobody may write, (n, 2).
     first, second : signals (n,).
     """
-    both = large((first.size, 2))
-    both[:, 0], both[:, 1] = first, second
-    both.setflags(write=False)
-    return both
+    return filled(first.size, lambda part: np.column_stack([first[part], second[part]]), 2)
 
 
 def _off_grid(t: Array, step: float) -> float:
@@ -539,30 +522,29 @@ def resample(t: Array, columns: dict[str, Array], dt: float) -> tuple[Array, dic
     slower = float(np.median(np.diff(t[: LONG + 1]))) > dt / 1.5
     resampled = {}
     for name, value in columns.items():
-        new = large((count,))
         area = None if slower else _area(t, value)
-        for part in blocks(count):
-            new[part] = np.interp(grid[part], t, value)
-            if area is not None:
-                _average(new[part], grid[part], t, value, area, dt)
-        resampled[name] = new
+        resampled[name] = filled(count, partial(_at, grid, t, value, area, dt))
     return grid, resampled
 
 
 def _grid(begin: float, dt: float, count: int, end: float = math.inf) -> Array:
     """Return times of equal steps, none beyond an end."""
-    grid = large((count,))
-    for part in blocks(count):
-        grid[part] = np.minimum(begin + dt * np.arange(part.start, part.stop), end)
-    return grid
+    return filled(
+        count, lambda part: np.minimum(begin + dt * np.arange(part.start, part.stop), end)
+    )
 
 
-def _average(new: Array, grid: Array, t: Array, value: Array, area: Array, dt: float) -> None:
-    """Put the mean over a step about each instant of the grid in the place of the value there."""
+def _at(grid: Array, t: Array, value: Array, area: Array | None, dt: float, part: slice) -> Array:
+    """Return the value at some instants of the grid, or the mean over a step about each."""
+    grid = grid[part]
+    new = np.interp(grid, t, value)
+    if area is None:
+        return new
     half = np.minimum(dt / 2.0, np.minimum(grid - t[0], t[-1] - grid))
     inside = half > 1e-9 * dt
     ends = (_integral(t, value, area, (grid + side * half)[inside]) for side in (1.0, -1.0))
     new[inside] = (next(ends) - next(ends)) / (2.0 * half[inside])
+    return new
 
 
 def _area(t: Array, value: Array) -> Array:
@@ -581,5 +563,4 @@ def _integral(t: Array, value: Array, total: Array, at: Array) -> Array:
     k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
     ahead = at - t[k]
     slope = (value[k + 1] - value[k]) / (t[k + 1] - t[k])
-    area: Array = total[k] + ahead * (value[k] + slope * ahead / 2.0)
-    return area
+    return total[k] + ahead * (value[k] + slope * ahead / 2.0)

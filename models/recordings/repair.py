@@ -80,7 +80,7 @@ class Repair:
         VehicleError
             Where the numbers of the car are those of no car.
         """
-        declared = {name for name in _TABLES if name != "vehicle" for name in getattr(self, name)}
+        declared = {name for table in _TABLES[:-1] for name in getattr(self, table)}
         if self.acceleration_sensor_x:
             declared.add("a_y")
         turned = self.velocity_sensor_angle or self.velocity_sensor_x
@@ -129,8 +129,7 @@ class Repair:
 
     def _scaled(self, recording: Recording, name: str, part: slice) -> Array:
         factor, offset = self._scale(name)
-        signal: Array = getattr(recording, name)[part] * factor - offset
-        return signal
+        return getattr(recording, name)[part] * factor - offset
 
     def on(self, vehicle: Vehicle) -> Vehicle:
         """Return the car with the corrected numbers."""
@@ -172,9 +171,8 @@ class Repair:
             name: _added(getattr(self, name), getattr(other, name))
             for name in ("offset", "delay", "lag")
         }
-        factor = dict(self.factor)
-        for key, value in other.factor.items():
-            factor[key] = factor.get(key, 1.0) * value
+        one, more = self.factor, other.factor
+        factor = {key: one.get(key, 1.0) * more.get(key, 1.0) for key in {**one, **more}}
         places = {name: getattr(self, name) + getattr(other, name) for name in _SCALARS}
         return Repair(
             factor=factor,
@@ -208,7 +206,6 @@ class Repair:
         ahead = self.velocity_sensor_x * f_y / f_r
         pushed = self.acceleration_sensor_x * f_a / f_r
         angle = math.copysign(1.0, f_x * f_y) * self.velocity_sensor_angle
-        off = {name: self.offset.get(name, 0.0) * factor(name, 1.0) for name in CHANNELS}
         more = {name: other.offset.get(name, 0.0) for name in CHANNELS}
         more["v_y"] += ahead * more["r"]
         c, s = math.cos(angle), math.sin(angle)
@@ -216,7 +213,9 @@ class Repair:
             c * more["v_x"] + s * more["v_y"],
             c * more["v_y"] - s * more["v_x"],
         )
-        offset = {name: off[name] + more[name] for name in CHANNELS}
+        offset = {
+            name: self.offset.get(name, 0.0) * factor(name, 1.0) + more[name] for name in CHANNELS
+        }
         return replace(
             self.merged(other),
             offset={name: value for name, value in offset.items() if value},
@@ -269,8 +268,7 @@ def _without_low_pass(signal: Array, lag: float, dt: float, half: int) -> Array:
         bell = np.hanning(2 * half + 3)[1:-1]
         padded = np.pad(signal, half, mode="reflect", reflect_type="odd")
         signal = np.convolve(padded, bell / bell.sum(), "valid")
-    source: Array = signal + lag * np.gradient(signal, dt)
-    return source
+    return signal + lag * np.gradient(signal, dt)
 
 
 def _earlier(t: Array, signal: Array, delay: float, whole: slice, part: slice) -> Array:

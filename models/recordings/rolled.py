@@ -114,13 +114,13 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: ca.SX, free: ca.SX) ->
     ahead, passed = v + a * dt, since + dt
     near, alike = (NOISE + share * ca.fabs(ahead) for share in (SLIP, ALIKE))
 
-    steady = ca.fabs(rates) <= limit
+    steady, away = ca.fabs(rates) <= limit, ca.fabs(c - ahead)
     agree = ca.logic_and(ca.mmax(c) - ca.mmin(c) <= near, ca.logic_all(steady))
     doubt = UNSURE * most * since
     doubt = ca.if_else(agree, doubt * (1.0 + since / PATIENCE), doubt)
     slow = ca.fmax(ca.fabs(ahead), ca.mmax(ca.fabs(c))) < SLOW
     doubt = ca.if_else(slow, SLOW, doubt)
-    likely = ca.logic_and(ca.logic_or(slow, steady), ca.fabs(c - ahead) <= near + doubt)
+    likely = ca.logic_and(ca.logic_or(slow, steady), away <= near + doubt)
     some = ca.logic_any(likely)
 
     # Nobody is trusted: it goes on as it went, unless that leads away from all wheels.
@@ -130,11 +130,9 @@ def _trusted(trust: _Trust, c: ca.SX, rates: ca.SX, rule: ca.SX, free: ca.SX) ->
     # Driven wheels run ahead of the car, however little.
     likely = _rather(likely, free, ca.logic_not(a > BRAKED))
     likely = _rather(likely, ca.fabs(rates - a) <= UNSURE * most, ca.SX(0.0))
-    best = ca.if_else(
-        a > ROLLS_OUT,
-        _lowest(c, likely),
-        ca.if_else(a < BRAKED, -_lowest(-c, likely), _nearest(c, likely, ahead)),
-    )
+    nearest = _lowest(c, ca.logic_and(likely, away <= _lowest(away, likely)))
+    slowing = ca.if_else(a < BRAKED, -_lowest(-c, likely), nearest)
+    best = ca.if_else(a > ROLLS_OUT, _lowest(c, likely), slowing)
     kept = ca.logic_and(likely, ca.fabs(c - best) <= alike)
     reach = most * dt + doubt
     now = ca.fmin(ca.fmax(_mean(c, kept), ahead - reach), ahead + reach)
@@ -160,16 +158,6 @@ def _rather(likely: ca.SX, those: ca.SX, unless: ca.SX) -> ca.SX:
 def _lowest(c: ca.SX, among: ca.SX) -> ca.SX:
     """Return the lowest number of some, infinite where there is none."""
     return ca.mmin(ca.if_else(among, c, ca.inf))
-
-
-def _nearest(c: ca.SX, among: ca.SX, to: ca.SX) -> ca.SX:
-    """Return the number of some that is nearest to another, of several the first."""
-    best, distance = ca.SX(0.0), ca.SX(ca.inf)
-    for k in range(c.numel()):
-        away = ca.fabs(c[k] - to)
-        nearer = ca.logic_and(among[k], away < distance)
-        best, distance = ca.if_else(nearer, c[k], best), ca.if_else(nearer, away, distance)
-    return best
 
 
 def _mean(c: ca.SX, among: ca.SX) -> ca.SX:

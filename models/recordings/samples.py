@@ -182,7 +182,7 @@ def dropouts(signal: Array, white: float) -> NDArray[np.intp]:
         return np.empty(0, dtype=np.intp)
     kept = np.abs(np.concatenate([[0.0], signal[~zero], [0.0]]))
     place = np.cumsum(~zero)
-    beside = np.minimum(kept[place], kept[np.minimum(place + 1, kept.size - 1)])
+    beside = np.minimum(kept[place], kept[place + 1])
     steps = np.abs(np.diff(signal[~zero]))
     step = float(np.percentile(steps[steps > 0.0], 90)) if steps.any() else math.inf
     found = np.flatnonzero(zero & (beside > 10.0 * max(white, step)))
@@ -198,8 +198,7 @@ def spikes(signal: Array, white: float) -> NDArray[np.intp]:
     beside = np.stack([signal[:-4], signal[1:-3], signal[3:-1], signal[4:]])
     off = np.abs(signal[2:-2] - np.median(beside, axis=0))
     around = np.maximum(0.05 * swing(signal), 3.0 * np.ptp(beside, axis=0))
-    found: NDArray[np.intp] = np.flatnonzero(off > np.maximum(_SPIKE * white, around)) + 2
-    return found
+    return np.flatnonzero(off > np.maximum(_SPIKE * white, around)) + 2
 
 
 def lateness(signal: Array, dt: float, step: float) -> tuple[float, float] | None:
@@ -240,8 +239,7 @@ def lateness(signal: Array, dt: float, step: float) -> tuple[float, float] | Non
 def _variance(X: Array, y: Array) -> Array:
     """Return the variance that a first fit says each sample has."""
     theta, *_ = np.linalg.lstsq(X, y, rcond=None)
-    variance: Array = np.maximum(X @ theta, 0.1 * float(np.mean(y)))
-    return variance
+    return np.maximum(X @ theta, 0.1 * float(np.mean(y)))
 
 
 # The clock: all signals at once.

@@ -61,15 +61,14 @@ class Wheels:
     acceleration: float = 12.0
 
     def __post_init__(self) -> None:
-        for name, sizes, words in (
-            ("radius", (0, 1, 2, 4), "one number, one per axle or one per wheel"),
-            ("track", (0, 1, 2), "one number or one per axle"),
+        for name, sizes, words, ends in (
+            ("radius", (0, 1, 2, 4), "one number, one per axle or one per wheel", _RADII),
+            ("track", (0, 1, 2), "one number or one per axle", _LENGTHS),
         ):
             given = getattr(self, name)
             if len(given) not in sizes:
                 raise RecordingError(f"wheels: {name} must be {words}, not {len(given)} numbers")
-        for name, ends in (("radius", _RADII), ("track", _LENGTHS)):
-            for one in getattr(self, name):
+            for one in given:
                 require_within(RecordingError, *ends, **{f"wheels: {name}": one})
         if self.wheelbase is not None:
             require_within(RecordingError, *_LENGTHS, **{"wheels: wheelbase": self.wheelbase})
@@ -85,11 +84,10 @@ class Wheels:
         """Return the radius of a wheel [m], of `wheel` that of the rear axle; None: unknown."""
         if not self.radius:
             return None
-        k = WHEELS.index(name) if name in WHEELS[:4] else 2
-        if len(self.radius) == 4:
-            one = self.radius[2:] if name not in WHEELS[:4] else self.radius[k : k + 1]
-            return sum(one) / len(one)
-        return self.radius[min(k // 2, len(self.radius) - 1)]
+        k, size = WHEELS.index(name), len(self.radius)
+        corners = [self.radius[corner * size // 4] for corner in range(4)]
+        some = corners[k : k + 1] or corners[2:]
+        return sum(some) / len(some)
 
     def completed(self, vehicle: Vehicle) -> "Wheels":
         """Return it, completed by what the vehicle declares."""
@@ -161,17 +159,14 @@ def identified_scales(
     v_x, r = at("v_x"), at("r") if "r" in parts else np.zeros(t.size)
     found = {}
     for name in WHEELS:
-        if name not in parts:
-            continue
-        given = _identified_scale(t, v_x, r, at(name))
+        given = _identified_scale(t, v_x, r, at(name)) if name in parts else None
         if given is None:
             continue
         value, seconds = given
-        unit, (low, high) = units[name], _SPEEDS
-        speed = low <= value <= high and (not is_given(unit) or quantity_of(name, unit) == SPEED)
-        turns = not speed and (not is_given(unit) or quantity_of(name, unit) != SPEED)
-        if speed or (turns and _RADII[0] <= value <= _RADII[1]):
-            found[name] = Scale(value, turns, seconds)
+        shown = quantity_of(name, units[name]) if is_given(units[name]) else ""
+        speed = shown in ("", SPEED) and _SPEEDS[0] <= value <= _SPEEDS[1]
+        if speed or (shown != SPEED and _RADII[0] <= value <= _RADII[1]):
+            found[name] = Scale(value, not speed, seconds)
     return found
 
 

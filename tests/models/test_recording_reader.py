@@ -240,3 +240,8 @@ def test_at_a_coarse_interval_a_segment_of_too_few_samples_is_left_out(tmp_path)
     coarse = read_recording(path, dt=0.25)
     assert coarse.breaks == () and len(coarse) >= 40
     assert coarse.notes[-1:] == ("left out: 1 segment of less than 2.5 s",)
+
+
+def test_a_car_that_stands_is_read_with_its_accelerometer():
+    still = dict.fromkeys(("vx", "vy", "r", "delta_f", "ay"), np.zeros(1000))
+    assert not read_recording({"t": np.arange(1000) * 0.01, **still}).notes

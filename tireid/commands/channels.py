@@ -86,9 +86,9 @@ def run(options: argparse.Namespace) -> int:
         cut = "cut out, as given" if log_map.holes == CUT else _CUT_BY_MAP
         tell(f"{empty}: they are {cut}")
         log_map = replace(log_map, holes=CUT)
-    aside = [] if "v_y" in missing else choice.aside_signals(signals, proposal)
+    left, aside = ("", []) if "v_y" in missing else choice.aside(signals, proposal)
     if aside:
-        tell(choice.aside_text(signals, proposal))
+        tell(left)
     elif not choice.has_v_y(signals) and not missing:
         tell(f"{column_of('a_y')} is there: without vy, identify estimates it")
     said, of_wheels, rolls = _wheels(log, signals, log_map, chosen)
