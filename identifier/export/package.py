@@ -206,9 +206,10 @@ def run_in_virtual_machine(
     return np.array(table), dict(zip(specialized.carry, state, strict=True))
 
 
-def vectors_header(specialized: SpecializedStep) -> str:
+def vectors_header(specialized: SpecializedStep, most: int = _SAMPLES) -> str:
     samples = synthetic_samples(specialized)
     outputs, _ = run_in_virtual_machine(specialized, samples)
+    samples, outputs = samples[:most], outputs[:most]
     double, single = _tolerances(specialized)
     kept = rules([member for member in carried_members(specialized) if member.learnt])
     names = ", ".join(port.name for port in specialized.inputs)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from identifier.export.fmu import token_header
-from identifier.export.package import build_package, vectors, vectors_header
+from identifier.export.package import build_package, vectors_header
 from identifier.methods import LIVE, make_method
 from models.vehicle import sedan
 from mpc.export.package import vectors_header as mpc_vectors_header
@@ -26,15 +26,14 @@ def reference() -> Mapping[str, str]:
     package = build_package(make_method(LIVE, car), car)
     pair = build_pair(package)
     texts = {**package.files, **pair.tracker.files, **pair.files}
-    few, found = vectors(package.specialized), pair.tracker.vectors
-    few = few._replace(samples=few.samples[:FEW], force=few.force[:FEW])
+    found = pair.tracker.vectors
     found = found._replace(
         measured=found.measured[:FEW], expected=found.expected[:FEW], road=found.road[: FEW + 1]
     )
     headers = {
         **{Path(path).name: text for path, text in texts.items() if _is_wanted(path)},
         "token.h": token_header("{00000000}", 2),
-        "tireid_vectors.h": vectors_header(package.specialized, few),
+        "tireid_vectors.h": vectors_header(package.specialized, FEW),
         "tireid_mpc_vectors.h": mpc_vectors_header(pair.tracker.name, found),
     }
     return {name: _undated(text) for name, text in headers.items()}
