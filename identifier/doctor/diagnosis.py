@@ -131,9 +131,9 @@ def diagnose(recording: Recording, vehicle: Vehicle) -> Diagnosis:
     elif any(one.code == "straight" for one in found):  # by a yaw rate that may be the fault
         broken = _contradictions(recording, vehicle)
         found = [one for one in found if one.code != "straight" or not broken] + broken
-    coarse = {one.channel for one in found if one.code == "quantized"}
+    coarse = {one.channel for one in found if one.code == "quantized"}  # all sizes need delta_f
     sizes = [
-        replace(one, note=True, sure=False) if one.channel in coarse else one
+        replace(one, note=True, sure=False) if coarse & {one.channel, "delta_f"} else one
         for one in doubted(fine.findings, found)
     ]
     ranked = sorted([*found, *sizes], key=lambda one: not one.matters)
