@@ -241,10 +241,9 @@ def test_a_pose_that_nobody_told_and_that_is_none_is_left_aside_with_a_note(tmp_
 def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
     pytest.importorskip("rosbags")
     from tests.models.logs.drive_in_every_format import header
-    from tests.models.logs.test_bag import store_of, write
+    from tests.models.logs.test_bag import STORE, write
 
-    store = store_of()
-    kinds = store.types
+    kinds = STORE.types
     make = {name.rpartition("/")[2]: kinds[name] for name in kinds}
     vector, none = make["Vector3"], np.zeros(36)
     box, command, tracked = [], [], []
@@ -256,34 +255,34 @@ def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
         if kind == "Odometry":
             still = make["Twist"](vector(0.0, 0.0, 0.0), vector(0.0, 0.0, 0.0))
             message = make["Odometry"](
-                header(store, ns, "map"), "base_link", make["PoseWithCovariance"](at, none),
+                header(STORE, ns, "map"), "base_link", make["PoseWithCovariance"](at, none),
                 make["TwistWithCovariance"](still, none),
             )  # fmt: skip
         elif kind == "TFMessage":
             moved = make["Transform"](vector(at.position.x, at.position.y, 0.1), turn)
             still = make["Transform"](vector(0.1, 0.0, 0.0), make["Quaternion"](0.0, 0.0, 0.0, 1.0))
             message = make["TFMessage"]([
-                make["TransformStamped"](header(store, ns, "map"), "base_link", moved),
-                make["TransformStamped"](header(store, ns, "base_link"), "laser", still),
+                make["TransformStamped"](header(STORE, ns, "map"), "base_link", moved),
+                make["TransformStamped"](header(STORE, ns, "base_link"), "laser", still),
             ])  # fmt: skip
         else:
-            message = make["PoseStamped"](header(store, ns, "map"), at)
+            message = make["PoseStamped"](header(STORE, ns, "map"), at)
         tracked.append((ns, message))
         rate, push = COLUMNS["imu_gyro_z [rad/s]"][k], COLUMNS["imu_acc_y [m/s^2]"][k]
         nine = np.zeros(9)
         box.append((ns, make["Imu"](
-            header(store, ns), make["Quaternion"](0.0, 0.0, 0.0, 1.0), nine,
+            header(STORE, ns), make["Quaternion"](0.0, 0.0, 0.0, 1.0), nine,
             vector(0.0, 0.0, rate), nine, vector(0.1, push, 9.81), nine,
         )))  # fmt: skip
         drive = make["AckermannDrive"](DELTA[k], 0.0, V_X[k], 0.0, 0.0)
-        command.append((ns, make["AckermannDriveStamped"](header(store, ns), drive)))
+        command.append((ns, make["AckermannDriveStamped"](header(STORE, ns), drive)))
     package = {"PoseStamped": "geometry_msgs", "Odometry": "nav_msgs", "TFMessage": "tf2_msgs"}
     topics = {
         "/tf" if kind == "TFMessage" else "/vicon/car": (f"{package[kind]}/msg/{kind}", tracked),
         "/imu": ("sensor_msgs/msg/Imu", box),
         "/ackermann_cmd": ("ackermann_msgs/msg/AckermannDriveStamped", command),
     }
-    found = read_recording(write(tmp_path / "bag", store, topics))
+    found = read_recording(write(tmp_path / "bag", topics))
     assert any("80 ms late" in note for note in found.notes), found.notes
     judge(found)
 

@@ -30,4 +30,5 @@ def refusal(path, dbc=None):
         log.read([one.name for one in log.listed()])
     text = str(caught.value)
     assert "\n" not in text and len(text) < 700
+    assert text.startswith((str(path), str(dbc)))
     return text

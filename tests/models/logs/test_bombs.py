@@ -72,34 +72,40 @@ def parquet(path, **columns):
     return path
 
 
-def element(kind, data):
-    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+def element(kind, data, order="<"):
+    return struct.pack(order + "II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def head_of(kind, rows, order="<"):
+    """Flags and dimensions of a variable of MATLAB of one column."""
+    flags, shape = struct.pack(order + "II", kind, 0), struct.pack(order + "ii", rows, 1)
+    return element(6, flags, order) + element(5, shape, order)
 
 
 def numbers(name, count):
     """A variable of MATLAB: zeros of one byte."""
-    flags, shape = struct.pack("<II", 8, 0), struct.pack("<ii", count, 1)
-    parts = element(6, flags) + element(5, shape) + element(1, name) + element(1, bytes(count))
-    return element(14, parts)
+    return element(14, head_of(8, count) + element(1, name) + element(1, bytes(count)))
 
 
 def struct_of(name, count):
     """A struct of MATLAB with one field, t."""
-    flags, shape = struct.pack("<II", 2, 0), struct.pack("<ii", 1, 1)
-    head = element(6, flags) + element(5, shape) + element(1, name)
     return element(
         14,
-        head
+        head_of(2, 1)
+        + element(1, name)
         + element(5, struct.pack("<i", 8))
         + element(1, b"t".ljust(8, b"\0"))
         + numbers(b"", count),
     )
 
 
+HEADER = b"MATLAB 5.0 MAT-file".ljust(124)
+
+
 def matlab(path, *variables):
     packed = [zlib.compress(one, 9) for one in variables]
     body = b"".join(struct.pack("<II", 15, len(one)) + one for one in packed)
-    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + body)
+    path.write_bytes(HEADER + b"\0\1IM" + body)
     return path
 
 
