@@ -155,6 +155,7 @@ COLUMNS = {
     "imu_acc_y [m/s^2]": np.interp(T - 0.08, T, np.gradient(V_Y, T) + V_X * R),
     "drive.steering_angle [rad]": DELTA, "encoder_speed [m/s]": V_X,
 }  # fmt: skip
+TOLD = LogMap(signals=given_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
 
 
 def table(path, columns):
@@ -222,9 +223,8 @@ def test_a_pose_can_be_told_and_wants_all_three(tmp_path):
 def test_a_pose_that_is_integrated_from_wheels_is_refused(tmp_path):
     x, y = integral(V_X * np.cos(PSI)), integral(V_X * np.sin(PSI))
     path = table(tmp_path / "log.csv", {**COLUMNS, "x [m]": x, "y [m]": y, "yaw [rad]": PSI})
-    told = LogMap(signals=given_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
     with pytest.raises(RecordingError, match=r"never leaves its heading, as one .* from wheels"):
-        read_recording(path, log_map=told)
+        read_recording(path, log_map=TOLD)
 
 
 def test_a_pose_that_nobody_told_and_that_is_none_is_left_aside_with_a_note(tmp_path):
@@ -232,9 +232,8 @@ def test_a_pose_that_nobody_told_and_that_is_none_is_left_aside_with_a_note(tmp_
     found = read_recording(table(tmp_path / "log.csv", columns))
     assert found.v_y is None and found.a_y is not None
     assert any("x, y, heading is left aside" in note for note in found.notes)
-    told = LogMap(signals=given_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
     with pytest.raises(RecordingError, match="must go along with the direction of travel"):
-        read_recording(tmp_path / "log.csv", log_map=told)
+        read_recording(tmp_path / "log.csv", log_map=TOLD)
 
 
 @pytest.mark.parametrize("kind", ["PoseStamped", "Odometry", "TFMessage"])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks.faults import Together, WrongUnit
-from benchmarks.random_cars import random_car, random_drive
 from identifier.axle import AxleIdentifier
 from identifier.doctor import Finding, diagnose, diagnosis
 from identifier.doctor.diagnosis import Diagnosis, _contradictions
@@ -16,13 +15,12 @@ from identifier.run import identify
 from models.faults import SensorFault
 from models.recordings import Repair
 from models.vehicle import sedan
+from tests.identifier.conftest import drawn
 
 
 @pytest.fixture(scope="module")
 def driven():
-    rng = np.random.default_rng(43)
-    drive = random_drive(random_car("sedan", rng), rng)
-    return drive.car.told, drive.log(rng)
+    return drawn("sedan", 43)
 
 
 @pytest.fixture(scope="module")

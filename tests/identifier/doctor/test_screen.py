@@ -10,7 +10,7 @@ from benchmarks import doctor_cases
 from benchmarks.everyday_drives import everyday_log
 from benchmarks.fault_cases import StraightOnly
 from benchmarks.faults import Held, SensorElsewhere, Together
-from benchmarks.random_cars import CLASSES, good_sensors, random_car, random_drive
+from benchmarks.random_cars import CLASSES, good_sensors
 from benchmarks.recorded_cars import CARMAKER, DART
 from identifier.doctor import diagnose
 from identifier.doctor.pieces import PIECE, PIECES, looked_at
@@ -32,7 +32,7 @@ from models.maneuvers import SampledSteer
 from models.plant import Plant
 from models.recordings import joined, read_recording, runs
 from models.vehicle import sedan
-from tests.identifier.conftest import steered
+from tests.identifier.conftest import drawn, steered
 from tireid.driving.learn import sample_recording
 
 DEGREES = 180.0 / np.pi
@@ -49,17 +49,12 @@ def in_sideslip(recording, per_rad=1.0):
 
 @pytest.fixture(scope="module", params=CLASSES)
 def driven(request):
-    """A random car of a class as it is told, and its drive by good sensors."""
-    rng = np.random.default_rng(41)
-    drive = random_drive(random_car(request.param, rng), rng)
-    return drive.car.told, drive.log(rng)
+    return drawn(request.param, 41)
 
 
 @pytest.fixture(scope="module")
 def one():
-    rng = np.random.default_rng(42)
-    drive = random_drive(random_car("sedan", rng), rng)
-    return drive.car.told, drive.log(rng)
+    return drawn("sedan", 42)
 
 
 def named(recording, car):
@@ -132,10 +127,9 @@ def test_every_gross_fault_is_the_first_that_is_named_and_its_repair_gives_the_d
 
 def test_speeds_in_mm_per_s_are_read_as_such():
     """Of a small car: those of others are beyond what a log may hold."""
-    rng = np.random.default_rng(41)
-    drive = random_drive(random_car("tenth", rng), rng)
+    car, log = drawn("tenth", 41)
     millimeters = Together(faults=(scaled("v_x", 1e3), scaled("v_y", 1e3)))
-    assert named(millimeters.apply(drive.log(rng)), drive.car.told) == ["unit v_x", "unit v_y"]
+    assert named(millimeters.apply(log), car) == ["unit v_x", "unit v_y"]
 
 
 @pytest.mark.sweep("57*")

@@ -23,6 +23,11 @@ def assert_equal(channels, t, columns):
         assert np.all(np.diff(channel.rows) == 1) and channel.rows[0] in (1, 2)
 
 
+def channel_of(log, name):
+    (channel,) = log.read([name])
+    return channel
+
+
 def refusal(path, dbc=None):
     """The one line with which a log is refused, on opening or on reading."""
     with pytest.raises(RecordingError) as caught:

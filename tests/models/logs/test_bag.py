@@ -7,7 +7,7 @@ import pytest
 
 from models.logs.bag import _KNOWN
 from models.logs.door import open_log
-from tests.models.logs.conftest import refusal
+from tests.models.logs.conftest import channel_of, refusal
 from tests.models.logs.drive_in_every_format import FIRST_NS, header, write_bag
 
 rosbag2 = pytest.importorskip("rosbags.rosbag2")
@@ -217,7 +217,7 @@ def test_stamps_that_were_not_set_give_way_to_the_time_of_the_bag(tmp_path):
         message.header.stamp.sec = message.header.stamp.nanosec = 0
     log = open_log(write(tmp_path / "bag", {"/velocity": (kind, messages)}))
     assert "its clock is when the bag received it: /velocity" in log.notes[0]
-    assert np.array_equal(log.read(["/velocity/heading_rate"])[0].t, np.arange(50) / 100)
+    assert np.array_equal(channel_of(log, "/velocity/heading_rate").t, np.arange(50) / 100)
 
 
 @pytest.mark.parametrize("of", ["a drive", "a simulation"])
@@ -241,7 +241,7 @@ def test_compressed_bags_are_read_and_unpack_no_further_than_allowed(mode, tmp_p
     storage = "mcap" if mode == "STORAGE" else "sqlite3"
     compression = getattr(rosbag2.CompressionMode, mode)
     path = write(tmp_path / "bag", topics, storage, compression)
-    values = open_log(path).read(["/velocity/longitudinal_velocity"])[0].values
+    values = channel_of(open_log(path), "/velocity/longitudinal_velocity").values
     assert np.array_equal(values, np.arange(50.0))
     small = {"FILE": "megabytes=0.001", "MESSAGE": "block=0.00002", "STORAGE": "block=0.001"}
     monkeypatch.setenv("TIREID_LIMITS", small[mode])

@@ -10,6 +10,7 @@ from models.logs.log import RecordingError
 from models.logs.names import propose
 from models.recordings import LogMap, read_recording
 from models.recordings.map import given_signals
+from tests.models.logs.conftest import channel_of
 from tests.models.logs.test_which_time import signals
 
 T = 0.01 * np.arange(600)
@@ -46,7 +47,7 @@ def test_a_folder_with_a_file_for_each_message_is_one_log(tmp_path, clock):
     assert [one.name for one in log.listed()] == sorted(SIGNALS)
     assert any("notes.txt" in note for note in log.notes)
     for channel in log.read(["vx", "delta_f"]):
-        expected = np.interp(channel.t - log.read(["vx"])[0].t[0], T, SIGNALS[channel.name])
+        expected = np.interp(channel.t - channel_of(log, "vx").t[0], T, SIGNALS[channel.name])
         np.testing.assert_allclose(channel.values, expected, atol=2e-4)
     recording = read_recording(folder)
     assert recording.name == "log" and recording.duration == pytest.approx(5.96, abs=0.03)

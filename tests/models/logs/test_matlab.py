@@ -9,7 +9,7 @@ import pytest
 import scipy.io
 
 from models.logs.door import open_log
-from tests.models.logs.conftest import refusal
+from tests.models.logs.conftest import channel_of, refusal
 from tests.models.logs.drive_in_every_format import write_mat73
 from tests.models.logs.test_bombs import HEADER, element, head_of
 
@@ -108,7 +108,7 @@ def test_files_of_another_byte_order_are_read(tmp_path):
 
     path.write_bytes(HEADER + b"\1\0MI" + matrix(b"t", T[:40]) + matrix(b"v", A[:40]))
     assert np.array_equal(scipy.io.loadmat(path)["v"].ravel(), A[:40])
-    assert np.array_equal(open_log(path).read(["v"])[0].values, A[:40])
+    assert np.array_equal(channel_of(open_log(path), "v").values, A[:40])
 
 
 SHAPES = {  # what is written, names and units of its channels, of which the last one is B
@@ -243,5 +243,5 @@ def test_other_hdf5_files_are_read_as_they_are(tmp_path):
         file["blob"] = np.void(b"cos\nsystem\n(S'touch x'\ntR.")  # a pickle stays what it is
     log = open_log(path)
     assert log.format == "HDF5"
-    assert np.array_equal(log.read(["drive.v"])[0].values, A)
+    assert np.array_equal(channel_of(log, "drive.v").values, A)
     assert np.array_equal(log.read(["drive.m(:,2)"])[0].values, B)

@@ -20,6 +20,7 @@ from models.logs.foreign import one_line
 from models.logs.growing import Growing
 from models.logs.log import RecordingError
 from models.logs.table import Kind, TableLog
+from tests.models.logs.conftest import channel_of
 from tests.models.logs.drive_in_every_format import write
 from tests.models.logs.loggers import DIALECTS, DT, drive, plain
 
@@ -123,7 +124,7 @@ def test_a_column_of_parquet_that_stands_twice_is_listed_as_in_a_text(tmp_path):
         ("w", 100),
         ("v (2)", 50),
     ]
-    assert np.array_equal(log.read(["w"])[0].values, t)
+    assert np.array_equal(channel_of(log, "w").values, t)
 
 
 @pytest.mark.parametrize("categories", [False, True])
@@ -292,7 +293,7 @@ def test_parquet_knows_durations(tmp_path, unit):
     t = pyarrow.array(whole, pyarrow.duration(unit))
     pyarrow.parquet.write_table(pyarrow.table({"time": t, "v": np.arange(60.0)}), path)
     expected = np.arange(60.0) * (1.0 if unit == "s" else 0.01)
-    np.testing.assert_allclose(open_log(path).read(["v"])[0].t, expected, atol=1e-12)
+    np.testing.assert_allclose(channel_of(open_log(path), "v").t, expected, atol=1e-12)
 
 
 def test_no_thread_of_pyarrow_is_left_with_bytes_of_pythons(tmp_path):

@@ -10,6 +10,7 @@ from models.logs.log import RecordingError
 from models.logs.stamps import nanoseconds
 from models.recordings import LogMap, read_recording
 from models.recordings.reader import with_columns
+from tests.models.logs.conftest import channel_of
 
 N = 300
 T = 0.02 * np.arange(N)
@@ -227,7 +228,7 @@ def test_arrays_of_numpy_are_read_with_their_time_and_never_run(tmp_path):
     np.savez_compressed(tmp_path / "a.npz", t=T, **SIGNALS, words=np.array("car"))
     log = open_log(tmp_path / "a.npz")
     assert [one.name for one in log.listed()] == list(SIGNALS) and log.format == "NumPy"
-    np.testing.assert_array_equal(log.read(["vy"])[0].values, SIGNALS["vy"])
+    np.testing.assert_array_equal(channel_of(log, "vy").values, SIGNALS["vy"])
     assert read_recording(tmp_path / "a.npz").name == "a"
     table = np.rec.fromarrays([T, *SIGNALS.values()], names=["t", *SIGNALS])
     np.save(tmp_path / "b.npy", table)
