@@ -42,6 +42,10 @@ def drawn(kind, seed):
     return drive.car.told, drive.log(rng)
 
 
+def codes_of(findings):
+    return [f"{one.code} {one.channel}".strip() for one in findings]
+
+
 def saturating(alpha, stiffness, peak):
     return peak * np.tanh(stiffness * alpha / peak)
 

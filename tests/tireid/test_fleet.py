@@ -85,8 +85,8 @@ def learnt_into(out, tasks, spread_map=map, **more):
     return learn_fleet(tasks, told_by(tasks), Store(str(out)), spread_map, lambda _: None, **more)
 
 
-def rows_of(out):
-    return list(Store(str(out)).stream())
+def rows_of(out, *columns):
+    return list(Store(str(out)).stream(*columns))
 
 
 def digest(out):
@@ -435,13 +435,13 @@ def test_an_older_store_and_files_that_are_none_are_refused(store, tmp_path):
         if wrong:
             path.write_bytes(wrong)
         with pytest.raises(StoreError, match=why):
-            list(Store(str(tmp_path)).stream(INDEX))
+            rows_of(tmp_path, INDEX)
     path.write_bytes(b"PAR1 that is written now")
-    assert list(Store(str(tmp_path)).stream(INDEX)) == []
+    assert rows_of(tmp_path, INDEX) == []
     path.unlink()
     os.mkfifo(path)
     with pytest.raises(StoreError, match=f"^{path}: must be a file, it is a device, pipe or soc"):
-        list(Store(str(tmp_path)).stream(INDEX))
+        rows_of(tmp_path, INDEX)
     row = next(row for row in rows_of(store) if not row.error)
     for broken in (
         {"matrix": row.matrix[1:]}, {"vector": [float("nan")] * len(row.vector)},

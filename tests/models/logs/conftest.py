@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -21,6 +24,12 @@ def assert_equal(channels, t, columns):
         assert np.array_equal(channel.values, values, equal_nan=True), channel.name
         assert channel.t.dtype == channel.values.dtype == np.float64
         assert np.all(np.diff(channel.rows) == 1) and channel.rows[0] in (1, 2)
+
+
+def ran(script, *words):
+    """Python ended, after a script in a process of its own."""
+    told = [sys.executable, "-c", script, *map(str, words)]
+    return subprocess.run(told, capture_output=True, text=True, check=False)
 
 
 def channel_of(log, name):

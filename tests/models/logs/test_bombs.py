@@ -4,8 +4,6 @@ import contextlib
 import os
 import re
 import struct
-import subprocess
-import sys
 import time
 import zlib
 from pathlib import Path
@@ -17,7 +15,7 @@ from models import apart
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.schema import _SWELLS
-from tests.models.logs.conftest import refusal
+from tests.models.logs.conftest import ran, refusal
 
 MANY = 100_000_000  # samples of a channel that the limits allow
 ROOM = 700_000_000  # bytes beyond what the readers themselves take
@@ -135,12 +133,7 @@ def test_what_swells_in_memory_is_refused_before_it_does(tmp_path):
         (parquet(tmp_path / "run.parquet", run=["x" * 3_000_000]), "run must be at most 200"),
     ]
     assert max(path.stat().st_size for path, _ in cases) < 500_000
-    reader = subprocess.run(
-        [sys.executable, "-c", READER, *(str(path) for path, _ in cases)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    reader = ran(READER, *(path for path, _ in cases))
     assert reader.returncode == 0, reader.stderr
     for (path, words), line in zip(cases, reader.stdout.splitlines(), strict=True):
         assert re.search(words, line), (path.name, line)
@@ -253,9 +246,7 @@ apart.apart(ValueError, Path("."), 0.0, pow, 7, 10**9)
 
 
 def test_a_process_apart_ends_with_the_one_that_started_it():
-    run = [sys.executable, "-c", KILLED]
-    killed = subprocess.run(run, capture_output=True, text=True, check=False)
-    about, waited = Path(f"/proc/{int(killed.stdout)}/stat"), 0.0
+    about, waited = Path(f"/proc/{int(ran(KILLED).stdout)}/stat"), 0.0
     with contextlib.suppress(FileNotFoundError):
         while about.read_text().split()[2] != "Z":
             assert waited < 3.0

@@ -4,8 +4,6 @@ import gzip
 import importlib
 import random
 import shutil
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -14,7 +12,7 @@ from models.logs import can
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.logs.memory import open_arrays
-from tests.models.logs.conftest import assert_equal, refusal
+from tests.models.logs.conftest import assert_equal, ran, refusal
 from tests.models.logs.drive_in_every_format import FORMATS, UNITS, write
 
 BINARY = [name for name in FORMATS if name != "CSV"]
@@ -108,11 +106,9 @@ def test_a_text_is_told_without_importing_the_readers_of_other_formats(tmp_path,
     written = write("CSV", tmp_path, *drive)
     script = "import sys; from models.logs.door import open_log; open_log(sys.argv[1]).listed();"
     script += "print(*sorted(name for name in sys.modules if name.startswith('models.logs.')))"
-    ran = subprocess.run(
-        [sys.executable, "-c", script, str(written.path)], capture_output=True, text=True
-    )
-    imported = {name.rpartition(".")[2] for name in ran.stdout.split()}
-    assert {"text", "magic"} <= imported, ran.stderr
+    told = ran(script, written.path)
+    imported = {name.rpartition(".")[2] for name in told.stdout.split()}
+    assert {"text", "magic"} <= imported, told.stderr
     assert not imported & {"parquet", "mdf", "matlab", "bag", "can", "frames", "grouped"}
 
 
