@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from benchmarks.random_cars import random_car, random_drive
 from identifier.axle import AxleIdentifier
 from identifier.frozen import FrozenModelError
 from identifier.paper.network import NetworkModel, Weights
@@ -32,6 +33,17 @@ def network_model(car, network, rng):
     return NetworkModel(
         vehicle=car, network=network, weights=weights, force_unit=1500.0, min_speed=1.0
     )
+
+
+def drawn(kind, seed):
+    """A random car of a class as it is told, and its drive by good sensors."""
+    rng = np.random.default_rng(seed)
+    drive = random_drive(random_car(kind, rng), rng)
+    return drive.car.told, drive.log(rng)
+
+
+def codes_of(findings):
+    return [f"{one.code} {one.channel}".strip() for one in findings]
 
 
 def saturating(alpha, stiffness, peak):

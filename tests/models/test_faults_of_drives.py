@@ -56,6 +56,9 @@ def waves():
     return Recording(name="waves", t=T, **wave)
 
 
+WAVES = waves()
+
+
 @pytest.mark.parametrize("fault", ALL, ids=lambda fault: type(fault).__name__)
 def test_a_fault_is_pure_leaves_the_truth_and_changes_what_is_logged(drive, fault):
     before = {name: getattr(drive, name).copy() for name in CHANNELS}
@@ -70,7 +73,7 @@ def test_a_fault_is_pure_leaves_the_truth_and_changes_what_is_logged(drive, faul
 
 def test_a_broken_channel_is_broken_from_start_to_end_and_alone():
     fault = SensorFault(channel="r", kind="biased", start=3.0, duration=2.0, size=0.05)
-    good, shown = waves(), fault.apply(waves())
+    good, shown = WAVES, fault.apply(WAVES)
     inside = (T >= 3.0) & (T < 5.0)
     np.testing.assert_allclose(shown.r - good.r, 0.05 * inside, atol=1e-15)
     np.testing.assert_array_equal(shown.v_y, good.v_y)
@@ -79,7 +82,7 @@ def test_a_broken_channel_is_broken_from_start_to_end_and_alone():
 def test_noise_has_its_size_and_its_seed():
     def noise(seed):
         fault = SensorFault(channel="v_y", kind="noisy", size=0.05, seed=seed)
-        return fault.apply(waves()).v_y - waves().v_y
+        return fault.apply(WAVES).v_y - WAVES.v_y
 
     assert np.std(noise(1)) == pytest.approx(0.05, rel=0.06)
     assert np.corrcoef(noise(1), noise(2))[0, 1] == pytest.approx(0.0, abs=0.08)
@@ -87,24 +90,24 @@ def test_noise_has_its_size_and_its_seed():
 
 def test_a_lagging_channel_has_gain_and_phase_of_a_first_order_low_pass():
     lag, rate = 0.38, 1.0 + 0.3 * CHANNELS.index("r")
-    shown = Lagging(channels=("r",), time_constant=lag).apply(waves()).r
+    shown = Lagging(channels=("r",), time_constant=lag).apply(WAVES).r
     gain, phase = 1.0 / math.hypot(1.0, rate * lag), math.atan(rate * lag)
     late = slice(400, None)
     np.testing.assert_allclose(shown[late], 0.1 * gain * np.sin(rate * T[late] - phase), atol=2e-5)
 
 
 def test_held_channels_change_once_in_a_period_and_are_right_when_they_do():
-    shown = Held(channels=("v_y",), every=0.1, lasts=0.1).apply(waves()).v_y
-    np.testing.assert_array_equal(shown[::10], waves().v_y[::10])
-    np.testing.assert_array_equal(shown, np.repeat(waves().v_y[::10], 10)[: T.size])
-    some = Held(channels=("v_y",), every=1.0, lasts=0.2).apply(waves()).v_y
-    stale = np.flatnonzero(some != waves().v_y)
+    shown = Held(channels=("v_y",), every=0.1, lasts=0.1).apply(WAVES).v_y
+    np.testing.assert_array_equal(shown[::10], WAVES.v_y[::10])
+    np.testing.assert_array_equal(shown, np.repeat(WAVES.v_y[::10], 10)[: T.size])
+    some = Held(channels=("v_y",), every=1.0, lasts=0.2).apply(WAVES).v_y
+    stale = np.flatnonzero(some != WAVES.v_y)
     assert set(stale % 100) == set(range(1, 20))
 
 
 @pytest.mark.parametrize("size", [0.5, -0.5])
 def test_a_clock_that_jumps_misses_or_repeats_time_in_all_channels(size):
-    ramp = replace(waves(), v_y=T, axle_force=np.column_stack((T, T)))
+    ramp = replace(WAVES, v_y=T, axle_force=np.column_stack((T, T)))
     shown = ClockJump(at=5.0, size=size).apply(ramp)
     before = shown.t < 5.0
     np.testing.assert_allclose(shown.v_y[before], shown.t[before], atol=1e-12)

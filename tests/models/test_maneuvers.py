@@ -64,12 +64,13 @@ def test_numbers_that_are_not_finite_are_refused_by_name(maneuver, value):
 @every_maneuver
 def test_numbers_that_must_be_positive_are(maneuver):
     names = {field.name for field in fields(maneuver)}
-    for key in names & {"frequency", "rate_limit", "duration"}:
+    least = dict.fromkeys(("frequency", "rate_limit", "duration"), 0.0) | {
+        "onset": -0.1,
+        "pause": -0.1,
+    }
+    for key in names & least.keys():
         with pytest.raises(ManeuverError, match=key):
-            replace(maneuver, **{key: 0.0})
-    for key in names & {"onset", "pause"}:
-        with pytest.raises(ManeuverError, match=key):
-            replace(maneuver, **{key: -0.1})
+            replace(maneuver, **{key: least[key]})
 
 
 def test_a_step_ends_at_its_angle_after_amplitude_over_rate():

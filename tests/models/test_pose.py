@@ -155,6 +155,7 @@ COLUMNS = {
     "imu_acc_y [m/s^2]": np.interp(T - 0.08, T, np.gradient(V_Y, T) + V_X * R),
     "drive.steering_angle [rad]": DELTA, "encoder_speed [m/s]": V_X,
 }  # fmt: skip
+TOLD = LogMap(signals=given_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
 
 
 def table(path, columns):
@@ -222,9 +223,8 @@ def test_a_pose_can_be_told_and_wants_all_three(tmp_path):
 def test_a_pose_that_is_integrated_from_wheels_is_refused(tmp_path):
     x, y = integral(V_X * np.cos(PSI)), integral(V_X * np.sin(PSI))
     path = table(tmp_path / "log.csv", {**COLUMNS, "x [m]": x, "y [m]": y, "yaw [rad]": PSI})
-    told = LogMap(signals=given_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
     with pytest.raises(RecordingError, match=r"never leaves its heading, as one .* from wheels"):
-        read_recording(path, log_map=told)
+        read_recording(path, log_map=TOLD)
 
 
 def test_a_pose_that_nobody_told_and_that_is_none_is_left_aside_with_a_note(tmp_path):
@@ -232,19 +232,17 @@ def test_a_pose_that_nobody_told_and_that_is_none_is_left_aside_with_a_note(tmp_
     found = read_recording(table(tmp_path / "log.csv", columns))
     assert found.v_y is None and found.a_y is not None
     assert any("x, y, heading is left aside" in note for note in found.notes)
-    told = LogMap(signals=given_signals(["x=x [m]", "y=y [m]", "heading=yaw [rad]"]))
     with pytest.raises(RecordingError, match="must go along with the direction of travel"):
-        read_recording(tmp_path / "log.csv", log_map=told)
+        read_recording(tmp_path / "log.csv", log_map=TOLD)
 
 
 @pytest.mark.parametrize("kind", ["PoseStamped", "Odometry", "TFMessage"])
 def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
     pytest.importorskip("rosbags")
     from tests.models.logs.drive_in_every_format import header
-    from tests.models.logs.test_bag import store_of, write
+    from tests.models.logs.test_bag import STORE, write
 
-    store = store_of()
-    kinds = store.types
+    kinds = STORE.types
     make = {name.rpartition("/")[2]: kinds[name] for name in kinds}
     vector, none = make["Vector3"], np.zeros(36)
     box, command, tracked = [], [], []
@@ -256,34 +254,34 @@ def test_a_bag_with_pose_imu_and_command_is_read_as_it_is(tmp_path, kind):
         if kind == "Odometry":
             still = make["Twist"](vector(0.0, 0.0, 0.0), vector(0.0, 0.0, 0.0))
             message = make["Odometry"](
-                header(store, ns, "map"), "base_link", make["PoseWithCovariance"](at, none),
+                header(STORE, ns, "map"), "base_link", make["PoseWithCovariance"](at, none),
                 make["TwistWithCovariance"](still, none),
             )  # fmt: skip
         elif kind == "TFMessage":
             moved = make["Transform"](vector(at.position.x, at.position.y, 0.1), turn)
             still = make["Transform"](vector(0.1, 0.0, 0.0), make["Quaternion"](0.0, 0.0, 0.0, 1.0))
             message = make["TFMessage"]([
-                make["TransformStamped"](header(store, ns, "map"), "base_link", moved),
-                make["TransformStamped"](header(store, ns, "base_link"), "laser", still),
+                make["TransformStamped"](header(STORE, ns, "map"), "base_link", moved),
+                make["TransformStamped"](header(STORE, ns, "base_link"), "laser", still),
             ])  # fmt: skip
         else:
-            message = make["PoseStamped"](header(store, ns, "map"), at)
+            message = make["PoseStamped"](header(STORE, ns, "map"), at)
         tracked.append((ns, message))
         rate, push = COLUMNS["imu_gyro_z [rad/s]"][k], COLUMNS["imu_acc_y [m/s^2]"][k]
         nine = np.zeros(9)
         box.append((ns, make["Imu"](
-            header(store, ns), make["Quaternion"](0.0, 0.0, 0.0, 1.0), nine,
+            header(STORE, ns), make["Quaternion"](0.0, 0.0, 0.0, 1.0), nine,
             vector(0.0, 0.0, rate), nine, vector(0.1, push, 9.81), nine,
         )))  # fmt: skip
         drive = make["AckermannDrive"](DELTA[k], 0.0, V_X[k], 0.0, 0.0)
-        command.append((ns, make["AckermannDriveStamped"](header(store, ns), drive)))
+        command.append((ns, make["AckermannDriveStamped"](header(STORE, ns), drive)))
     package = {"PoseStamped": "geometry_msgs", "Odometry": "nav_msgs", "TFMessage": "tf2_msgs"}
     topics = {
         "/tf" if kind == "TFMessage" else "/vicon/car": (f"{package[kind]}/msg/{kind}", tracked),
         "/imu": ("sensor_msgs/msg/Imu", box),
         "/ackermann_cmd": ("ackermann_msgs/msg/AckermannDriveStamped", command),
     }
-    found = read_recording(write(tmp_path / "bag", store, topics))
+    found = read_recording(write(tmp_path / "bag", topics))
     assert any("80 ms late" in note for note in found.notes), found.notes
     judge(found)
 

@@ -131,35 +131,36 @@ def test_a_bad_cell_is_named_with_its_line(tmp_path, cell, rule):
 
 def test_time_must_rise_in_seconds(tmp_path):
     path, lines = tmp_path / "a.csv", rows(400)
-    write(path, HEADER, [*lines[:50], lines[49], *lines[50:]])
-    assert "t must increase, line 52 has 0.49 after 0.49" in refusal(path)
-    write(path, HEADER, lines[:50] + lines[:50])
-    assert "several runs in one file need a column run" in refusal(path)
-    write(path, HEADER, lines[:50] + lines[58:])
-    assert read_recording(path).t.size == 400  # eight lost samples are bridged
+    assert "t must increase, line 52 has 0.49 after 0.49" in refusal(
+        write(path, HEADER, [*lines[:50], lines[49], *lines[50:]])
+    )
+    assert "several runs in one file need a column run" in refusal(
+        write(path, HEADER, lines[:50] + lines[:50])
+    )
+    assert (
+        read_recording(write(path, HEADER, lines[:50] + lines[58:])).t.size == 400
+    )  # eight lost samples are bridged
     in_ms = read_recording(write(path, HEADER, rows(dt=10.0)))
     assert in_ms.t[-1] == pytest.approx(0.59) and any("in ms" in one for one in in_ms.notes)
-    write(path, HEADER.replace("t,", "t [s],"), rows(dt=0.2))
-    assert "at least 10 samples per second" in refusal(path)
-    write(path, HEADER.replace("t,", "t [s],"), rows(dt=10.0))
-    assert 'its typical step is 10; --columns "t=t [ms]"?' in refusal(path)
-    write(path, HEADER, rows(8))
-    assert "there are 8 rows" in refusal(path)
-    write(path, HEADER, rows(60, dt=0.001))
-    assert "lasts 0.05 s" in refusal(path)
+    assert "at least 10 samples per second" in refusal(
+        write(path, HEADER.replace("t,", "t [s],"), rows(dt=0.2))
+    )
+    assert 'its typical step is 10; --columns "t=t [ms]"?' in refusal(
+        write(path, HEADER.replace("t,", "t [s],"), rows(dt=10.0))
+    )
+    assert "there are 8 rows" in refusal(write(path, HEADER, rows(8)))
+    assert "lasts 0.05 s" in refusal(write(path, HEADER, rows(60, dt=0.001)))
 
 
 def test_a_gap_cuts_a_log_into_segments_and_it_is_said(tmp_path):
     path, lines = tmp_path / "a.csv", rows(400)
-    write(path, HEADER, lines[:150] + lines[161:])
-    got = read_recording(path)
+    got = read_recording(write(path, HEADER, lines[:150] + lines[161:]))
     assert got.breaks == (150,) and len(got) == 389
     assert got.t[149] == 1.49 and got.t[150] == 1.61 and got.dt == 0.01
     assert got.duration == pytest.approx(3.87)
     note = got.notes[-1]
     assert "2 segments" in note and "lasts 0.12 s, after 1.49 s" in note
-    write(path, HEADER, lines[:50] + lines[61:])
-    short = read_recording(path)
+    short = read_recording(write(path, HEADER, lines[:50] + lines[61:]))
     assert short.t[0] == 0.61 and not short.breaks
     assert short.notes[-1:] == ("left out: 1 segment of less than 1 s",)
 

@@ -27,19 +27,22 @@ def exact(rear=0.0):
     )
 
 
+EXACT = exact()
+
+
 def test_noise_and_bias_have_their_size_and_the_truth_stays_exact(rng):
     sensors = Sensors(
         v_y=Sensor(noise=0.05, bias=0.2), r=Sensor(noise=0.004), delta=Sensor(bias=-0.01)
     )
-    recording, measured = exact(), sensors.apply(exact(), rng)
-    error = measured.v_y - recording.v_y
+    measured = sensors.apply(EXACT, rng)
+    error = measured.v_y - EXACT.v_y
     assert np.mean(error) == pytest.approx(0.2, abs=5 * 0.05 / math.sqrt(N))
     assert np.std(error) == pytest.approx(0.05, rel=0.03)
-    assert np.std(measured.r - recording.r) == pytest.approx(0.004, rel=0.03)
-    assert np.corrcoef(error, measured.r - recording.r)[0, 1] == pytest.approx(0.0, abs=0.04)
-    np.testing.assert_allclose(measured.delta_f, recording.delta_f - 0.01, rtol=1e-14)
-    np.testing.assert_array_equal(measured.v_x, recording.v_x)
-    np.testing.assert_array_equal(measured.axle_force, recording.axle_force)
+    assert np.std(measured.r - EXACT.r) == pytest.approx(0.004, rel=0.03)
+    assert np.corrcoef(error, measured.r - EXACT.r)[0, 1] == pytest.approx(0.0, abs=0.04)
+    np.testing.assert_allclose(measured.delta_f, EXACT.delta_f - 0.01, rtol=1e-14)
+    np.testing.assert_array_equal(measured.v_x, EXACT.v_x)
+    np.testing.assert_array_equal(measured.axle_force, EXACT.axle_force)
 
 
 def test_a_delayed_signal_is_the_signal_some_time_ago(rng):
@@ -50,24 +53,23 @@ def test_a_delayed_signal_is_the_signal_some_time_ago(rng):
 
 
 def test_resolution_rounds_to_its_grid(rng):
-    recording = exact()
-    measured = Sensors(r=Sensor(resolution=0.01)).apply(recording, rng).r
+    measured = Sensors(r=Sensor(resolution=0.01)).apply(EXACT, rng).r
     np.testing.assert_allclose(measured / 0.01, np.round(measured / 0.01), atol=1e-9)
-    assert np.abs(measured - recording.r).max() == pytest.approx(0.005, rel=0.05)
+    assert np.abs(measured - EXACT.r).max() == pytest.approx(0.005, rel=0.05)
 
 
 def test_the_same_generator_state_is_the_same_noise():
     sensors = Sensors(v_x=Sensor(noise=0.1))
-    one = sensors.apply(exact(), np.random.default_rng(1))
-    two = sensors.apply(exact(), np.random.default_rng(1))
-    three = sensors.apply(exact(), np.random.default_rng(2))
+    one = sensors.apply(EXACT, np.random.default_rng(1))
+    two = sensors.apply(EXACT, np.random.default_rng(1))
+    three = sensors.apply(EXACT, np.random.default_rng(2))
     np.testing.assert_array_equal(one.v_x, two.v_x)
     assert np.abs(one.v_x - three.v_x).max() > 0.01
 
 
 def test_an_axle_that_does_not_steer_has_no_steering_sensor(rng):
     sensors = Sensors(delta=Sensor(noise=0.01))
-    assert np.all(sensors.apply(exact(), rng).delta_r == 0.0)
+    assert np.all(sensors.apply(EXACT, rng).delta_r == 0.0)
     assert np.any(sensors.apply(exact(rear=0.02), rng).delta_r != exact(rear=0.02).delta_r)
 
 

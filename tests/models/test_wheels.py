@@ -62,10 +62,7 @@ def test_a_rear_wheel_without_slip_tells_the_speed_of_the_center_of_gravity_exac
         only = told(run, {name: speeds[name]})
         np.testing.assert_allclose(only.v_x, run.v_x, atol=1e-9)
         assert only.gated == only.untrusted == 0
-
-
-def test_without_the_track_an_axle_tells_it_by_its_mean(run):
-    speeds = shown(run, np.zeros((run.t.size, 4)))
+    # Without the track an axle tells it by its mean.
     rear = told(run, {name: speeds[name] for name in CORNERS[2:]}, Wheels()).v_x
     np.testing.assert_allclose(rear, run.v_x, atol=1e-9)
     with pytest.raises(RecordingError, match=r"wheel_rl is alone .* \[wheels\] track"):

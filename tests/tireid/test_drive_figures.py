@@ -168,6 +168,13 @@ def test_the_film_is_small_and_moves_and_holds_its_end(drives, kind, tmp_path, m
     assert sum(duration for _, duration in frames[3:]) >= 100 * film.HOLD
 
 
+def ends_of(axes):
+    """Where what is shaded begins and ends, and by which label."""
+    turn = axes.transData.inverted()
+    boxes = [(one.get_extents().transformed(turn), one.get_label()) for one in axes.patches]
+    return [(box.x0, box.x1, label) for box, label in boxes]
+
+
 def picture(t, *parts):
     """The panels of the axles in a picture of a film."""
     figure = Figure()
@@ -195,10 +202,7 @@ def test_the_film_shows_the_curves_as_they_were_known_then(t):
             slip, force = drawn[label].T
             expected = curves_at(TIRE._replace(weights=weights), np.radians(slip))[axle]
             np.testing.assert_allclose(1e3 * force, expected, atol=1e-6)
-        boxes = [
-            patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches
-        ]
-        edges = sorted(end for box in boxes for end in (box.x0, box.x1))
+        edges = sorted(end for *ends, _ in ends_of(axes) for end in ends)
         known_to = np.degrees(known.slip[axle])
         reach = axes.get_xlim()[1]
         assert edges == pytest.approx([-reach, -known_to, known_to, reach], abs=1e-6)
@@ -246,9 +250,8 @@ def test_a_broken_sensor_is_shaded_and_where_it_was_noticed_is_marked():
         labels = [text.get_text() for text in figure.legends[0].get_texts()]
         assert {"v_y biased", "sensor fault noticed"} <= set(labels)
         for axes in figure.axes:
-            (shade,) = [p for p in axes.patches if p.get_label() == "v_y biased"]
-            box = shade.get_extents().transformed(axes.transData.inverted())
-            assert (box.x0, box.x1) == pytest.approx((2.0 * SPEED, 3.5 * SPEED), abs=0.1)
+            (shade,) = [ends for *ends, label in ends_of(axes) if label == "v_y biased"]
+            assert shade == pytest.approx([2.0 * SPEED, 3.5 * SPEED], abs=0.1)
             (mark,) = [line for line in axes.lines if line.get_label() == "sensor fault noticed"]
             assert mark.get_xdata()[0] == pytest.approx(2.5 * SPEED)
     late = replace(FAULT, start=1e3)

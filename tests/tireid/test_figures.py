@@ -17,6 +17,7 @@ from identifier.run import History
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tests.tireid.test_drive_figures import FIGURES as DRIVEN
+from tests.tireid.test_drive_figures import curves, ends_of
 from tireid.figures import style
 from tireid.figures.forces import (
     force_figure,
@@ -89,6 +90,7 @@ def frozen_replays(history):
     return {22.0: replayed(history), 21.0: replayed(history)}
 
 
+MADE, BLIND = made_up(), made_up(truth=False)
 RESULTS = {
     "instantaneous": {"online": (0.3, 0.2, 0.4), "32": (1.1, 0.9, 1.4)},
     "integral": {"online": (0.3, 0.2, 0.4), "32": (0.4, 0.3, 0.5)},
@@ -97,25 +99,19 @@ RESULTS = {
 PAPER = {"integral": {"online": 0.3386, "32": 0.4247}}
 
 FIGURES = {
-    "forces": lambda: force_figure(made_up(), frozen_replays(made_up())),
-    "forces without truth": lambda: force_figure(
-        made_up(truth=False), frozen_replays(made_up(truth=False))
-    ),
+    "forces": lambda: force_figure(MADE, frozen_replays(MADE)),
+    "forces without truth": lambda: force_figure(BLIND, frozen_replays(BLIND)),
     "forces of a model car": lambda: force_figure(made_up(5.0), window=(20.5, 21.5)),
-    "slip": lambda: slip_figure(made_up().freeze(22.0), made_up().recording),
-    "slip without truth": lambda: slip_figure(
-        made_up(truth=False).freeze(22.0), made_up(truth=False).recording, made_up(truth=False)
-    ),
-    "error": lambda: error_figure(made_up(), freeze_times=[21.0]),
-    "error under bounds": lambda: error_figure(made_up(), {"X": 3.0, "trivial": 0.5}, [21.0]),
-    "weights": lambda: weights_figure(made_up(), [21.0, 22.0]),
+    "slip": lambda: slip_figure(MADE.freeze(22.0), MADE.recording),
+    "slip without truth": lambda: slip_figure(BLIND.freeze(22.0), BLIND.recording, BLIND),
+    "error": lambda: error_figure(MADE, freeze_times=[21.0]),
+    "error under bounds": lambda: error_figure(MADE, {"X": 3.0, "trivial": 0.5}, [21.0]),
+    "weights": lambda: weights_figure(MADE, [21.0, 22.0]),
     "inputs": lambda: inputs_figure(made_up(rear=0.01).recording),
     "comparison": lambda: comparison_figure(RESULTS, PAPER),
-    "prediction": lambda: prediction_figure(replayed(made_up())),
-    "prediction against online": lambda: prediction_figure(
-        replayed(made_up(truth=False)), made_up(truth=False)
-    ),
-    "prediction alone": lambda: prediction_figure(replayed(made_up(truth=False))),
+    "prediction": lambda: prediction_figure(replayed(MADE)),
+    "prediction against online": lambda: prediction_figure(replayed(BLIND), BLIND),
+    "prediction alone": lambda: prediction_figure(replayed(BLIND)),
 }
 EVERY = FIGURES | DRIVEN
 every_figure = pytest.mark.parametrize("draw", EVERY.values(), ids=EVERY.keys())
@@ -188,8 +184,8 @@ def test_the_paper_s_measure_stands_below_the_error_to_the_truth():
     sides = Reproduction(
         past_against_online=past, past_against_truth=None, after_against_truth=None
     )
-    result = replace(replayed(made_up()), reproduction=sides)
-    figure = force_figure(made_up(), {22.0: result})
+    result = replace(replayed(MADE), reproduction=sides)
+    figure = force_figure(MADE, {22.0: result})
     assert figure.axes[2].get_title("right") == "RMSE 0.43 kN\npast to online 0.26 kN"
     assert figure.axes[3].get_title("right") == "RMSE 0.21 kN\npast to online 0.14 kN"
     assert not clipped(figure)
@@ -213,7 +209,7 @@ def unlike_axles():
 
 
 def test_every_axle_has_its_own_curves_in_the_slip_figure():
-    model, recording = unlike_axles(), made_up().recording
+    model, recording = unlike_axles(), MADE.recording
     figure = slip_figure(model, recording)
     loads = 1500.0 * 9.81 / 2.7 * np.array([1.5, 1.2])
     alpha = np.column_stack(
@@ -224,25 +220,18 @@ def test_every_axle_has_its_own_curves_in_the_slip_figure():
     )
     frozen = model.predict(recording)
     for axle, axes in enumerate(figure.axes[:2]):
-        drawn = {
-            line.get_label(): np.radians(1.0) * np.asarray(line.get_xdata()) for line in axes.lines
-        }
-        force = {line.get_label(): 1e3 * np.asarray(line.get_ydata()) for line in axes.lines}
-        slip = drawn["frozen curve, steady"]
+        drawn = {label: line.T * [[np.radians(1.0)], [1e3]] for label, line in curves(axes).items()}
+        slip, force = drawn["frozen curve, steady"]
         units = np.tanh(slip[:, None] / np.array(model.ladder))
-        np.testing.assert_allclose(
-            force["frozen curve, steady"], loads[axle] * units @ model.W[axle], rtol=1e-6, atol=1e-6
-        )
+        np.testing.assert_allclose(force, loads[axle] * units @ model.W[axle], rtol=1e-6, atol=1e-6)
         for label, expected in (("truth", recording.axle_force), ("frozen weights", frozen)):
-            np.testing.assert_allclose(drawn[label], alpha[:, axle], atol=1e-9)
-            np.testing.assert_allclose(force[label], expected[:, axle], rtol=1e-9, atol=1e-6)
+            slip, force = drawn[label]
+            np.testing.assert_allclose(slip, alpha[:, axle], atol=1e-9)
+            np.testing.assert_allclose(force, expected[:, axle], rtol=1e-9, atol=1e-6)
         linear = next(line for line in axes.lines if "linear" in line.get_label())
         stiffness = np.ptp(linear.get_ydata()) / np.ptp(linear.get_xdata())
         assert stiffness * 1e3 == pytest.approx((1e5, 1.2e5)[axle] * np.radians(1.0))
-        shaded = [
-            patch.get_extents().transformed(axes.transData.inverted()) for patch in axes.patches
-        ]
-        edges = sorted(min(abs(box.x0), abs(box.x1)) for box in shaded)
+        edges = sorted(min(abs(x0), abs(x1)) for x0, x1, _ in ends_of(axes))
         assert edges == pytest.approx([np.degrees((0.02, 0.01)[axle])] * 2)
     slopes = [np.ptp(axes.lines[-1].get_ydata()) for axes in figure.axes[:2]]
     assert slopes[0] > 1.5 * slopes[1]
@@ -254,7 +243,7 @@ def test_the_learnt_axles_are_drawn_each_in_its_own_numbers():
     growth = np.linspace(0.5, 1.0, n)[:, None, None]
     W = growth * np.array([[0.2, 0.3, 0.2, 0.1], [0.1, 0.4, 0.1, 0.3]])
     own = growth * np.array([[0.03, 0.5, 0.0], [0.05, 0.2, 0.0]])
-    history = replace(made_up(), method=design, state={"W": W, "own": own})
+    history = replace(MADE, method=design, state={"W": W, "own": own})
     stiffness, lag, grip = learnt_axles_figure(history).axes
     for axle, load in enumerate(1500.0 * 9.81 / 2.7 * np.array([1.5, 1.2])):
         slope = (W[:-1, axle] / np.array(design.ladder)).sum(axis=1)
@@ -268,7 +257,7 @@ def test_the_learnt_axles_are_drawn_each_in_its_own_numbers():
 
 def test_the_band_is_drawn_around_the_curve_of_each_axle():
     model = unlike_axles()
-    for axle, axes in enumerate(slip_figure(model, made_up().recording).axes[:2]):
+    for axle, axes in enumerate(slip_figure(model, MADE.recording).axes[:2]):
         (band,) = [one for one in axes.collections if one.get_label() == "band of 90 %"]
         corners = np.array(band.get_paths()[0].vertices)
         slip = np.radians(np.unique(corners[:, 0])[20:-20:10])
@@ -279,7 +268,7 @@ def test_the_band_is_drawn_around_the_curve_of_each_axle():
 
 
 def test_slow_samples_are_left_out_of_the_slip_figure():
-    history = made_up()
+    history = MADE
     recording = replace(history.recording, v_x=np.where(np.arange(N) < 100, 0.1, 15.0))
     truth = slip_figure(history.freeze(22.0), recording).axes[0].lines[0]
     assert np.size(truth.get_xdata()) == N - 100
@@ -288,7 +277,7 @@ def test_slow_samples_are_left_out_of_the_slip_figure():
 
 
 def test_the_error_norm_is_the_euclidean_norm_and_bounds_far_above_make_its_axis_logarithmic():
-    history = made_up()
+    history = MADE
     axes = FIGURES["error"]().axes[0]
     expected = np.sqrt(np.sum(history.outputs["xi_tilde"] ** 2, axis=1))
     assert axes.lines[0].get_ydata() == pytest.approx(expected)
@@ -297,7 +286,7 @@ def test_the_error_norm_is_the_euclidean_norm_and_bounds_far_above_make_its_axis
 
 
 def test_a_law_that_diverges_leaves_the_panel_instead_of_flattening_it():
-    history = made_up()
+    history = MADE
     force, xi_tilde = history.axle_force.copy(), history.outputs["xi_tilde"].copy()
     growth = np.exp(np.minimum(10.0 * np.arange(100), 700.0))[:, None]
     force[150:250] *= growth
@@ -341,13 +330,14 @@ def test_a_comparison_draws_medians_with_quartiles_on_their_own_sides():
 
 @pytest.mark.parametrize("truth", [True, False])
 def test_below_the_forces_stands_what_is_missed_of_them(truth):
-    history = made_up(truth=truth)
+    history = MADE if truth else BLIND
     replays = frozen_replays(history)
     figure = force_figure(history, replays)
     known = history.recording.axle_force if truth else history.axle_force
     last = replays[22.0].axle_force
     for axle, axes in enumerate(figure.axes[-2:]):
-        drawn = {line.get_label(): np.asarray(line.get_ydata()) for line in axes.lines[1:]}
+        _, *lines = axes.lines
+        drawn = {line.get_label(): line.get_ydata() for line in lines}
         expected = {"frozen weights": (last - known)[:, axle] / 1e3}
         if truth:
             expected["online"] = (history.axle_force - known)[:, axle] / 1e3
@@ -357,7 +347,7 @@ def test_below_the_forces_stands_what_is_missed_of_them(truth):
 
 
 def test_below_the_curve_stands_what_the_model_misses_of_the_truth():
-    history = made_up()
+    history = MADE
     model = unlike_axles()
     figure = slip_figure(model, history.recording)
     missed = (model.predict(history.recording) - history.recording.axle_force) / 1e3
@@ -370,8 +360,8 @@ def test_below_the_curve_stands_what_the_model_misses_of_the_truth():
 
 @pytest.mark.heavy
 def test_times_of_a_clock_that_began_long_ago_fit_their_titles_and_axes():
-    recording = made_up().recording
-    history = replace(made_up(), recording=replace(recording, t=recording.t + 1.7e9))
+    recording = MADE.recording
+    history = replace(MADE, recording=replace(recording, t=recording.t + 1.7e9))
     figure = force_figure(history, {1.7e9 + 22.0: replayed(history)})
     assert not clipped(figure)
     assert figure.axes[2].get_title("left") == "Front axle, frozen at 22 s"

@@ -85,6 +85,10 @@ def learnt_into(out, tasks, spread_map=map, **more):
     return learn_fleet(tasks, told_by(tasks), Store(str(out)), spread_map, lambda _: None, **more)
 
 
+def rows_of(out, *columns):
+    return list(Store(str(out)).stream(*columns))
+
+
 def digest(out):
     """A hash of every file of a store, hidden ones apart."""
     files = sorted(path for path in Path(out).rglob("*.parquet"))
@@ -92,7 +96,7 @@ def digest(out):
 
 
 def test_each_log_becomes_a_row_and_a_bad_one_says_why(store):
-    rows = sorted(Store(store).stream(), key=lambda row: row.log)
+    rows = sorted(rows_of(store), key=lambda row: row.log)
     assert len(rows) == 4 * DAYS + 1
     (bad,) = [row for row in rows if row.error]
     assert bad.log == str(Path("red/summer/2026-03-09-broken.csv").absolute())
@@ -103,7 +107,7 @@ def test_each_log_becomes_a_row_and_a_bad_one_says_why(store):
 
 
 def test_a_row_is_what_identify_says_of_its_log(store, logs):
-    row = next(one for one in Store(store).stream() if one.log.endswith("quick.csv"))
+    row = next(one for one in rows_of(store) if one.log.endswith("quick.csv"))
     log = read_recording(logs / "quick.csv")
     tire = identify(log, replace(sedan(), chassis=None)).tire
     assert [row.stiffness_front, row.stiffness_rear] == pytest.approx(
@@ -166,7 +170,7 @@ def test_each_run_of_a_file_is_a_row(logs, tmp_path):
     tasks, _ = find_logs([str(tmp_path / "*.csv")], "cars/red.toml")
     assert learnt_into(tmp_path / "store", tasks)[0] == 1
     assert learnt_into(tmp_path / "store", tasks)[0] == 0
-    rows = list(Store(str(tmp_path / "store")).stream())
+    rows = rows_of(tmp_path / "store")
     assert [Path(row.name).name for row in rows] == ["two.csv:0", "two.csv:1"]
     assert {row.file for row in rows} == {rows[0].file}
     assert rows[0].stiffness_front != rows[1].stiffness_front
@@ -178,7 +182,7 @@ def test_a_log_without_v_y_is_learnt_and_has_the_date_of_its_file(garage):
     os.utime(garage / "without.csv", (1.7e9, 1.7e9))
     tasks, _ = find_logs([str(garage / "without.csv")], str(garage / "car.toml"))
     learnt_into(garage / "store", tasks)
-    (row,) = Store(str(garage / "store")).stream()
+    (row,) = rows_of(garage / "store")
     assert not row.error and usable(row, rejected=True)
     assert (row.date, row.vehicle, row.tires) == ("2023-11-14T22:13:20+00:00", sedan().name, "")
 
@@ -217,7 +221,7 @@ def test_logs_and_store_at_an_address_are_known_by_what_their_file_system_says(g
         assert (learnt_now(), learnt_now()) == (1, 0)
         fs.pipe_file(path, text[:-1] + b" ")  # of the same size
         assert learnt_now() == 1
-        rows = list(Store("memory://fleet").stream())
+        rows = rows_of("memory://fleet")
         assert {(row.log, row.tires) for row in rows} == {(f"memory://{path}", "wet")}
         assert {row.date for row in rows} == {"2026-03-01T10:00"} and len(rows) == 2
         assert not [name for name in fs.find("/fleet") if not name.endswith(".parquet")]
@@ -293,13 +297,13 @@ def test_writers_at_once_that_are_killed_lose_no_row_and_readers_see_whole_ones(
     writers = [subprocess.Popen(words) for _ in range(2)]
     try:
         until = time.monotonic() + 60.0
-        while len(list(Store(address).stream())) < many and time.monotonic() < until:
+        while len(rows_of(address)) < many and time.monotonic() < until:
             assert all(writer.poll() is None for writer in writers)  # no error ends one
     finally:
         for writer in writers:
             writer.kill()
             writer.wait()
-    rows = [row for row in Store(address).stream() if row.log != "dropped"]
+    rows = [row for row in rows_of(address) if row.log != "dropped"]
     assert len(rows) == len({row.log for row in rows}) >= many - 3
     assert {f"log-{k}" for k in range(len(rows))} == {row.log for row in rows}
     by_error = {bool(row.error): row for row in rows}
@@ -317,7 +321,7 @@ def test_a_store_is_written_whole_whether_its_address_moves_files_or_not(store):
                 raise FileExistsError(path2)
             super().mv(path1, path2)
 
-    (row, *_), fs = Store(store).stream(), MemoryFileSystem()
+    (row, *_), fs = rows_of(store), MemoryFileSystem()
     for moves in (MemoryFileSystem(), MovesOverNothing()):
         there = Store("memory://moved")
         there.__dict__["_place"] = moves, "/moved"
@@ -361,10 +365,10 @@ def test_a_log_that_kills_workers_of_a_cluster_is_learnt_once_it_can(tmp_path):
 
     for again, count in ((False, 2), (False, 0), (True, 2)):
         assert learnt_into(tmp_path, tasks, on_a_cluster(elsewhere), again=again)[0] == count
-    rows = {Path(row.log).name: row for row in Store(str(tmp_path)).stream()}
+    rows = {Path(row.log).name: row for row in rows_of(tmp_path)}
     assert "died" in rows[Path(DEADLY).name].error and len(rows) == 2
     learnt_into(tmp_path, tasks, again=True)
-    (row,) = [row for row in Store(str(tmp_path)).stream() if row.log.endswith(DEADLY)]
+    (row,) = [row for row in rows_of(tmp_path) if row.log.endswith(DEADLY)]
     content = hashlib.blake2b(Path(DEADLY).read_bytes(), digest_size=16).hexdigest()
     assert (row.content, row.error) == (content, "")
 
@@ -431,14 +435,14 @@ def test_an_older_store_and_files_that_are_none_are_refused(store, tmp_path):
         if wrong:
             path.write_bytes(wrong)
         with pytest.raises(StoreError, match=why):
-            list(Store(str(tmp_path)).stream(INDEX))
+            rows_of(tmp_path, INDEX)
     path.write_bytes(b"PAR1 that is written now")
-    assert list(Store(str(tmp_path)).stream(INDEX)) == []
+    assert rows_of(tmp_path, INDEX) == []
     path.unlink()
     os.mkfifo(path)
     with pytest.raises(StoreError, match=f"^{path}: must be a file, it is a device, pipe or soc"):
-        list(Store(str(tmp_path)).stream(INDEX))
-    row = next(row for row in Store(store).stream() if not row.error)
+        rows_of(tmp_path, INDEX)
+    row = next(row for row in rows_of(store) if not row.error)
     for broken in (
         {"matrix": row.matrix[1:]}, {"vector": [float("nan")] * len(row.vector)},
         {"driven": -1.0}, {"reach": row.reach[1:]},

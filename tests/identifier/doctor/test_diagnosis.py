@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from benchmarks.faults import Together, WrongUnit
-from benchmarks.random_cars import random_car, random_drive
 from identifier.axle import AxleIdentifier
 from identifier.doctor import Finding, diagnose, diagnosis
 from identifier.doctor.diagnosis import Diagnosis, _contradictions
@@ -16,13 +15,12 @@ from identifier.run import identify
 from models.faults import SensorFault
 from models.recordings import Repair
 from models.vehicle import sedan
+from tests.identifier.conftest import codes_of, drawn
 
 
 @pytest.fixture(scope="module")
 def driven():
-    rng = np.random.default_rng(43)
-    drive = random_drive(random_car("sedan", rng), rng)
-    return drive.car.told, drive.log(rng)
+    return drawn("sedan", 43)
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +92,7 @@ def test_a_unit_comes_before_the_offset_that_is_found_behind_it(driven):
     car, log = driven
     biased = SensorFault(channel="r", kind="biased", size=0.02).apply(log)
     found = diagnose(SensorFault(channel="r", kind="scaled", size=57.3).apply(biased), car).findings
-    assert [(one.code, one.channel) for one in found[:2]] == [("unit", "r"), ("offset", "r")]
+    assert codes_of(found[:2]) == ["unit r", "offset r"]
     assert found[1].size == pytest.approx(0.02, abs=0.002)
     assert "bank" in found[1].text, "at one speed a road that is banked looks the same"
     mended, _ = combined(found[:2]).apply(replace(biased, r=57.3 * biased.r), car)
@@ -153,9 +151,9 @@ def test_a_log_without_v_y_or_in_a_fixed_frame_is_not_asked_for_sizes(driven):
     still = log.r.copy()
     still[300:400] = still[300]
     frozen = diagnose(replace(log, v_y=None, r=still), car)
-    assert [(one.code, one.channel) for one in frozen.findings] == [("frozen", "r")]
+    assert codes_of(frozen.findings) == ["frozen r"]
     slow = diagnose(replace(log, v_y=None, t=1000.0 * log.t), car)
-    assert "clock_unit" in [one.code for one in slow.findings]
+    assert "clock_unit" in codes_of(slow.findings)
 
 
 def test_a_law_that_is_broken_is_a_finding_that_matters(driven, monkeypatch):

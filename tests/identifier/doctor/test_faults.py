@@ -18,7 +18,7 @@ from identifier.estimate.solve import descend
 from identifier.motion.parameters import INDEX
 from models.recordings import Repair
 from models.vehicle import GRAVITY
-from tests.identifier.conftest import areas_of, pressed
+from tests.identifier.conftest import areas_of, codes_of, pressed
 
 # Kinds whose sizes this drive tells well, and how well: of the size, or where "" absolutely.
 SIZED = {
@@ -104,7 +104,7 @@ def test_an_accelerometer_on_a_body_that_rolls_has_no_fault(driven, degrees_per_
 def test_downforce_is_a_note_and_none_is_missing_where_it_is_told():
     log, car = pressed(0.3, np.random.default_rng(3))
     found = found_in(log, car)
-    assert [one.code for one in found] == ["downforce"]
+    assert codes_of(found) == ["downforce"]
     assert found[0].note and not found[0].matters and not found[0].sure
     assert found[0].size * (100.0 / 3.6) ** 2 == pytest.approx(0.3, rel=0.4)
     assert found_in(log, replace(car, **areas_of(car, 0.3))) == ()
@@ -115,8 +115,7 @@ def test_downforce_is_a_note_and_none_is_missing_where_it_is_told():
 def test_a_diagnosis_mends_the_log_and_nothing_is_found_in_it_then(driven, kind):
     (fault, logged, car), log = faulty(driven, kind), driven[1]
     said = diagnose(logged, car)
-    sure = [(one.code, one.channel) for one in said.findings if one.sure]
-    assert sure == [(fault.code, fault.channel)]
+    assert codes_of(one for one in said.findings if one.sure) == codes_of([fault])
     mended, same = said.repair.apply(logged, car)
     wrong, left = (
         max(np.abs(getattr(x, name) - getattr(log, name)).max() for name in ("v_y", "delta_f"))
@@ -133,8 +132,7 @@ def test_what_is_alike_at_constant_speed_is_named_beside_it(driven):
     slow = replace(log, v_x=np.full(len(log), float(np.median(log.v_x))))
     turned = Misaligned(angle=0.03).apply(replace(log, v_x=slow.v_x, a_y=None))
     first, second = found_in(turned, car)[:2]
-    codes = [(one.code, one.channel) for one in (first, second)]
-    assert ("velocity_sensor_angle", "v_y") in codes
+    assert "velocity_sensor_angle v_y" in codes_of([first, second])
     assert not first.sure and not second.sure
 
 
@@ -305,7 +303,7 @@ def test_a_step_of_all_ranks_the_fault_first_and_begins_where_a_y_asks(driven, k
     fault, *logged = faulty(driven, kind)
     search = prepared(*logged)
     gain, suspect, begin = search.promised(search.nominal())[0]
-    assert (suspect.code, suspect.channel) == (fault.code, fault.channel)
+    assert codes_of([suspect]) == codes_of([fault])
     assert gain > RULES.gain
     if BEGIN[kind] is None:
         assert begin == 0.0

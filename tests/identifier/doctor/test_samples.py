@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 from identifier.doctor.samples import CERTAIN, _is_late, sample_findings
 from models.recordings.evidence import computed_v_y
 from models.recordings.samples import Runs, resolution
+from tests.identifier.conftest import codes_of
 from tests.made import made
 
 DT = 0.01
@@ -45,8 +46,9 @@ def changed(recording, name, where, value):
     return replace(recording, **{name: signal})
 
 
-def only(recording):
+def only(recording, code):
     (found,) = sample_findings(recording)
+    assert codes_of([found]) == [code]
     return found
 
 
@@ -57,14 +59,14 @@ def test_a_log_without_a_fault_has_none(smooth, noisy):
 @pytest.mark.parametrize("name", ["v_y", "r", "a_y", "delta_f"])
 def test_a_channel_that_stops_for_a_while_is_frozen_there_for_so_long(smooth, noisy, name):
     still = changed(noisy, name, slice(1200, 1280), getattr(noisy, name)[1200])
-    found = only(still)
-    assert (found.code, found.channel, found.unit) == ("frozen", name, "s")
+    found = only(still, f"frozen {name}")
+    assert found.unit == "s"
     assert found.size == pytest.approx(0.8)
     assert "from 12 s on for 0.8 s" in found.text
     assert sample_findings(changed(noisy, name, slice(1200, 1225), 0.01)) == [], "not for 0.3 s"
     exact = sample_findings(changed(smooth, name, slice(1200, 1280), getattr(smooth, name)[1200]))
     servo = name == "delta_f"  # which may stand still
-    assert [one.code for one in exact] == ["frozen"] * (not servo)
+    assert codes_of(exact) == [f"frozen {name}"] * (not servo)
 
 
 def test_a_channel_that_stops_while_the_car_stands_is_not_frozen(noisy):
@@ -76,8 +78,7 @@ def test_a_channel_that_stops_while_the_car_stands_is_not_frozen(noisy):
 @pytest.mark.parametrize("lasts", [2, 5])
 def test_a_slow_channel_is_late_by_half_of_what_its_values_last(noisy, lasts):
     held = replace(noisy, r=noisy.r[np.arange(T.size) // lasts * lasts])
-    found = only(held)
-    assert (found.code, found.channel) == ("held", "r")
+    found = only(held, "held r")
     assert found.size == pytest.approx(lasts * DT)
     assert found.repair.delay == {"r": pytest.approx(0.5 * (lasts - 1) * DT)} and found.sure
 
@@ -86,15 +87,14 @@ def test_samples_that_are_repeated_now_and_then_are_counted(noisy):
     signal = noisy.v_y.copy()
     for k in range(100, 2900, 100):
         signal[k : k + 3] = signal[k - 1]
-    found = only(replace(noisy, v_y=signal))
-    assert (found.code, found.channel) == ("held", "v_y")
+    found = only(replace(noisy, v_y=signal), "held v_y")
     assert found.size == pytest.approx(0.04)
     assert "28 times" in found.text and "2.8 % of the log" in found.text
 
 
 def test_samples_that_are_lost_are_counted_from_the_first_on(noisy):
-    found = only(changed(noisy, "v_x", [500, 501, 900, 901, 902], 0.0))
-    assert (found.code, found.channel, found.size) == ("dropout", "v_x", 5.0)
+    found = only(changed(noisy, "v_x", [500, 501, 900, 901, 902], 0.0), "dropout v_x")
+    assert found.size == 5.0
     assert "for 5 of 3000 samples, first at 5 s" in found.text and found.confidence == CERTAIN
 
 
@@ -139,24 +139,23 @@ def test_the_digits_of_a_file_are_no_fault(noisy, digits, per_unit):
 def test_single_samples_far_off_are_spikes(noisy):
     at = np.array([400, 1100, 2000])
     spiky = changed(noisy, "r", at, noisy.r[at] + [1.0, -1.0, 1.0])
-    found = only(spiky)
-    assert (found.code, found.channel, found.size) == ("spikes", "r", 3.0)
+    found = only(spiky, "spikes r")
+    assert found.size == 3.0
     assert "first at 4 s" in found.text
     two = changed(noisy, "r", at[:2], noisy.r[at[:2]] + 1.0)
     assert sample_findings(two) == [], "two are none"
 
 
 def test_a_coarse_channel_is_told_with_its_step(noisy):
-    found = only(replace(noisy, r=0.05 * np.round(noisy.r / 0.05)))
-    assert (found.code, found.channel, found.unit, found.note) == ("quantized", "r", "rad/s", True)
+    found = only(replace(noisy, r=0.05 * np.round(noisy.r / 0.05)), "quantized r")
+    assert (found.unit, found.note) == ("rad/s", True)
     assert found.size == pytest.approx(0.05)
     assert sample_findings(replace(noisy, r=0.02 * np.round(noisy.r / 0.02))) == []
 
 
 @pytest.mark.parametrize(("factor", "words"), [(1.0, "is a copy of"), (-2.5, "is -2.5 times")])
 def test_a_channel_that_is_another_is_told_with_its_factor(noisy, factor, words):
-    found = only(replace(noisy, a_y=factor * noisy.r))
-    assert (found.code, found.channel) == ("copied", "a_y")
+    found = only(replace(noisy, a_y=factor * noisy.r), "copied a_y")
     assert found.size == pytest.approx(factor) and f"a_y {words} r" in found.text
 
 
@@ -176,8 +175,8 @@ def test_a_clock_that_jumps_is_told_where_and_by_how_much(noisy):
     def of(kept):
         return made(DT * np.arange(kept.size), **{n: getattr(noisy, n)[kept] for n in NOISE})
 
-    found = only(of(np.r_[0:1500, 1540:3000]))
-    assert (found.code, found.unit) == ("clock", "s")
+    found = only(of(np.r_[0:1500, 1540:3000]), "clock")
+    assert found.unit == "s"
     assert found.size == pytest.approx(0.4, rel=0.3) and found.deviation == 0.5 * found.size
     assert float(found.text.split("at once at ")[1].split(" s")[0]) == pytest.approx(15.0, abs=0.06)
     twice = sample_findings(of(np.r_[0:1500, 1450:3000]))
@@ -190,16 +189,15 @@ def test_a_clock_that_jumps_is_told_where_and_by_how_much(noisy):
 def test_a_v_y_that_is_switched_off_is_told_with_its_share_and_speed(noisy):
     off = (T > 8.5) & (T < 11.5) | (T > 27.0)
     slow = replace(noisy, v_x=noisy.v_x - 10.0 * off)
-    found = only(replace(slow, v_y=np.where(off, 0.0, slow.v_y)))
-    assert (found.code, found.channel) == ("zero", "v_y")
+    found = only(replace(slow, v_y=np.where(off, 0.0, slow.v_y)), "zero v_y")
     assert found.size == pytest.approx(DT * off.sum()) and "exactly 0 2 times" in found.text
     slowest = float(np.percentile(np.abs(slow.v_x[~off]), 5))
     assert f"where the car is slower than {slowest:.3g} m/s" in found.text
 
 
 def test_a_channel_without_a_sensor_is_told_and_not_asked_further(noisy):
-    found = only(replace(noisy, a_y=np.full(T.size, 0.25)))
-    assert (found.code, found.channel, found.confidence) == ("frozen", "a_y", CERTAIN)
+    found = only(replace(noisy, a_y=np.full(T.size, 0.25)), "frozen a_y")
+    assert found.confidence == CERTAIN
     assert (
         found.size == pytest.approx(noisy.duration) and "a_y is 0.25 m/s^2 throughout" in found.text
     )
@@ -241,8 +239,8 @@ def cornering(v_y=None):
     ],
 )
 def test_a_v_y_that_was_computed_is_named_alone_with_what_it_follows_from(v_y, said):
-    found = only(cornering(v_y))
-    assert (found.code, found.channel, found.confidence) == ("computed", "v_y", CERTAIN)
+    found = only(cornering(v_y), "computed v_y")
+    assert found.confidence == CERTAIN
     assert said in found.text and "leave the column vy out of the log: ay is there" in found.text
 
 

@@ -10,7 +10,7 @@ from benchmarks import doctor_cases
 from benchmarks.everyday_drives import everyday_log
 from benchmarks.fault_cases import StraightOnly
 from benchmarks.faults import Held, SensorElsewhere, Together
-from benchmarks.random_cars import CLASSES, good_sensors, random_car, random_drive
+from benchmarks.random_cars import CLASSES, good_sensors
 from benchmarks.recorded_cars import CARMAKER, DART
 from identifier.doctor import diagnose
 from identifier.doctor.pieces import PIECE, PIECES, looked_at
@@ -32,7 +32,7 @@ from models.maneuvers import SampledSteer
 from models.plant import Plant
 from models.recordings import joined, read_recording, runs
 from models.vehicle import sedan
-from tests.identifier.conftest import steered
+from tests.identifier.conftest import codes_of, drawn, steered
 from tireid.driving.learn import sample_recording
 
 DEGREES = 180.0 / np.pi
@@ -49,21 +49,16 @@ def in_sideslip(recording, per_rad=1.0):
 
 @pytest.fixture(scope="module", params=CLASSES)
 def driven(request):
-    """A random car of a class as it is told, and its drive by good sensors."""
-    rng = np.random.default_rng(41)
-    drive = random_drive(random_car(request.param, rng), rng)
-    return drive.car.told, drive.log(rng)
+    return drawn(request.param, 41)
 
 
 @pytest.fixture(scope="module")
 def one():
-    rng = np.random.default_rng(42)
-    drive = random_drive(random_car("sedan", rng), rng)
-    return drive.car.told, drive.log(rng)
+    return drawn("sedan", 42)
 
 
 def named(recording, car):
-    return [f"{one.code} {one.channel}".strip() for one in screen(recording, car).findings]
+    return codes_of(screen(recording, car).findings)
 
 
 CHANNELS = ("v_x", "v_y", "r", "delta_f", "a_y")
@@ -122,7 +117,7 @@ def test_every_gross_fault_is_the_first_that_is_named_and_its_repair_gives_the_d
     broken = fault.apply(log)
     found = screen(broken, car)
     first = found.findings[0]
-    assert f"{first.code} {first.channel}" == want
+    assert codes_of([first]) == [want]
     if first.sure and not case.endswith("mirrored"):  # which mirrors the other channels, too
         mended, declared = found.repair.apply(broken, car)
         assert declared == car
@@ -132,10 +127,9 @@ def test_every_gross_fault_is_the_first_that_is_named_and_its_repair_gives_the_d
 
 def test_speeds_in_mm_per_s_are_read_as_such():
     """Of a small car: those of others are beyond what a log may hold."""
-    rng = np.random.default_rng(41)
-    drive = random_drive(random_car("tenth", rng), rng)
+    car, log = drawn("tenth", 41)
     millimeters = Together(faults=(scaled("v_x", 1e3), scaled("v_y", 1e3)))
-    assert named(millimeters.apply(drive.log(rng)), drive.car.told) == ["unit v_x", "unit v_y"]
+    assert named(millimeters.apply(log), car) == ["unit v_x", "unit v_y"]
 
 
 @pytest.mark.sweep("57*")
@@ -170,7 +164,7 @@ def test_gross_faults_are_named_beside_a_sensor_at_the_rear_axle(driven, case):
     car, log = driven
     fault, want = GROSS[case]
     found = screen(fault.apply(elsewhere(log, -car.l_r)), car).findings
-    assert [f"{one.code} {one.channel}" for one in found] == [want]
+    assert codes_of(found) == [want]
 
 
 @pytest.mark.sweep("tenth")
@@ -279,7 +273,7 @@ def steered_by_hand(lost):
 def test_a_coarse_steering_wheel_that_rests_has_lost_nothing():
     assert sample_findings(steered_by_hand(lost=False)) == []
     found = sample_findings(steered_by_hand(lost=True))
-    assert [(one.code, one.channel) for one in found] == [("held", "delta_f")]
+    assert codes_of(found) == ["held delta_f"]
 
 
 def test_a_v_y_that_is_switched_off_when_slow_is_no_measurement(one):
@@ -297,7 +291,7 @@ def test_a_slow_sampling_interval_is_a_clock_in_ms_and_nothing_else_is_asked(one
     car, log = one
     for broken in (log, replace(log, r=-log.r)):
         found = screen(replace(broken, t=1e3 * log.t), car)
-        assert [f.code for f in found.findings] == ["clock_unit"]
+        assert codes_of(found.findings) == ["clock_unit"]
         assert not found.repair
         assert "clock" in found.blind
 
@@ -438,8 +432,7 @@ def test_a_channel_that_rests_for_a_while_is_told_and_the_rest_is_asked(long):
     broken = part_of(log, v_y=0.0)
     found = screen(scaled("r", DEGREES).apply(broken), car)
     first, frozen = found.findings
-    assert (first.code, first.channel) == ("unit", "r")
-    assert (frozen.code, frozen.channel) == ("frozen", "v_y")
+    assert codes_of([first, frozen]) == ["unit r", "frozen v_y"]
     assert frozen.size == pytest.approx(np.ptp(log.t[log.segments[0]]), abs=0.05)
     assert "v_y does not change from 0 s on for" in frozen.text
     assert not found.blind
@@ -459,7 +452,7 @@ def test_of_a_reading_nothing_is_sure_where_one_part_is_not(one):
     car, log = one
     broken = Together(faults=(scaled("r", DEGREES), scaled("delta_f", 3.0))).apply(log)
     found = screen(broken, car).findings
-    assert {"unit r", "factor delta_f"} == {f"{one.code} {one.channel}" for one in found}
+    assert {"unit r", "factor delta_f"} == {*codes_of(found)}
     assert not any(one.sure for one in found)
     assert screen(scaled("r", DEGREES).apply(log), car).findings[0].sure
 

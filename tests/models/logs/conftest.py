@@ -1,3 +1,6 @@
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -23,6 +26,17 @@ def assert_equal(channels, t, columns):
         assert np.all(np.diff(channel.rows) == 1) and channel.rows[0] in (1, 2)
 
 
+def ran(script, *words):
+    """Python ended, after a script in a process of its own."""
+    told = [sys.executable, "-c", script, *map(str, words)]
+    return subprocess.run(told, capture_output=True, text=True, check=False)
+
+
+def channel_of(log, name):
+    (channel,) = log.read([name])
+    return channel
+
+
 def refusal(path, dbc=None):
     """The one line with which a log is refused, on opening or on reading."""
     with pytest.raises(RecordingError) as caught:
@@ -30,4 +44,5 @@ def refusal(path, dbc=None):
         log.read([one.name for one in log.listed()])
     text = str(caught.value)
     assert "\n" not in text and len(text) < 700
+    assert text.startswith((str(path), str(dbc)))
     return text

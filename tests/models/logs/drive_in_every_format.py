@@ -237,6 +237,10 @@ class Written(NamedTuple):
     dbc: Path | None
     names: dict[str, str]
 
+    @property
+    def channels(self):
+        return list(self.names.values())
+
 
 # By format: how a drive is written, into a folder. All of them hold the same doubles.
 def _named(path, columns, pattern="{}", dbc=False):

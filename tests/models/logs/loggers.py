@@ -19,9 +19,9 @@ class Drive(NamedTuple):
     steer: np.ndarray  # deg
 
 
-def drive(n=N):
+def drive():
     """A slalom, to three digits, as files hold it."""
-    t = np.round(DT * np.arange(n), 3)
+    t = np.round(DT * np.arange(N), 3)
     wave = np.sin(2.0 * t)
     return Drive(
         t, *(np.round(one, 3) for one in (60.0 + 2.0 * wave, 0.1 * wave, 11.3 * wave, -2.5 * wave))
@@ -32,9 +32,12 @@ def number(value, decimal="."):
     return f"{value:.3f}".replace(".", decimal)
 
 
-def table(rows, delimiter=",", decimal=".", end="\n", quoted=False, trailing=False):
+ROWS = [*zip(*drive(), strict=True)]
+
+
+def table(delimiter=",", decimal=".", end="\n", quoted=False, trailing=False):
     lines = []
-    for row in rows:
+    for row in ROWS:
         cells = [number(one, decimal) for one in row]
         cells = [f'"{cell}"' for cell in cells] if quoted else cells
         lines.append(delimiter.join(cells) + (delimiter if trailing else ""))
@@ -45,13 +48,13 @@ def plain(delimiter=",", decimal=".", **how):
     header = delimiter.join(
         ["Time [s]", "Speed [km/h]", "vy [m/s]", "Yaw Rate [deg/s]", "Steering [deg]"]
     )
-    return header + "\n" + table(zip(*drive(), strict=True), delimiter, decimal, **how)
+    return header + "\n" + table(delimiter, decimal, **how)
 
 
 def units_row(delimiter=";", decimal=","):
     lines = [delimiter.join(["Time", "Speed", "vy", "Yaw Rate", "Steering"])]
     lines += [delimiter.join(["s", "km/h", "m/s", "°/s", "°"])]
-    return "\n".join(lines) + "\n" + table(zip(*drive(), strict=True), delimiter, decimal)
+    return "\n".join(lines) + "\n" + table(delimiter, decimal)
 
 
 _MOTEC = """\
@@ -78,10 +81,10 @@ _MOTEC = """\
 
 def motec():
     """MoTeC i2: every cell quoted, a preamble of pairs, names, units, a blank line."""
-    body = table(zip(*drive(), strict=True), quoted=True)
-    return (_MOTEC + body).replace("\n", "\r\n")
+    return (_MOTEC + table(quoted=True)).replace("\n", "\r\n")
 
 
+# AiM Race Studio: pairs, names, units, and each a line of its own.
 _AIM = """\
 "Format","AiM CSV File"
 "Session","Track day"
@@ -103,29 +106,22 @@ _AIM = """\
 """
 
 
-def aim():
-    """AiM Race Studio: pairs, names, units, and each a line of its own."""
-    return _AIM + table(zip(*drive(), strict=True), quoted=True)
-
-
 def carmaker_dat():
     """IPG CarMaker: columns apart by blanks, names and units in comments."""
     lines = ["#INFOFILE1.1 - Do not remove this line!", "## Testrun: Slalom", "#"]
     lines += ["# Time Car.v Car.vy Car.YawRate Steer.WhlAng", "# s km/h m/s deg/s deg"]
-    rows = ["  ".join(f"{one:12.3f}" for one in row) for row in zip(*drive(), strict=True)]
+    rows = ["  ".join(f"{one:12.3f}" for one in row) for row in ROWS]
     return "\n".join(lines + rows) + "\n"
 
 
-def carmaker_csv():
-    header = "#Time;Car.v [km/h];Car.vy [m/s];Car.YawRate [deg/s];Steer.WhlAng [deg]"
-    return header + "\n" + table(zip(*drive(), strict=True), ";")
+CARMAKER = "#Time;Car.v [km/h];Car.vy [m/s];Car.YawRate [deg/s];Steer.WhlAng [deg]\n"
 
 
 def two_d():
     """2D datarecording: a title, names, units in brackets, decimal commas, tabs."""
     lines = ["2D Datarecording WinARace export", "Event:\tTest", ""]
     lines += ["Time\tV_GPS\tVy\tGyro_Z\tSteer", "[s]\t[km/h]\t[m/s]\t[°/s]\t[°]"]
-    return "\r\n".join(lines) + "\r\n" + table(zip(*drive(), strict=True), "\t", ",", end="\r\n")
+    return "\r\n".join(lines) + "\r\n" + table("\t", ",", end="\r\n")
 
 
 _VBOX = """\
@@ -155,10 +151,9 @@ time velocity Vy YawRate Steering
 
 def vbox():
     """Racelogic VBOX: sections; time is hhmmss.ss."""
-    one = drive()
     rows = [
         f"{clock(t).replace(':', '')} {v:+08.3f} {vy:+.3f} {r:+.3f} {d:+.3f}"
-        for t, v, vy, r, d in zip(*one, strict=True)
+        for t, v, vy, r, d in ROWS
     ]
     return (_VBOX + "\n".join([*rows, ""])).replace("\n", "\r\n")
 
@@ -172,8 +167,7 @@ def clock(t, start=14 * 3600 + 31 * 60 + 59.5):
 def stamped(stamp, name="Time"):
     """The table with another clock."""
     lines = [f"{name},Speed [km/h],vy [m/s],Yaw Rate [deg/s],Steering [deg]"]
-    one = drive()
-    for t, *rest in zip(*one, strict=True):
+    for t, *rest in ROWS:
         lines.append(",".join([stamp(t), *map(number, rest)]))
     return "\n".join(lines) + "\n"
 
@@ -191,7 +185,7 @@ def rounded(t, tick):
 
 
 def fortran():
-    rows = [",".join(f"{one:.5E}" for one in row) for row in zip(*drive(), strict=True)]
+    rows = [",".join(f"{one:.5E}" for one in row) for row in ROWS]
     return "\n".join([plain().split("\n")[0], *rows]).replace("E", "D").replace("TimD", "TimE")
 
 
@@ -209,51 +203,51 @@ def described(form):
 TWICE = "time_s [s],speed_kmh (km/h),vy_mps [m/s] 1),yaw_rate_deg (deg/s) *OBD,Steering_deg [deg]*"
 SPEEDS = {"Speed_kmh": "km/h", "Speed:km/h": "km/h", "Speed (km/h)": "km/h", "Speed": ""}
 
-DIALECTS: dict[str, bytes] = {
-    "commas": plain().encode(),
-    "semicolons": plain(";").encode(),
-    "semicolons and decimal commas": plain(";", ",").encode(),
-    "tabs": plain("\t").encode(),
-    "tabs and decimal commas": plain("\t", ",").encode(),
-    "bars": plain("|").encode(),
-    "quoted": plain(quoted=True).encode(),
-    "quoted decimal commas between commas": plain(decimal=",", quoted=True).encode(),
-    "rows that end in a delimiter": plain(";", trailing=True).encode(),
-    "CRLF": plain().replace("\n", "\r\n").encode(),
-    "CR": plain().replace("\n", "\r").encode(),
+_TEXTS: dict[str, str | bytes] = {
+    "commas": plain(),
+    "semicolons": plain(";"),
+    "semicolons and decimal commas": plain(";", ","),
+    "tabs": plain("\t"),
+    "tabs and decimal commas": plain("\t", ","),
+    "bars": plain("|"),
+    "quoted": plain(quoted=True),
+    "quoted decimal commas between commas": plain(decimal=",", quoted=True),
+    "rows that end in a delimiter": plain(";", trailing=True),
+    "CRLF": plain().replace("\n", "\r\n"),
+    "CR": plain().replace("\n", "\r"),
     "Latin-1": units_row().encode("latin-1"),
-    "UTF-8": units_row().encode(),
+    "UTF-8": units_row(),
     "UTF-8 with mark": units_row().encode("utf-8-sig"),
     "UTF-16": units_row().encode("utf-16"),
     "UTF-16 without mark": plain().encode("utf-16-le"),
     "units in a row, tabs": units_row("\t", ".").encode("cp1252"),
     "MoTeC": motec().encode("cp1252"),
-    "AiM": aim().encode(),
-    "CarMaker .dat": carmaker_dat().encode(),
-    "CarMaker .csv": carmaker_csv().encode(),
+    "AiM": _AIM + table(quoted=True),
+    "CarMaker .dat": carmaker_dat(),
+    "CarMaker .csv": CARMAKER + table(";"),
     "2D": two_d().encode("cp1252"),
-    "VBOX": vbox().encode(),
-    "milliseconds told": stamped(lambda t: f"{1000 * t:.0f}", "Time [ms]").encode(),
-    "milliseconds by their steps": stamped(lambda t: f"{1000 * t:.0f}").encode(),
-    "nanoseconds": stamped(lambda t: f"{round(1e6 * t) * 1000}", "timestamp").encode(),
-    "epoch in s": stamped(lambda t: f"{1684592000 + t:.3f}", "timestamp").encode(),
-    "epoch in ms": stamped(lambda t: f"{1684592000000 + round(1000 * t)}").encode(),
-    "epoch in us": stamped(lambda t: f"{1684592000000000 + round(1e6 * t)}").encode(),
-    "epoch in ns": stamped(lambda t: f"{1684592000000000000 + round(1e9 * t)}").encode(),
-    "ISO 8601": stamped(iso).encode(),
-    "ISO 8601 with zone": stamped(lambda t: iso(t).replace("T", " ") + "+02:00").encode(),
-    "time of day": stamped(clock).encode(),
-    "over midnight": stamped(lambda t: clock(t, 86399.5)).encode(),
-    "minutes and seconds": stamped(lambda t: f"{int(t + 59.5) // 60:02d}:{(t + 59.5) % 60:06.3f}")
-    .encode(),
-    "rounded to 0.1 s": stamped(lambda t: rounded(t, 0.1)).encode(),
-    "a typographic minus": plain(";", ",").replace("-", "\u2212").encode(),
+    "VBOX": vbox(),
+    "milliseconds told": stamped(lambda t: f"{1000 * t:.0f}", "Time [ms]"),
+    "milliseconds by their steps": stamped(lambda t: f"{1000 * t:.0f}"),
+    "nanoseconds": stamped(lambda t: f"{round(1e6 * t) * 1000}", "timestamp"),
+    "epoch in s": stamped(lambda t: f"{1684592000 + t:.3f}", "timestamp"),
+    "epoch in ms": stamped(lambda t: f"{1684592000000 + round(1000 * t)}"),
+    "epoch in us": stamped(lambda t: f"{1684592000000000 + round(1e6 * t)}"),
+    "epoch in ns": stamped(lambda t: f"{1684592000000000000 + round(1e9 * t)}"),
+    "ISO 8601": stamped(iso),
+    "ISO 8601 with zone": stamped(lambda t: iso(t).replace("T", " ") + "+02:00"),
+    "time of day": stamped(clock),
+    "over midnight": stamped(lambda t: clock(t, 86399.5)),
+    "minutes and seconds": stamped(lambda t: f"{int(t + 59.5) // 60:02d}:{(t + 59.5) % 60:06.3f}"),
+    "rounded to 0.1 s": stamped(lambda t: rounded(t, 0.1)),
+    "a typographic minus": plain(";", ",").replace("-", "\u2212"),
     "an en dash": plain("\t").replace("-", "\u2013").encode("cp1252"),
     "wide blanks": stamped(lambda t: f"{1000 * t:_.0f}".replace("_", "\u202f"), "Time\u00a0[ms]")
     .encode("utf-16"),
-    "Fortran": fortran().encode(),
-    "units twice, remarks": renamed(TWICE).encode(),
+    "Fortran": fortran(),
+    "units twice, remarks": renamed(TWICE),
     "names and units in lines": described("Channel : {1}\nUnit : {2}\nID : 7").encode("utf-8-sig"),
-    "names in numbered comments": described("# Column {0} = {1} [{2}]").encode(),
-    "comments": plain().replace("\n", "\n# a comment, with, commas\n", 1).encode(),
+    "names in numbered comments": described("# Column {0} = {1} [{2}]"),
+    "comments": plain().replace("\n", "\n# a comment, with, commas\n", 1),
 }  # fmt: skip
+DIALECTS = {k: one.encode() if isinstance(one, str) else one for k, one in _TEXTS.items()}

@@ -7,7 +7,7 @@ import pytest
 
 from models.logs.bag import _KNOWN
 from models.logs.door import open_log
-from tests.models.logs.conftest import refusal
+from tests.models.logs.conftest import channel_of, refusal
 from tests.models.logs.drive_in_every_format import FIRST_NS, header, write_bag
 
 rosbag2 = pytest.importorskip("rosbags.rosbag2")
@@ -16,15 +16,30 @@ STEP = 10_000_000  # ns
 STORAGES = {"sqlite3": rosbag2.StoragePlugin.SQLITE3, "mcap": rosbag2.StoragePlugin.MCAP}
 
 
-def store_of(**types):
-    """Types of a distribution, those that cars use, and more by their definitions."""
-    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
-    for kind, text in {**_KNOWN, **types}.items():
-        store.register(typesys.get_types_from_msg(text, kind))
-    return store
+MIXED = """
+bool ready
+uint8 mode
+string word
+int16 small
+float64[] many
+float32 after
+Inner inner
+Inner[2] pair
+Inner[] more
+string[] words
+uint64 large
+int8 last
+"""
+INNER = "float64 x\nstring name\nint32 n\nuint16[3] codes"
+SCALARS = ("mode", "small", "after", "inner.x", "inner.n", "large", "last")
+# Types of a distribution, those that cars use, and more by their definitions.
+STORE = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+MINE = {"Inner": INNER, "Mixed": MIXED, "Loop": "float64 x"}
+for kind, text in (_KNOWN | {f"my_msgs/msg/{name}": one for name, one in MINE.items()}).items():
+    STORE.register(typesys.get_types_from_msg(text, kind))
 
 
-def write(path, store, topics, storage="sqlite3", mode=None):
+def write(path, topics, storage="sqlite3", mode=None):
     """Topics: name -> (type, [(received in ns, message)]); in the order of their times."""
     bag = rosbag2.Writer(path, version=9, storage_plugin=STORAGES[storage])
     if mode is not None:
@@ -32,19 +47,19 @@ def write(path, store, topics, storage="sqlite3", mode=None):
     with bag:
         rows = []
         for name, (kind, messages) in topics.items():
-            connection = bag.add_connection(name, kind, typestore=store)
-            rows += [(time, connection, store.serialize_cdr(one, kind)) for time, one in messages]
+            connection = bag.add_connection(name, kind, typestore=STORE)
+            rows += [(time, connection, STORE.serialize_cdr(one, kind)) for time, one in messages]
         for time, connection, raw in sorted(rows, key=lambda row: row[0]):
             bag.write(connection, time, raw)
     return path
 
 
-def car_topics(store, count=50):
+def car_topics(count=50):
     """Every message that cars tell their motion by, with numbers that count up."""
 
     def of(kind, *values):
         package, _, name = kind.partition("/")
-        return store.types[f"{package}/msg/{name}"](*values)
+        return STORE.types[f"{package}/msg/{name}"](*values)
 
     def pair(kind, one, two):
         vectors = (of("geometry_msgs/Vector3", *values) for values in (one, two))
@@ -76,7 +91,7 @@ def car_topics(store, count=50):
         messages = []
         for k in range(count):
             ns = FIRST_NS + k * STEP
-            h = header(store, ns)
+            h = header(STORE, ns)
             begin = [] if name == "/plain" else [h.stamp if name.endswith("/steer") else h]
             messages.append((ns, of(kind, *begin, *build(float(k)))))
         topics[name] = kind.replace("/", "/msg/"), messages
@@ -114,10 +129,7 @@ def old(path, folder):
 
 @pytest.mark.parametrize("kind", ["sqlite3", "mcap", "old"])
 def test_messages_of_cars_are_read_with_their_units(kind, tmp_path):
-    store = store_of()
-    path = write(
-        tmp_path / "bag", store, car_topics(store), "mcap" if kind == "mcap" else "sqlite3"
-    )
+    path = write(tmp_path / "bag", car_topics(), "mcap" if kind == "mcap" else "sqlite3")
     log = open_log(old(path, tmp_path) if kind == "old" else path)
     units = {one.name: one.unit for one in log.listed()}
     k = np.arange(50.0)
@@ -130,37 +142,19 @@ def test_messages_of_cars_are_read_with_their_units(kind, tmp_path):
     assert not any("covariance" in name or "stamp" in name for name in units)
 
 
-MIXED = """
-bool ready
-uint8 mode
-string word
-int16 small
-float64[] many
-float32 after
-Inner inner
-Inner[2] pair
-Inner[] more
-string[] words
-uint64 large
-int8 last
-"""
-INNER = "float64 x\nstring name\nint32 n\nuint16[3] codes"
-SCALARS = ("mode", "small", "after", "inner.x", "inner.n", "large", "last")
-
-
-def random_message(store, rng):
+def random_message(rng):
     def word():
         return "x" * int(rng.integers(0, 9))
 
     def inner():
-        return store.types["my_msgs/msg/Inner"](
+        return STORE.types["my_msgs/msg/Inner"](
             float(rng.standard_normal()),
             word(),
             int(rng.integers(-(2**31), 2**31)),
             rng.integers(0, 2**16, 3).astype(np.uint16),
         )
 
-    return store.types["my_msgs/msg/Mixed"](
+    return STORE.types["my_msgs/msg/Mixed"](
         bool(rng.integers(2)),
         int(rng.integers(256)),
         word(),
@@ -176,14 +170,10 @@ def random_message(store, rng):
     )
 
 
-def mixed_store():
-    return store_of(**{"my_msgs/msg/Inner": INNER, "my_msgs/msg/Mixed": MIXED})
-
-
 def test_messages_of_any_lengths_are_read_as_rosbags_reads_them(tmp_path):
-    store, rng = mixed_store(), np.random.default_rng(2)
-    messages = [(FIRST_NS + k * STEP, random_message(store, rng)) for k in range(400)]
-    path = write(tmp_path / "bag", store, {"/a": ("my_msgs/msg/Mixed", messages)}, "mcap")
+    rng = np.random.default_rng(2)
+    messages = [(FIRST_NS + k * STEP, random_message(rng)) for k in range(400)]
+    path = write(tmp_path / "bag", {"/a": ("my_msgs/msg/Mixed", messages)}, "mcap")
     log = open_log(path)
     assert tuple(one.name for one in log.listed()) == tuple(f"/a/{one}" for one in SCALARS)
     for name, channel in zip(SCALARS, log.read([f"/a/{one}" for one in SCALARS]), strict=True):
@@ -196,13 +186,13 @@ def test_messages_of_any_lengths_are_read_as_rosbags_reads_them(tmp_path):
 
 
 def test_messages_of_the_other_byte_order_are_read(tmp_path):
-    store, rng = mixed_store(), np.random.default_rng(2)
-    message = random_message(store, rng)
+    rng = np.random.default_rng(2)
+    message = random_message(rng)
     kind = "my_msgs/msg/Mixed"
     with rosbag2.Writer(tmp_path / "bag", version=9) as bag:
-        connection = bag.add_connection("/a", kind, typestore=store)
+        connection = bag.add_connection("/a", kind, typestore=STORE)
         for k in range(20):
-            raw = store.serialize_cdr(message, kind, little_endian=k % 2 == 0)
+            raw = STORE.serialize_cdr(message, kind, little_endian=k % 2 == 0)
             bag.write(connection, FIRST_NS + k * STEP, raw)
     large, x = open_log(tmp_path / "bag").read(["/a/large", "/a/inner.x"])
     assert set(large.values) == {float(message.large)}
@@ -210,39 +200,36 @@ def test_messages_of_the_other_byte_order_are_read(tmp_path):
 
 
 def test_a_type_without_definition_is_named_and_others_are_read(tmp_path):
-    store = mixed_store()
-    topics = car_topics(store)
+    topics = car_topics()
     topics["/mixed"] = (
         "my_msgs/msg/Mixed",
-        [(FIRST_NS, random_message(store, np.random.default_rng(1)))],
+        [(FIRST_NS, random_message(np.random.default_rng(1)))],
     )
-    path = write(tmp_path / "bag", store, {name: topics[name] for name in ("/twist", "/mixed")})
+    path = write(tmp_path / "bag", {name: topics[name] for name in ("/twist", "/mixed")})
     log = open_log(old(path, tmp_path))
     assert {one.name.split("/")[1] for one in log.listed()} == {"twist"}
     assert log.notes == ("not read: /mixed (the type my_msgs/msg/Mixed has no definition)",)
 
 
 def test_stamps_that_were_not_set_give_way_to_the_time_of_the_bag(tmp_path):
-    store = store_of()
-    kind, messages = car_topics(store)["/velocity"]
+    kind, messages = car_topics()["/velocity"]
     for _, message in messages:
         message.header.stamp.sec = message.header.stamp.nanosec = 0
-    log = open_log(write(tmp_path / "bag", store, {"/velocity": (kind, messages)}))
+    log = open_log(write(tmp_path / "bag", {"/velocity": (kind, messages)}))
     assert "its clock is when the bag received it: /velocity" in log.notes[0]
-    assert np.array_equal(log.read(["/velocity/heading_rate"])[0].t, np.arange(50) / 100)
+    assert np.array_equal(channel_of(log, "/velocity/heading_rate").t, np.arange(50) / 100)
 
 
 @pytest.mark.parametrize("of", ["a drive", "a simulation"])
 def test_the_stamp_is_the_clock_and_not_when_the_bag_received_the_message(of, tmp_path):
-    store = store_of()
-    topics = {name: car_topics(store)[name] for name in ("/twist", "/plain")}
+    topics = {name: car_topics()[name] for name in ("/twist", "/plain")}
     late = []
     for k, (time, one) in enumerate(topics["/twist"][1]):
         if of == "a simulation":
             one.header.stamp.sec, one.header.stamp.nanosec = 5 + k // 100, k % 100 * STEP
         late.append((time + 7_000_000 + k % 3 * 10**6, one))
     topics["/twist"] = topics["/twist"][0], late
-    log = open_log(write(tmp_path / "bag", store, topics))
+    log = open_log(write(tmp_path / "bag", topics))
     twist, plain = log.read(["/twist/twist.linear.x", "/plain/speed"])
     assert np.array_equal(twist.t, np.arange(50) / 100)
     assert np.array_equal(plain.t, np.arange(50) / 100)
@@ -250,12 +237,11 @@ def test_the_stamp_is_the_clock_and_not_when_the_bag_received_the_message(of, tm
 
 @pytest.mark.parametrize("mode", ["FILE", "MESSAGE", "STORAGE"])
 def test_compressed_bags_are_read_and_unpack_no_further_than_allowed(mode, tmp_path, monkeypatch):
-    store = store_of()
-    topics = {"/velocity": car_topics(store)["/velocity"]}
+    topics = {"/velocity": car_topics()["/velocity"]}
     storage = "mcap" if mode == "STORAGE" else "sqlite3"
     compression = getattr(rosbag2.CompressionMode, mode)
-    path = write(tmp_path / "bag", store, topics, storage, compression)
-    values = open_log(path).read(["/velocity/longitudinal_velocity"])[0].values
+    path = write(tmp_path / "bag", topics, storage, compression)
+    values = channel_of(open_log(path), "/velocity/longitudinal_velocity").values
     assert np.array_equal(values, np.arange(50.0))
     small = {"FILE": "megabytes=0.001", "MESSAGE": "block=0.00002", "STORAGE": "block=0.001"}
     monkeypatch.setenv("TIREID_LIMITS", small[mode])
@@ -314,13 +300,12 @@ def test_another_database_is_refused(tables, said, tmp_path):
 
 @pytest.mark.parametrize("storage", STORAGES)
 def test_the_rate_of_a_topic_is_that_of_its_messages_however_long_the_bag_is(tmp_path, storage):
-    store = store_of()
-    topics = car_topics(store, 400)
+    topics = car_topics(400)
     for name, step in (("/twist", 4), ("/plain", 5), ("/velocity", 1)):
         kind, messages = topics[name]
         topics[name] = kind, messages[: 100 if step > 1 else None : step]
     few = {name: topics[name] for name in ("/twist", "/plain", "/velocity")}
-    listed = open_log(write(tmp_path / "bag", store, few, storage)).listed()
+    listed = open_log(write(tmp_path / "bag", few, storage)).listed()
     rates = {one.name.split("/")[1]: one.rate for one in listed}
     assert rates == pytest.approx({"twist": 25.0, "plain": 20.0, "velocity": 100.0})
 
@@ -332,9 +317,8 @@ def test_a_bag_of_ros_1_is_refused_with_what_converts_it(tmp_path):
 
 
 def test_a_type_that_holds_itself_is_refused(tmp_path):
-    store = store_of(**{"my_msgs/msg/Loop": "float64 x"})
-    message = store.types["my_msgs/msg/Loop"](1.0)
-    path = write(tmp_path / "bag", store, {"/loop": ("my_msgs/msg/Loop", [(FIRST_NS, message)])})
+    message = STORE.types["my_msgs/msg/Loop"](1.0)
+    path = write(tmp_path / "bag", {"/loop": ("my_msgs/msg/Loop", [(FIRST_NS, message)])})
     with sqlite3.connect(path / "bag.db3") as base:
         base.execute(
             "UPDATE message_definitions SET encoded_message_definition = 'float64 x\nLoop loop\n'"

@@ -4,8 +4,6 @@ import contextlib
 import os
 import re
 import struct
-import subprocess
-import sys
 import time
 import zlib
 from pathlib import Path
@@ -17,7 +15,7 @@ from models import apart
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.schema import _SWELLS
-from tests.models.logs.conftest import refusal
+from tests.models.logs.conftest import ran, refusal
 
 MANY = 100_000_000  # samples of a channel that the limits allow
 ROOM = 700_000_000  # bytes beyond what the readers themselves take
@@ -72,34 +70,40 @@ def parquet(path, **columns):
     return path
 
 
-def element(kind, data):
-    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+def element(kind, data, order="<"):
+    return struct.pack(order + "II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def head_of(kind, rows, order="<"):
+    """Flags and dimensions of a variable of MATLAB of one column."""
+    flags, shape = struct.pack(order + "II", kind, 0), struct.pack(order + "ii", rows, 1)
+    return element(6, flags, order) + element(5, shape, order)
 
 
 def numbers(name, count):
     """A variable of MATLAB: zeros of one byte."""
-    flags, shape = struct.pack("<II", 8, 0), struct.pack("<ii", count, 1)
-    parts = element(6, flags) + element(5, shape) + element(1, name) + element(1, bytes(count))
-    return element(14, parts)
+    return element(14, head_of(8, count) + element(1, name) + element(1, bytes(count)))
 
 
 def struct_of(name, count):
     """A struct of MATLAB with one field, t."""
-    flags, shape = struct.pack("<II", 2, 0), struct.pack("<ii", 1, 1)
-    head = element(6, flags) + element(5, shape) + element(1, name)
     return element(
         14,
-        head
+        head_of(2, 1)
+        + element(1, name)
         + element(5, struct.pack("<i", 8))
         + element(1, b"t".ljust(8, b"\0"))
         + numbers(b"", count),
     )
 
 
+HEADER = b"MATLAB 5.0 MAT-file".ljust(124)
+
+
 def matlab(path, *variables):
     packed = [zlib.compress(one, 9) for one in variables]
     body = b"".join(struct.pack("<II", 15, len(one)) + one for one in packed)
-    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + body)
+    path.write_bytes(HEADER + b"\0\1IM" + body)
     return path
 
 
@@ -129,12 +133,7 @@ def test_what_swells_in_memory_is_refused_before_it_does(tmp_path):
         (parquet(tmp_path / "run.parquet", run=["x" * 3_000_000]), "run must be at most 200"),
     ]
     assert max(path.stat().st_size for path, _ in cases) < 500_000
-    reader = subprocess.run(
-        [sys.executable, "-c", READER, *(str(path) for path, _ in cases)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    reader = ran(READER, *(path for path, _ in cases))
     assert reader.returncode == 0, reader.stderr
     for (path, words), line in zip(cases, reader.stdout.splitlines(), strict=True):
         assert re.search(words, line), (path.name, line)
@@ -247,9 +246,7 @@ apart.apart(ValueError, Path("."), 0.0, pow, 7, 10**9)
 
 
 def test_a_process_apart_ends_with_the_one_that_started_it():
-    run = [sys.executable, "-c", KILLED]
-    killed = subprocess.run(run, capture_output=True, text=True, check=False)
-    about, waited = Path(f"/proc/{int(killed.stdout)}/stat"), 0.0
+    about, waited = Path(f"/proc/{int(ran(KILLED).stdout)}/stat"), 0.0
     with contextlib.suppress(FileNotFoundError):
         while about.read_text().split()[2] != "Z":
             assert waited < 3.0

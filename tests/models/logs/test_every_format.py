@@ -4,8 +4,6 @@ import gzip
 import importlib
 import random
 import shutil
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -14,7 +12,7 @@ from models.logs import can
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.logs.memory import open_arrays
-from tests.models.logs.conftest import assert_equal, refusal
+from tests.models.logs.conftest import assert_equal, ran, refusal
 from tests.models.logs.drive_in_every_format import FORMATS, UNITS, write
 
 BINARY = [name for name in FORMATS if name != "CSV"]
@@ -39,7 +37,7 @@ def test_every_format_gives_the_doubles_and_the_clock_that_were_written(format, 
     t, columns = drive
     log = open_log(written.path, written.dbc)
     listed = {one.name: one for one in log.listed()}
-    names = list(written.names.values())
+    names = written.channels
     assert set(names) <= set(listed)
     assert_equal(log.read(names), t, columns)
     back = log.read(names[::-1])
@@ -78,7 +76,7 @@ def test_the_name_of_a_file_does_not_tell_its_format(format, tmp_path, drive, wr
     other.parent.mkdir()
     (shutil.copytree if written.path.is_dir() else shutil.copy)(written.path, other)
     log = open_log(other, written.dbc)
-    assert_equal(log.read(list(written.names.values())), t, columns)
+    assert_equal(log.read(written.channels), t, columns)
 
 
 @pytest.mark.parametrize("format", EXTRAS)
@@ -108,11 +106,9 @@ def test_a_text_is_told_without_importing_the_readers_of_other_formats(tmp_path,
     written = write("CSV", tmp_path, *drive)
     script = "import sys; from models.logs.door import open_log; open_log(sys.argv[1]).listed();"
     script += "print(*sorted(name for name in sys.modules if name.startswith('models.logs.')))"
-    ran = subprocess.run(
-        [sys.executable, "-c", script, str(written.path)], capture_output=True, text=True
-    )
-    imported = {name.rpartition(".")[2] for name in ran.stdout.split()}
-    assert {"text", "magic"} <= imported, ran.stderr
+    told = ran(script, written.path)
+    imported = {name.rpartition(".")[2] for name in told.stdout.split()}
+    assert {"text", "magic"} <= imported, told.stderr
     assert not imported & {"parquet", "mdf", "matlab", "bag", "can", "frames", "grouped"}
 
 
@@ -197,7 +193,7 @@ def test_a_clock_that_does_not_rise_is_refused(format, clock, tmp_path, drive):
 def test_a_clock_of_numbers_that_counts_since_1970_keeps_them(format, tmp_path, drive):
     t, columns = drive
     written = write(format, tmp_path, 1.7e9 + t, columns)
-    first, *_ = open_log(written.path).read(list(written.names.values()))
+    first, *_ = open_log(written.path).read(written.channels)
     assert np.array_equal(first.t, 1.7e9 + t)
 
 

@@ -9,8 +9,9 @@ import pytest
 import scipy.io
 
 from models.logs.door import open_log
-from tests.models.logs.conftest import refusal
+from tests.models.logs.conftest import channel_of, refusal
 from tests.models.logs.drive_in_every_format import write_mat73
+from tests.models.logs.test_bombs import HEADER, element, head_of
 
 T = np.arange(300) / 100
 SLOW = T[::10]
@@ -98,16 +99,6 @@ def test_numbers_of_every_type_are_those_that_scipy_reads(kind, compressed, tmp_
         assert np.array_equal(channel.values, there[:, k])
 
 
-def element(number, data, order="<"):
-    return struct.pack(order + "II", number, len(data)) + data + b"\0" * (-len(data) % 8)
-
-
-def head_of(kind, rows, order="<"):
-    """Flags and dimensions of a variable of one column."""
-    flags, shape = struct.pack(order + "II", kind, 0), struct.pack(order + "ii", rows, 1)
-    return element(6, flags, order) + element(5, shape, order)
-
-
 def test_files_of_another_byte_order_are_read(tmp_path):
     path = tmp_path / "log.mat"
 
@@ -115,10 +106,9 @@ def test_files_of_another_byte_order_are_read(tmp_path):
         data = element(1, name, ">") + element(9, values.astype(">f8").tobytes(), ">")
         return element(14, head_of(6, 40, ">") + data, ">")
 
-    header = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack(">H", 0x0100) + b"MI"
-    path.write_bytes(header + matrix(b"t", T[:40]) + matrix(b"v", A[:40]))
+    path.write_bytes(HEADER + b"\1\0MI" + matrix(b"t", T[:40]) + matrix(b"v", A[:40]))
     assert np.array_equal(scipy.io.loadmat(path)["v"].ravel(), A[:40])
-    assert np.array_equal(open_log(path).read(["v"])[0].values, A[:40])
+    assert np.array_equal(channel_of(open_log(path), "v").values, A[:40])
 
 
 SHAPES = {  # what is written, names and units of its channels, of which the last one is B
@@ -200,7 +190,7 @@ def nested(depth):
 
 def test_cells_so_deep_that_they_break_a_stack_are_refused(tmp_path):
     path = tmp_path / "log.mat"
-    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + nested(100_000))
+    path.write_bytes(HEADER + b"\x00\x01IM" + nested(100_000))
     assert "levels of structs and cells must be at most 32" in refusal(path)
 
 
@@ -214,8 +204,7 @@ def test_a_variable_that_inflates_beyond_the_limit_is_refused(tmp_path, monkeypa
 def test_a_compressed_variable_that_is_no_variable_is_refused(tmp_path):
     data = zlib.compress(b"no variable, but some words")
     path = tmp_path / "log.mat"
-    header = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
-    path.write_bytes(header + struct.pack("<II", 15, len(data)) + data)
+    path.write_bytes(HEADER + b"\x00\x01IM" + struct.pack("<II", 15, len(data)) + data)
     assert "is cut off" in refusal(path)
 
 
@@ -254,5 +243,5 @@ def test_other_hdf5_files_are_read_as_they_are(tmp_path):
         file["blob"] = np.void(b"cos\nsystem\n(S'touch x'\ntR.")  # a pickle stays what it is
     log = open_log(path)
     assert log.format == "HDF5"
-    assert np.array_equal(log.read(["drive.v"])[0].values, A)
+    assert np.array_equal(channel_of(log, "drive.v").values, A)
     assert np.array_equal(log.read(["drive.m(:,2)"])[0].values, B)

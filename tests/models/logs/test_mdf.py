@@ -7,7 +7,7 @@ import pytest
 
 from models.logs import mdf
 from models.logs.door import open_log
-from tests.models.logs.conftest import refusal
+from tests.models.logs.conftest import channel_of, refusal
 
 asammdf = pytest.importorskip("asammdf")
 T = np.arange(600) / 100
@@ -126,7 +126,7 @@ def test_a_state_named_among_numbers_is_nan(tmp_path):
     log = opened(tmp_path, signal("v", RAW, SLOW, conversion=conversion))
     assert [one.name for one in log.listed()] == ["v"]
     expected = np.where(RAW == 89, np.nan, RAW * 0.5 + 1.0)
-    assert np.array_equal(log.read(["v"])[0].values, expected, equal_nan=True)
+    assert np.array_equal(channel_of(log, "v").values, expected, equal_nan=True)
 
 
 def test_samples_that_the_logger_marked_invalid_are_nan(tmp_path):

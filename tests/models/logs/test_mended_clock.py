@@ -9,6 +9,7 @@ from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.logs.memory import open_arrays
 from models.logs.stamps import PAUSE
+from tests.models.logs.conftest import channel_of
 from tests.models.logs.drive_in_every_format import write
 
 N = 300
@@ -45,7 +46,7 @@ def test_the_samples_are_those_of_the_right_log(format, kind, tmp_path, drive):
         log, names = as_arrays(t, columns, rows), list(columns)
     else:
         written = write(format, tmp_path, t[rows], {k: v[rows] for k, v in columns.items()})
-        log, names = open_log(written.path, written.dbc, mend=True), list(written.names.values())
+        log, names = open_log(written.path, written.dbc, mend=True), written.channels
         with pytest.raises(RecordingError, match=r"must increase.*--mend-clock"):
             open_log(written.path, written.dbc).read(names)
     channels = log.read(names)
@@ -60,7 +61,7 @@ def test_what_follows_where_the_clock_starts_again_is_put_after_a_gap(drive):
     t, columns = drive
     pieces = [EVERY, EVERY[:200], EVERY[:250]]
     log = as_arrays(t, columns, np.concatenate(pieces))
-    channel = log.read(["r"])[0]
+    channel = channel_of(log, "r")
     np.testing.assert_array_equal(channel.values, columns["r"][np.concatenate(pieces)])
     ends = np.cumsum([len(piece) for piece in pieces])
     for before, after in pairwise(np.split(channel.t, ends[:-1])):
@@ -73,11 +74,11 @@ def test_runs_are_not_mixed_and_a_sample_astray_goes_to_its_place(drive):
     t, columns = drive
     late = np.concatenate([EVERY[:200], EVERY[90:]])  # as late as that no clock begins
     log = as_arrays(t, columns, late)
-    np.testing.assert_array_equal(log.read(["r"])[0].values, columns["r"][late])
+    np.testing.assert_array_equal(channel_of(log, "r").values, columns["r"][late])
     log = as_arrays(t, columns, np.concatenate([EVERY[:20], EVERY[21:], [20]]))
-    np.testing.assert_array_equal(log.read(["r"])[0].values, columns["r"])
+    np.testing.assert_array_equal(channel_of(log, "r").values, columns["r"])
     mixed = np.random.default_rng(7).permutation(N)
-    np.testing.assert_array_equal(as_arrays(t, columns, mixed).read(["r"])[0].t, t)
+    np.testing.assert_array_equal(channel_of(as_arrays(t, columns, mixed), "r").t, t)
 
 
 def test_a_clock_of_several_that_starts_again_is_refused_all_the_same(tmp_path, drive):
@@ -86,7 +87,7 @@ def test_a_clock_of_several_that_starts_again_is_refused_all_the_same(tmp_path, 
     written = write("MDF4", tmp_path, t[rows], {k: v[rows] for k, v in columns.items()})
     log = open_log(written.path, mend=True)
     with pytest.raises(RecordingError, match="the clock starts again beside others: cut"):
-        log.read(list(written.names.values()))
+        log.read(written.channels)
 
 
 @pytest.mark.parametrize(
@@ -103,5 +104,5 @@ def test_stamps_that_rest_throughout_are_refused_all_the_same(drive, power, each
 def test_a_log_that_is_right_is_left_alone(drive):
     t, columns = drive
     log = as_arrays(t, columns, EVERY)
-    np.testing.assert_array_equal(log.read(["r"])[0].t, t)
+    np.testing.assert_array_equal(channel_of(log, "r").t, t)
     assert not log.notes

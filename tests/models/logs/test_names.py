@@ -81,9 +81,13 @@ LWI_VZ_Lenkradwinkel, ESP_VZ_Gierrate, yaw_rate_sign
 """)
 
 
-@pytest.mark.parametrize(
-    ("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in names_of(all_)]
-)
+def each_of(called):
+    """Run a test for every name with its signal."""
+    told = [(s, n) for s, some in called.items() for n in names_of(some)]
+    return pytest.mark.parametrize(("signal", "name"), told)
+
+
+@each_of(CALLED)
 def test_a_name_of_a_logger_is_that_signal_before_any_other(signal, name):
     found = {one: _name_confidence(one, name) for one in _RULES}
     assert found[signal] >= SURE
@@ -457,9 +461,7 @@ PUBLIC = {  # names apart by commas
 UNIT = {"v_x": "m/s", "r": "deg/s", "delta_f": "deg", "a_y": "m/s^2", "a_x": "m/s^2"}
 
 
-@pytest.mark.parametrize(
-    ("signal", "name"), [(s, n) for s, all_ in PUBLIC.items() for n in names_of(all_)]
-)
+@each_of(PUBLIC)
 def test_names_of_public_logs_are_proposed(signal, name):
     unit = unit_in_name(name) or UNIT[signal]
     found = proposed((name, unit, 20.0 * WAVE))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from models.logs.door import open_log
+from tests.models.logs.conftest import channel_of
 
 
 def at(rate, begin=0.0, lasts=4.0):
@@ -52,7 +53,7 @@ def test_behind_a_time_that_repeats_the_first_stands_what_has_the_first(tmp_path
 def test_channels_that_began_apart_stay_apart(tmp_path):
     (t_1, v_1), (t_2, v_2) = at(100), at(100, begin=2.0)
     log = open_log(written(tmp_path / "log.csv", time_1=t_1, v=v_1, time_2=t_2, w=v_2))
-    assert log.read(["w"])[0].t[0] == 2.0
+    assert channel_of(log, "w").t[0] == 2.0
 
 
 @pytest.mark.parametrize("other", ["gps_time", "time_2"])
@@ -60,7 +61,7 @@ def test_another_time_of_the_same_rows_is_no_clock_of_its_own(tmp_path, other):
     (t, v), late = at(100), 3.2 if other == "gps_time" else 0.0
     log = open_log(written(tmp_path / "log.csv", **{"time": t, "v": v, other: t + late, "w": v}))
     assert [one.name for one in log.listed()] == ["v", other, "w"]
-    np.testing.assert_array_equal(log.read(["w"])[0].t, t)
+    np.testing.assert_array_equal(channel_of(log, "w").t, t)
     assert not log.notes
 
 
@@ -68,4 +69,4 @@ def test_a_time_that_rests_is_that_of_a_slower_sensor_of_the_same_rows(tmp_path)
     t, v = at(100)
     rests = np.round(np.floor(10.0 * t) / 10.0, 6)
     log = open_log(written(tmp_path / "log.csv", time=t, v=v, gps_time=rests, w=v))
-    np.testing.assert_array_equal(log.read(["w"])[0].t, t)
+    np.testing.assert_array_equal(channel_of(log, "w").t, t)

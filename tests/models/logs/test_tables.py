@@ -2,7 +2,6 @@
 
 import errno
 import random
-import subprocess
 import sys
 from dataclasses import replace
 from functools import partial
@@ -20,6 +19,7 @@ from models.logs.foreign import one_line
 from models.logs.growing import Growing
 from models.logs.log import RecordingError
 from models.logs.table import Kind, TableLog
+from tests.models.logs.conftest import channel_of, ran
 from tests.models.logs.drive_in_every_format import write
 from tests.models.logs.loggers import DIALECTS, DT, drive, plain
 
@@ -107,9 +107,8 @@ for log in (TableLog(table=replace(text.table, arrow=True)), parquet):
     log.read([one.name for one in log.listed()])
 print("pyarrow" in sys.modules, "pandas" in sys.modules)
 """
-    paths = [str(tmp_path / "log.csv"), str(tmp_path / "log.parquet")]
-    ran = subprocess.run([sys.executable, "-c", script, *paths], capture_output=True, text=True)
-    assert ran.stdout == "True False\n", ran.stderr
+    told = ran(script, tmp_path / "log.csv", tmp_path / "log.parquet")
+    assert told.stdout == "True False\n", told.stderr
 
 
 def test_a_column_of_parquet_that_stands_twice_is_listed_as_in_a_text(tmp_path):
@@ -123,7 +122,7 @@ def test_a_column_of_parquet_that_stands_twice_is_listed_as_in_a_text(tmp_path):
         ("w", 100),
         ("v (2)", 50),
     ]
-    assert np.array_equal(log.read(["w"])[0].values, t)
+    assert np.array_equal(channel_of(log, "w").values, t)
 
 
 @pytest.mark.parametrize("categories", [False, True])
@@ -241,20 +240,12 @@ print(sizes[1] - sizes[0])
                 file.writelines(
                     f"{0.001 * (k + j):.3f},20.125,0.001,0.002,0.003\n" for j in range(1000)
                 )
-        paths.append(str(path))
-    grown = {
-        in_memory: float(
-            subprocess.run(
-                [sys.executable, "-c", script, str(in_memory), *paths],
-                capture_output=True,
-                text=True,
-                check=True,
-            ).stdout
-        )
-        for in_memory in (1 << 16, 1 << 30)
-    }
-    assert grown[1 << 16] < 12.0  # [MB]; six columns of 600 000 numbers are 29
-    assert grown[1 << 30] > 20.0, "the alarm rings where all is held in memory"
+        paths.append(path)
+    little, all_ = (
+        float(ran(script, in_memory, *paths).stdout) for in_memory in (1 << 16, 1 << 30)
+    )
+    assert little < 12.0  # [MB]; six columns of 600 000 numbers are 29
+    assert all_ > 20.0, "the alarm rings where all is held in memory"
 
 
 def test_parquet_bears_units_and_times_of_the_calendar(tmp_path):
@@ -292,7 +283,7 @@ def test_parquet_knows_durations(tmp_path, unit):
     t = pyarrow.array(whole, pyarrow.duration(unit))
     pyarrow.parquet.write_table(pyarrow.table({"time": t, "v": np.arange(60.0)}), path)
     expected = np.arange(60.0) * (1.0 if unit == "s" else 0.01)
-    np.testing.assert_allclose(open_log(path).read(["v"])[0].t, expected, atol=1e-12)
+    np.testing.assert_allclose(channel_of(open_log(path), "v").t, expected, atol=1e-12)
 
 
 def test_no_thread_of_pyarrow_is_left_with_bytes_of_pythons(tmp_path):

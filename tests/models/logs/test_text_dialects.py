@@ -11,6 +11,7 @@ from models.logs import preamble
 from models.logs.door import open_log
 from models.logs.log import RecordingError
 from models.recordings import read_recording
+from tests.models.logs.conftest import channel_of, refusal
 from tests.models.logs.loggers import DIALECTS, DT, SPEEDS, drive, plain, stamped, table, units_row
 
 
@@ -20,21 +21,17 @@ def written(tmp_path, data, name="log.csv"):
     return path
 
 
-def opened(tmp_path, *data):
-    return open_log(written(tmp_path, *data))
+def opened(tmp_path, data, rows=(), **how):
+    """The log of a text, or of a header and rows."""
+    return open_log(written(tmp_path, "\n".join([data, *rows]) if rows else data, **how))
 
 
-def refusal(tmp_path, data, channels=None):
-    """The one line that a text is refused with, when its first channel or those named are read."""
+def refused(tmp_path, data):
+    """The one line that a text is refused with, without its path."""
     path = written(tmp_path, data)
-    with pytest.raises(RecordingError) as caught:
-        log = open_log(path)
-        log.read(channels if channels is not None else [one.name for one in log.listed()])
-    message = str(caught.value)
-    assert "\n" not in message
+    message = refusal(path).removeprefix(f"{path}: ")
     assert len(message) < 400
-    assert message.startswith(str(path))
-    return message.removeprefix(f"{path}: ")
+    return message
 
 
 @pytest.mark.parametrize("packed", [False, True])
@@ -80,8 +77,7 @@ def test_units_stand_in_names(tmp_path, name, unit):
 
 def test_names_of_signals_are_no_units(tmp_path):
     names = ("t", "v_x", "r", "delta_f", "a_y")
-    rows = [",".join(names), *(f"{DT * k:.2f},1,2,3,4" for k in range(20))]
-    log = opened(tmp_path, "\n".join(rows))
+    log = opened(tmp_path, ",".join(names), [f"{DT * k:.2f},1,2,3,4" for k in range(20)])
     assert [(one.name, one.unit) for one in log.listed()] == [(name, "") for name in names[1:]]
 
 
@@ -89,23 +85,24 @@ def test_channels_are_told_apart_that_bear_one_name(tmp_path):
     log = opened(tmp_path, plain().replace("vy [m/s]", "Speed [km/h]"))
     names = [one.name for one in log.listed()]
     assert names[:2] == ["Speed [km/h]", "Speed [km/h] (2)"]
-    np.testing.assert_array_equal(log.read([names[1]])[0].values, drive().lateral)
+    np.testing.assert_array_equal(channel_of(log, names[1]).values, drive().lateral)
 
 
 def test_words_among_numbers_are_no_channel_and_do_not_disturb(tmp_path):
     lines = plain().splitlines()
-    text = "\n".join([f"Note,{lines[0]},run", *(f'"a, b",{one},lap 1' for one in lines[1:])])
-    log = opened(tmp_path, text)
+    rows = [f'"a, b",{one},lap 1' for one in lines[1:]]
+    log = opened(tmp_path, f"Note,{lines[0]},run", rows)
     assert next(one.name for one in log.listed()) == "Speed [km/h]"
     assert "Note" not in [one.name for one in log.listed()]
     assert log.runs() == ("lap 1",)
-    assert "Note must be numeric, line 2 has 'a, b'" in refusal(tmp_path, text, channels=["Note"])
+    with pytest.raises(RecordingError, match="Note must be numeric, line 2 has 'a, b'"):
+        log.read(["Note"])
 
 
 def test_one_run_of_several_is_read_alone(tmp_path):
     lines = plain().splitlines()
     rows = [f"{one},{'a' if k < 50 else 'b'}" for k, one in enumerate(lines[1:])]
-    log = opened(tmp_path, "\n".join([lines[0] + ",run", *rows]))
+    log = opened(tmp_path, lines[0] + ",run", rows)
     assert log.runs() == ("a", "b")
     assert [one.samples for one in log.listed()] == [120] * 4
     assert [one.rate for one in log.listed()] == pytest.approx([100.0] * 4)
@@ -117,9 +114,9 @@ def test_one_run_of_several_is_read_alone(tmp_path):
 
 def test_a_slow_channel_in_a_fast_table_has_its_own_rate(tmp_path):
     rows = [f"{DT * k:.2f},{k},{k if k % 10 == 0 else ''}" for k in range(200)]
-    log = opened(tmp_path, "\n".join(["t,fast,slow", *rows]))
+    log = opened(tmp_path, "t,fast,slow", rows)
     assert [one.rate for one in log.listed()] == pytest.approx([100.0, 10.0])
-    slow = log.read(["slow"])[0].values
+    slow = channel_of(log, "slow").values
     assert np.count_nonzero(np.isfinite(slow)) == 20
 
 
@@ -127,7 +124,7 @@ def test_a_slow_channel_in_a_fast_table_has_its_own_rate(tmp_path):
 def test_a_missing_value_is_a_missing_value_however_it_is_written(tmp_path, word):
     lines = plain().splitlines()
     lines[60] = lines[60].replace(lines[60].split(",")[1], word)
-    values = opened(tmp_path, "\n".join(lines)).read(["Speed [km/h]"])[0].values
+    values = channel_of(opened(tmp_path, "\n".join(lines)), "Speed [km/h]").values
     assert np.flatnonzero(np.isnan(values)).tolist() == [59]
 
 
@@ -149,13 +146,13 @@ def test_the_header_once_more_and_comments_in_between_are_no_rows(tmp_path):
 def test_thousands_are_understood(tmp_path, rows, delimiter):
     lines = [delimiter.join(["t", "F"])]
     lines += [delimiter.join([f"{k}", rows[k % 3]]) for k in range(30)]
-    values = opened(tmp_path, "\n".join(lines)).read(["F"])[0].values
+    values = channel_of(opened(tmp_path, "\n".join(lines)), "F").values
     np.testing.assert_array_equal(values[:3], [1234.5, 12345.25, -1234567.0])
 
 
 def test_the_clock_is_found_by_what_it_does_where_no_name_tells(tmp_path):
     rows = [f"{k % 7},{DT * k:.2f},{k}" for k in range(60)]
-    log = opened(tmp_path, "\n".join(["a,b,c", *rows]))
+    log = opened(tmp_path, "a,b,c", rows)
     assert [one.name for one in log.listed()] == ["a", "c"]
     assert log.dialect[-1] == (
         "time is 'b' in s, as it rises evenly (likely), a unit that fits its steps (likely)"
@@ -164,9 +161,9 @@ def test_the_clock_is_found_by_what_it_does_where_no_name_tells(tmp_path):
 
 def test_a_clock_that_is_told_is_taken(tmp_path):
     rows = [f"{k % 7},{10 * k},{DT * k:.2f}" for k in range(60)]
-    log = opened(tmp_path, "\n".join(["a,Time,mine", *rows]))
+    log = opened(tmp_path, "a,Time,mine", rows)
     told = replace(log, clock_name="mine")
-    np.testing.assert_array_equal(told.read(["a"])[0].t, log.read(["a"])[0].t)
+    np.testing.assert_array_equal(channel_of(told, "a").t, channel_of(log, "a").t)
     assert [one.name for one in told.listed()] == ["a", "Time"]
     with pytest.raises(RecordingError, match="there is no channel 'b'"):
         replace(log, clock_name="b").listed()
@@ -183,8 +180,8 @@ def test_a_clock_that_is_told_is_taken(tmp_path):
 def test_rounded_stamps_are_put_on_the_even_clock_and_it_is_said(tmp_path, tick, dt, how):
     true = dt * np.arange(4000)
     rows = [f"{tick * stamp:.3f},1" for stamp in how(np.round(true / tick, 6))]
-    log = opened(tmp_path, "\n".join(["t,v", *rows]))
-    t = log.read(["v"])[0].t
+    log = opened(tmp_path, "t,v", rows)
+    t = channel_of(log, "v").t
     assert np.ptp(t - true) < 1e-3 * dt
     assert np.diff(t) == pytest.approx(np.full(3999, dt), rel=1e-4)
     (note,) = log.notes
@@ -195,7 +192,7 @@ def test_rounded_stamps_are_put_on_the_even_clock_and_it_is_said(tmp_path, tick,
 def test_samples_that_are_lost_among_rounded_stamps_stay_lost(tmp_path):
     true = 0.01 * np.delete(np.arange(4000), slice(1200, 1277))
     rows = [f"{stamp:.1f},1" for stamp in np.floor(np.round(true * 10, 6)) / 10]
-    t = opened(tmp_path, "\n".join(["t,v", *rows])).read(["v"])[0].t
+    t = channel_of(opened(tmp_path, "t,v", rows), "v").t
     assert np.abs(t - true).max() < 0.1
     assert np.count_nonzero(np.diff(t) > 0.011) == 1
     np.testing.assert_allclose(np.diff(t)[:1000], 0.01, rtol=1e-6)
@@ -208,8 +205,8 @@ def test_a_lost_sample_of_an_even_clock_moves_no_stamp(tmp_path, dt):
 
 def require_kept(tmp_path, stamps):
     t = np.round(stamps, 3)
-    log = opened(tmp_path, "\n".join(["t,v", *(f"{one:.3f},1" for one in t)]))
-    np.testing.assert_array_equal(log.read(["v"])[0].t, t)
+    log = opened(tmp_path, "t,v", [f"{one:.3f},1" for one in t])
+    np.testing.assert_array_equal(channel_of(log, "v").t, t)
     assert log.notes == ()
 
 
@@ -282,7 +279,7 @@ WRONG = {
         "Time must be a time, line 52 has '2023-05-20T10:00:xx'",
     ),
     "a quote that never ends": (
-        plain() + '"' + table(zip(*drive(), strict=True)) * 3,
+        plain() + '"' + table() * 3,
         "has 1 cells, the header has 5",
     ),
     "channels in blocks of their own": (
@@ -301,28 +298,25 @@ WRONG = {
 @pytest.mark.parametrize("wrong", WRONG)
 def test_a_wrong_file_is_refused_in_one_line_that_says_where_and_why(tmp_path, wrong):
     data, said = WRONG[wrong]
-    assert said in refusal(tmp_path, data)
+    assert said in refused(tmp_path, data)
 
 
 def test_a_header_of_megabytes_or_of_a_million_columns_is_refused(tmp_path):
-    assert "line 1 is longer than" in refusal(tmp_path, "a" * 10_000_000)
-    assert "line 1 is longer than" in refusal(tmp_path, ",".join(map(str, range(1_000_000))))
+    assert "line 1 is longer than" in refused(tmp_path, "a" * 10_000_000)
+    assert "line 1 is longer than" in refused(tmp_path, ",".join(map(str, range(1_000_000))))
     many = ",".join(f"c{k}" for k in range(20_000)) + "\n" + ",".join("1" for _ in range(20_000))
-    assert "columns must be at most 10000, here are 20000" in refusal(tmp_path, many)
+    assert "columns must be at most 10000, here are 20000" in refused(tmp_path, many)
 
 
 def test_a_line_without_end_is_refused_before_it_fills_memory(tmp_path):
     endless = plain() + "1" * 12_000_000
-    assert "line 122 is longer than 8388608 bytes" in refusal(tmp_path, endless)
+    assert "line 122 is longer than 8388608 bytes" in refused(tmp_path, endless)
 
 
 def test_folders_pipes_and_nothing_are_refused(tmp_path):
-    with pytest.raises(RecordingError, match="there is no such file"):
-        open_log(tmp_path / "nowhere.csv")
-    with pytest.raises(RecordingError, match="it is a folder"):
-        open_log(tmp_path)
-    with pytest.raises(RecordingError, match="a device, pipe or socket"):
-        open_log("/dev/zero")
+    assert "there is no such file" in refusal(tmp_path / "nowhere.csv")
+    assert "it is a folder" in refusal(tmp_path)
+    assert "a device, pipe or socket" in refusal("/dev/zero")
 
 
 @pytest.mark.parametrize("unit", ["sec", "s", "msec", "Milliseconds", "usec", "µs"])
@@ -390,7 +384,7 @@ sats time velocity {names}
 def test_units_of_a_vbo_belong_to_its_last_columns(tmp_path, names, units, told):
     titles = names.replace(" ", "\n")
     text = VBO.format(names=names, units=units, titles=titles)
-    listed = {one.name: one.unit for one in opened(tmp_path, text, "log.vbo").listed()}
+    listed = {one.name: one.unit for one in opened(tmp_path, text, name="log.vbo").listed()}
     assert tuple(listed[name] for name in names.split()) == told
     assert listed["velocity"] == "kmh"
 
@@ -398,7 +392,7 @@ def test_units_of_a_vbo_belong_to_its_last_columns(tmp_path, names, units, told)
 def test_a_cell_that_describes_a_channel_is_its_name_and_unit(tmp_path):
     head = '"Interval"|"ms"|0|0|1,"Speed"|"mph"|0.0|150.0|10,"Yaw"|"Deg/Sec"|-120|120|25'
     rows = "".join(f"{40 * k},{40.0 + k if k % 2 else ''},{0.5 * k}\n" for k in range(20))
-    log = opened(tmp_path, f"{head}\n{rows}", "run.log")
+    log = opened(tmp_path, f"{head}\n{rows}", name="run.log")
     assert [(one.name, one.unit) for one in log.listed()] == [("Speed", "mph"), ("Yaw", "Deg/Sec")]
     speed, yaw = log.read(["Speed", "Yaw"])
     assert np.isfinite(speed.values).sum() == 10
@@ -420,7 +414,7 @@ def test_a_table_of_labview_has_units_in_a_label_and_a_comment_that_no_row_has(t
         "***End_of_Header***\t\t\t\nX_Value\tSpeed\tYaw Rate\tComment\n"
     )
     rows = "".join(f"{0.01 * k:.2f}\t{70 + k % 5}.5\t{k % 7}.25\n" for k in range(99))
-    log = opened(tmp_path, head + rows, "run.lvm.txt")
+    log = opened(tmp_path, head + rows, name="run.lvm.txt")
     assert [(one.name, one.unit, one.samples) for one in log.listed()] == [
         ("Speed", "km/h", 99),
         ("Yaw Rate", "deg/s", 99),

@@ -10,7 +10,7 @@ from models.logs.door import open_log
 from models.logs.names import _RULES, SURE, _name_confidence, propose
 from models.logs.signals import QUANTITIES, WHEELS
 from models.logs.spelling import unit_in_name
-from tests.models.logs.test_names import WAVE, names_of, proposed
+from tests.models.logs.test_names import WAVE, each_of, names_of, proposed
 
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 CALLED = {  # names apart by commas
@@ -31,9 +31,7 @@ Ground Speed, yaw rate, encoder ticks
 """)
 
 
-@pytest.mark.parametrize(
-    ("signal", "name"), [(s, n) for s, all_ in CALLED.items() for n in names_of(all_)]
-)
+@each_of(CALLED)
 def test_a_name_of_a_logger_is_that_wheel_and_nothing_else(signal, name):
     found = {one: _name_confidence(one, name) for one in (*WHEELS, *_RULES)}
     assert found[signal] >= SURE

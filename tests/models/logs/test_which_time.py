@@ -10,6 +10,7 @@ from models.logs.log import RecordingError
 from models.logs.stamps import nanoseconds
 from models.recordings import LogMap, read_recording
 from models.recordings.reader import with_columns
+from tests.models.logs.conftest import channel_of, refusal
 
 N = 300
 T = 0.02 * np.arange(N)
@@ -219,23 +220,20 @@ def test_arrays_without_a_time_have_a_rate(tmp_path, ending, told):
     rate = 50.0 if told == "user" else 0.0
     steps(open_log(path, rate=rate))
     if told == "user":
-        with pytest.raises(RecordingError, match="there is no vector t or time"):
-            open_log(path)
+        assert "there is no vector t or time" in refusal(path)
 
 
 def test_arrays_of_numpy_are_read_with_their_time_and_never_run(tmp_path):
     np.savez_compressed(tmp_path / "a.npz", t=T, **SIGNALS, words=np.array("car"))
     log = open_log(tmp_path / "a.npz")
     assert [one.name for one in log.listed()] == list(SIGNALS) and log.format == "NumPy"
-    np.testing.assert_array_equal(log.read(["vy"])[0].values, SIGNALS["vy"])
+    np.testing.assert_array_equal(channel_of(log, "vy").values, SIGNALS["vy"])
     assert read_recording(tmp_path / "a.npz").name == "a"
     table = np.rec.fromarrays([T, *SIGNALS.values()], names=["t", *SIGNALS])
     np.save(tmp_path / "b.npy", table)
     steps(open_log(tmp_path / "b.npy"))
     np.savez(tmp_path / "c.npz", t=T, x=np.array([{}] * N, dtype=object))
-    with pytest.raises(RecordingError, match="x \\(no numbers\\)"):
-        open_log(tmp_path / "c.npz")
+    assert "x (no numbers)" in refusal(tmp_path / "c.npz")
     whole = (tmp_path / "a.npz").read_bytes()
     (tmp_path / "d.npz").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(RecordingError):
-        open_log(tmp_path / "d.npz")
+    refusal(tmp_path / "d.npz")
