@@ -19,7 +19,7 @@ from identifier.estimate.latent import Learnt, accelerometer_off, latent_priors,
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes
 from identifier.estimate.posterior import Posterior, Reach, Segment
-from identifier.estimate.priors import SEDAN, Priors
+from identifier.estimate.priors import Priors
 from identifier.estimate.roads import Roads, with_roads
 from identifier.estimate.solve import (
     ENOUGH,
@@ -229,7 +229,7 @@ def _reach(
 ) -> Reach:
     """Return what drives reached, by the estimate of them."""
     found = Reach(segments=tuple(_segments(drives, roads)))
-    later = _LASTS * min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
+    later = _LASTS * min(vehicle.scale, 1.0)
     for i, one in enumerate(drives):
         on = one.counts
         if not on.any():
@@ -286,7 +286,7 @@ def _blocks(
     """Yield drives that last no longer together.   alone : whether each is of one recording."""
     group: list[Drive] = []
     length = 0.0
-    small = _COARSE * float(np.sqrt(vehicle.wheelbase / SEDAN)) < 1.0
+    small = _COARSE * vehicle.scale < 1.0
     fastest = FASTEST * (_COARSE if coarse and not small else 1.0)
     for recording in recordings:
         n = max(round(longest / recording.dt), 1)
