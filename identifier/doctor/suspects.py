@@ -28,7 +28,7 @@ _OPPOSITES = {  # of what a size says, where it is negative
     "too far back": "too far forward",
     "grow with speed, as by a downforce": "shrink with speed, as by a lift",
 }
-_POWERS: Mapping[str, float] = {"": 0.0, "length": 2.0, "speed": 1.0, "rate": -1.0}
+_POWERS: Mapping[str, float] = {"": 0.0, "length": 2.0, "speed": 1.0, "rate": -1.0}  # of the scale
 NOTES = ("center_of_gravity", "yaw_inertia", "downforce")  # of the car: never an alarm, never sure
 
 

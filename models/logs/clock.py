@@ -68,14 +68,16 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
     """Return a channel without the empty cells that a slower channel has in a table.
     cut : whether `holes` are left out too; else they stay, and are refused.
     """
-    kept = ~np.isnan(channel.values)
-    if kept.all() or not kept.any() or (not cut and holes(channel).size):
+    there = ~np.isnan(channel.values)
+    if not there.any() or (not cut and holes(channel).size):
         return channel
-    return _kept(channel, kept)
+    return kept(channel, there)
 
 
-def _kept(channel: Channel, kept: NDArray[np.bool_]) -> Channel:
-    t, values, rows = channel.t[kept], channel.values[kept], channel.rows[kept]
+def kept(channel: Channel, some: NDArray[np.bool_]) -> Channel:
+    if some.all():
+        return channel
+    t, values, rows = channel.t[some], channel.values[some], channel.rows[some]
     return replace(channel, t=t, values=values, rows=rows)
 
 
@@ -97,7 +99,7 @@ def without_codes(channel: Channel) -> tuple[Channel, str]:
     step = np.fmax.reduce(np.abs(np.diff(rest)), initial=0.0)
     codes = [one for one in ends if np.fmin.reduce(np.abs(rest - one)) > _FAR * step > 0.0]
     said = ", ".join(f"{one:.9g}" for one in codes)
-    return _kept(channel, ~np.isin(values, codes)) if codes else channel, said
+    return kept(channel, ~np.isin(values, codes)), said
 
 
 def _are_codes(numbers: Array) -> NDArray[np.bool_]:

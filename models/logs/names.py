@@ -21,7 +21,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.logs.axes import Triad, along_axes, ground, triads
-from models.logs.clock import without_codes
+from models.logs.clock import kept, without_codes
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import BETA, COLUMNS, POSE, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import unit_in_name, without_units
@@ -310,7 +310,8 @@ def propose(
             continue
         hand, least = _rank(ranked[0])[0], ranked[0].confidence - _APART
         equal = [one for one in ranked if one.confidence > least and _rank(one)[0] == hand]
-        equal.sort(key=lambda one: -_rate(seen[one.channel[0]]))
+        rates = {one: np.nan_to_num(typical_rate(seen[one.channel[0]].t)) for one in equal}
+        equal.sort(key=lambda one: -float(f"{rates[one]:.1g}"))  # but for jitter
         guesses[name] = equal[0]
         others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
         if others:
@@ -401,7 +402,7 @@ def _with_signs(
     def completed(guess: Guess) -> Guess:
         name = guess.channel[0]
         sign = signs.get(frozenset(_words_of(name)), "")
-        if not sign or name not in seen or np.nanmin(seen[name].values, initial=0.0) < 0.0:
+        if not sign or name not in seen or np.min(seen[name].values, initial=0.0) < 0.0:
             return guess
         return replace(_said(guess, f"its sign is in {sign!r}"), sign=sign)
 
@@ -467,30 +468,24 @@ def _are_one(name: str, one: Guess, other: Guess, seen: _Seen) -> bool:
     if len(set(names)) > 1:
         return False
     first, second = (seen[guess.channel[0]] for guess in (one, other))
-    good, there = np.isfinite(first.values), np.isfinite(second.values)
-    if not good.any() or not there.any():
+    if not first.t.size or not second.t.size:
         return False
     scales = [to_si(guess.unit, quantity_of(name, guess.unit), name) for guess in (one, other)]
-    here = scales[0] * first.values[good]
-    beside = scales[1] * np.interp(first.t[good], second.t[there], second.values[there])
+    here = scales[0] * first.values
+    beside = scales[1] * np.interp(first.t, second.t, second.values)
     return _root_mean_square(here - beside) <= _SAME * _root_mean_square(here)
 
 
-def _rate(channel: Channel) -> float:
-    """Return the samples per second [Hz], so roughly that jitter does not matter; 0 of too few."""
-    rate = typical_rate(channel.t)
-    return 0.0 if math.isnan(rate) else float(f"{rate:.1g}")
-
-
 def _seen(log: LogFile, names: list[str], run: str | None) -> dict[str, Channel]:
-    """Return channels by name; without those that cannot be read."""
+    """Return channels by name, of samples that have a value; without those that cannot be read."""
     runs = log.runs()
     chosen = run if run is not None or not runs else runs[0]
     if not names:
         return {}
     try:
         read = log.read(names, chosen)
-        return {name: without_codes(one)[0] for name, one in zip(names, read, strict=True)}
+        coded = (without_codes(one)[0] for one in read)
+        return {one.name: kept(one, np.isfinite(one.values)) for one in coded}
     except RecordingError:
         if len(names) == 1:
             return {}
@@ -588,13 +583,12 @@ def _looked(signal: str, guess: Guess, seen: _Seen) -> Guess:
         if name not in seen:
             return replace(guess, confidence=0.0)
         values = seen[name].values
-        finite = values[np.isfinite(values)]
-        finite = finite[:: max(1, finite.size // _LOOKED_AT)]
-        if not finite.size or (signal != "delta_r" and np.ptp(finite) == 0.0):
+        values = values[:: max(1, values.size // _LOOKED_AT)]
+        if not values.size or (signal != "delta_r" and np.ptp(values) == 0.0):
             left = guess.confidence * (STILL if guess.confidence < _STANDARD else 1.0)
             return replace(_said(guess, "it never changes"), confidence=left)
-        size = max(size, float(np.abs(finite).max()))
-        usual = max(usual, _usual(finite))
+        size = max(size, float(np.abs(values).max()))
+        usual = max(usual, _usual(values))
     if guess.confidence == _STANDARD or signal in WHEELS:
         return guess
     if not guess.unit:
@@ -709,11 +703,9 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: _Seen) -> Guess:
 
 
 def _usual(values: Array) -> float:
-    """Return how far the finite ones go from zero, but for spikes."""
-    finite = values[np.isfinite(values)]
-    return float(np.quantile(np.abs(finite), 1.0 - _SPIKES)) if finite.size else 0.0
+    """Return how far they go from zero, but for spikes."""
+    return float(np.quantile(np.abs(values), 1.0 - _SPIKES)) if values.size else 0.0
 
 
 def _root_mean_square(values: Array) -> float:
-    finite = values[np.isfinite(values)]
-    return math.sqrt(float(np.mean(np.square(finite)))) if finite.size else 0.0
+    return math.sqrt(float(np.mean(np.square(values)))) if values.size else 0.0

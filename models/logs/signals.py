@@ -124,20 +124,15 @@ class Signal:
         )
 
     def _value(self, parts: Sequence[Array], quantity: str) -> Array:
-        total: Array = parts[0] if len(parts) == 1 else np.sum(parts, axis=0)
-        if len(parts) > 1 and quantity != FORCE:
-            total = total / len(parts)
-        if self.factor != 1.0:
-            total = total * self.factor
-        if self.offset != 0.0:
-            total = total - self.offset
+        total = (np.sum if quantity == FORCE else np.mean)(parts, axis=0)
+        total = total * self.factor - self.offset
         if self.table:
             hand, road = np.array(self.table).T
             inside: Array = np.interp(total, hand, road)
             first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
             below, above = np.minimum(total - hand[0], 0.0), np.maximum(total - hand[-1], 0.0)
             return np.asarray(inside + first * below + last * above)
-        return total if self.ratio == 1.0 else total / self.ratio
+        return np.asarray(total / self.ratio)
 
 
 def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:
