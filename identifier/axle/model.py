@@ -259,9 +259,7 @@ class AxleModel(TireModel):
             model_error=None,  # of the road that taught
         )
 
-    @property
-    def lagged(self) -> bool:
-        return True
+    lagged = True
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
         at = curve_at_speed(alpha, v_x, self.W, self.ladder, self.vehicle)

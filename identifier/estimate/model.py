@@ -143,9 +143,7 @@ class FittedModel(TireModel):
             play=self["steering_play"],
         )
 
-    @property
-    def lagged(self) -> bool:
-        return True
+    lagged = True
 
     @property
     def give(self) -> Array:

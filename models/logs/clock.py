@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, blocks, filled, large
 from models.logs.can import CALENDAR
-from models.logs.log import Channel, RecordingError
-from models.logs.stamps import not_rising, since
+from models.logs.log import Channel
+from models.logs.stamps import since
 
 _GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
 _SLOWER = 0.4  # share of empty cells from which a channel is taken to be slower than its rows
@@ -136,12 +136,6 @@ def typical_step(t: Array) -> float:
     return float(np.mean(steps[middle]))
 
 
-def are_one_clock(raws: Sequence[Raw]) -> bool:
-    """Whether all signals are sampled at the same instants."""
-    first = raws[0].t
-    return all(raw.t is first or np.array_equal(raw.t, first) for raw in raws[1:])
-
-
 def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Segment]:
     """Return signals of several clocks on one, in the segments in which all of them are there.
 
@@ -219,9 +213,3 @@ def _sampled(raw: Raw, grid: Array, dt: float, interval: float) -> Array:
     goes_on = (last > 0) & (step <= _GAP_INTERVALS * interval) & (ahead > _ON_STEP * dt)
     share = np.minimum(ahead, step) / np.where(step > 0.0, step, 1.0)
     return np.where(goes_on, now + share * (now - raw.values[before]), now)
-
-
-def require_rising(label: str, raw: Raw) -> None:
-    wrong = np.flatnonzero(~(np.diff(raw.t) > 0.0))
-    if wrong.size:
-        raise RecordingError(f"{label}: t {not_rising(raw.t, raw.rows, raw.place)}")

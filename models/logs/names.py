@@ -189,9 +189,6 @@ class Proposal:
         kept = [name for name in QUANTITIES if self.is_sure(name)]
         if "v_y" in kept and BETA in kept:
             kept.remove(BETA)
-        forces = {"Fyf", "Fyr"}
-        if len(forces & set(kept)) == 1:
-            kept = [name for name in kept if name not in forces]
         return {
             name: Signal(channel=one.channel, unit=one.unit, sign=one.sign, factor=one.factor)
             for name in kept
@@ -320,9 +317,10 @@ def propose(
     return Proposal(guesses={**guesses, **pose}, rivals=rivals)
 
 
-_PLACE = re.compile(_TABLES["pose"]["place"])
-_ANGLE = re.compile(_TABLES["pose"]["angle"])
-_TURN = re.compile(_TABLES["pose"]["turn"])
+_FORMS = [
+    (re.compile(_TABLES["pose"][form]), quantity, mark)
+    for form, quantity, mark in (("place", LENGTH, ""), ("angle", ANGLE, "h"), ("turn", ANGLE, "q"))
+]
 _TURNED = {"h", "qy", "qw"}
 _NO_POSE = set(_TABLES["pose"]["never"].split())
 
@@ -333,7 +331,7 @@ def poses(headings: Sequence[Heading]) -> dict[str, dict[str, list[Heading]]]:
     for one in map(_with_given_unit, headings):
         words = "_".join(_words_of(without_units(one.name, one.unit)[0]))
         plausible = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
-        for form, wanted, mark in ((_PLACE, LENGTH, ""), (_ANGLE, ANGLE, "h"), (_TURN, ANGLE, "q")):
+        for form, wanted, mark in _FORMS:
             found = form.fullmatch(words)
             of = set((found["of"] or "").split("_")) if found else set()
             if found and wanted in plausible and not of & _NO_POSE:

@@ -12,11 +12,9 @@ from codegen.arrays import Array, filled
 from models.logs.clock import (
     Raw,
     Segment,
-    are_one_clock,
     gaps,
     holes,
     on_one_clock,
-    require_rising,
     typical_step,
     without_codes,
     without_empty,
@@ -34,6 +32,7 @@ from models.logs.signals import (
     signed,
 )
 from models.logs.spelling import without_unit
+from models.logs.stamps import not_rising
 from models.logs.units import PER_SECOND, is_given, to_si
 from models.recordings.choice import chosen_signals, column_of, has_wheels, missing_signals
 from models.recordings.map import AXES, CUT, LogMap
@@ -54,16 +53,6 @@ _SLOWEST_CHANNEL = 0.11  # [s]: longest typical interval of a channel, 10 Hz wit
 _FASTEST = 5e-4  # [s]: shortest step by which a unit of the time is guessed
 _SHORTEST = 1.0  # [s]: a segment of less teaches nothing, since learning waits half a second
 _LEAST_LOW_PASS = 0.01  # Hz: nothing of a drive passes, and the filter's numbers are still right
-
-_FIELDS = {
-    "Fyf": "axle_force",
-    "Fyr": "axle_force",
-    BETA: "delta_f",
-    "x": "t",
-    "y": "t",
-    "heading": "delta_f",
-    **dict.fromkeys(WHEELS, "v_x"),
-}
 
 
 class _Segments(NamedTuple):
@@ -104,7 +93,8 @@ def recording_of(
                 raise RecordingError(
                     f"{label}: there are {raw.t.size} rows, at least {MINIMUM_SAMPLES} needed"
                 )
-            require_rising(label, raw)
+            if not (np.diff(raw.t) > 0.0).all():
+                raise RecordingError(f"{label}: t {not_rising(raw.t, raw.rows, raw.place)}")
             require_often(label, raw.t, log.clock)
         return named, raws, said, _segments(label, named, raws, log_map, dt)
 
@@ -201,7 +191,7 @@ def _require_finite(label: str, name: str, channel: Channel) -> None:
 
 
 def _require_of_a_car(label: str, name: str, values: Array, channel: Channel) -> None:
-    most = LARGEST[_FIELDS.get(name, name)]
+    most = LARGEST[name]
     bad = np.flatnonzero(np.abs(values) > most)
     if bad.size:
         raise RecordingError(
@@ -231,8 +221,9 @@ def _segments(
             for name, signal in signals.items()
         }
 
-    if are_one_clock(every):
-        found, t = [], every[0].t
+    t = every[0].t
+    if all(raw.t is t or np.array_equal(raw.t, t) for raw in every):
+        found = []
         columns = combined({key: raw.values for key, raw in raws.items()})
         for begin, end in pairwise([0, *gaps(t, log_map.longest_gap).tolist(), t.size]):
             if end - begin > 1:
