@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from codegen.arrays import Array, one_thread
+from codegen.arrays import Array, one_thread, root_mean_square
 from identifier.estimate.day import days_of, long_segments, steering_zeros
 from identifier.estimate.drive import FASTEST, Drive, hardest
 from identifier.estimate.information import CHANGES, Information
@@ -182,7 +182,7 @@ def _missed(recordings: Sequence[Recording], model: FittedModel) -> float:
     for one in (part for whole in recordings for part in _alone(whole, model.vehicle)):
         drive = Drive.of(one, model.vehicle)
         v_x, r = drive.signals[drive.counts][:, [0, 2]].T
-        rms = float(np.sqrt(np.mean((v_x * r / GRAVITY) ** 2))) if v_x.size else 0.0
+        rms = root_mean_square(v_x * r / GRAVITY)
         if rms <= _FORCELESS:
             continue
         p = model.on(one).on(model.p)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
-from codegen.arrays import Array, one_thread
+from codegen.arrays import Array, one_thread, root_mean_square
 from identifier.estimate.day import steering_zeros
 from identifier.estimate.drive import hardest
 from identifier.estimate.nodes import JERKS, Nodes, earlier, low_passed
@@ -517,7 +517,7 @@ def learn_latent(
     apart = ((best.z - other[0])[:, 0] / v_x)[on]
     share = 1.0 / (1.0 + np.exp(min(other[2] - best.cost, 50.0)))
     alike = share > _ALIKE and bool(on.any())  # else one of them explains the drive far worse
-    parted = float(np.sqrt(np.mean(apart**2))) if alike else 0.0
+    parted = root_mean_square(apart) if alike else 0.0
     index = problem.index[problem.index < P]
     moved = problem.index < P
     away = (other[1] - best.p)[index]

@@ -145,7 +145,7 @@ class InertialIdentifier(Method):
 
     @classmethod
     def beginning_with(
-        cls, model: TireModel | None, vehicle: Vehicle, *, dt: float = 0.01
+        cls, model: TireModel | None, vehicle: Vehicle, *, dt: float
     ) -> "tuple[InertialIdentifier, TireModel | None]":
         """Return the design for a car with these tires, and what its run begins with.
         model : a fit is held, what an axle identifier learnt is gone on from; others help nothing.

@@ -10,16 +10,14 @@ that are equal none is taken.
 import itertools
 import math
 import re
-import tomllib
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from codegen.arrays import Array
+from codegen.arrays import Array, root_mean_square
 from models.logs.axes import Triad, along_axes, ground, triads
 from models.logs.clock import kept, without_codes
 from models.logs.log import Channel, Heading, LogFile, RecordingError
@@ -37,6 +35,7 @@ from models.logs.units import (
     are_same,
     is_given,
     quantities,
+    rows_of,
     to_si,
     unit_of_range,
 )
@@ -78,7 +77,7 @@ class _Rule(NamedTuple):
     words: tuple[str, ...]
 
 
-_TABLES = tomllib.loads(Path(__file__).with_name("names.toml").read_text(encoding="utf-8"))
+_TABLES = rows_of("names.toml")
 _WORDS = {name: some.replace("|", " ").split() for name, some in _TABLES["words"].items()}
 
 
@@ -241,10 +240,11 @@ def _name_confidence(signal: str, name: str) -> float:
     while name.startswith("/") and len(listed) > 1 and listed[-1] in _GENERIC:
         listed = listed[:-1]
     rule, words = _RULES[signal], _with_parts(listed)
-    ends = ["".join(listed[k:]) for k in range(len(listed))]
+    stems = [listed]
     while len(listed) > 1 and listed[-1] in _SOURCES:
         listed = listed[:-1]
-        ends += ["".join(listed[k:]) for k in range(len(listed))]
+        stems.append(listed)
+    ends = ["".join(one[k:]) for one in stems for k in range(len(one))]
     if rule.known & {ends[0], "".join(listed)}:
         return _KNOWN
     if _with_parts(_words_of(_field(name))).union(ends) & rule.never:
@@ -471,7 +471,7 @@ def _are_one(name: str, one: Guess, other: Guess, seen: _Seen) -> bool:
     scales = [to_si(guess.unit, quantity_of(name, guess.unit), name) for guess in (one, other)]
     here = scales[0] * first.values
     beside = scales[1] * np.interp(first.t, second.t, second.values)
-    return _root_mean_square(here - beside) <= _SAME * _root_mean_square(here)
+    return root_mean_square(here - beside) <= _SAME * root_mean_square(here)
 
 
 def _seen(log: LogFile, names: list[str], run: str | None) -> dict[str, Channel]:
@@ -663,7 +663,7 @@ def _levered(guess: Guess, best: Mapping[str, Guess], seen: _Seen) -> Guess:
     turning = "a_y" if "a_y" in best and _is_given(best["a_y"]) else "r"
     there = {"v_x": best["v_x"], turning: best[turning], "delta_f": guess}
     v, turn, delta = (
-        _root_mean_square(seen[one.channel[0]].values) * to_si(one.unit, QUANTITIES[name], name)
+        root_mean_square(seen[one.channel[0]].values) * to_si(one.unit, QUANTITIES[name], name)
         for name, one in there.items()
     )
     turn = turn if turning == "r" else turn / max(v, 1e-9)
@@ -680,7 +680,7 @@ def _is_given(guess: Guess) -> bool:
 def _in_turning(name: str, there: Mapping[str, Guess], seen: _Seen) -> Guess:
     """Return the guess of one of them in the unit that v_x, r and a_y together have."""
     guess = there[name]
-    sizes = {one: _root_mean_square(seen[there[one].channel[0]].values) for one in there}
+    sizes = {one: root_mean_square(seen[there[one].channel[0]].values) for one in there}
     if len(there) < 3 or not all(sizes.values()):
         usual = _usual(seen[guess.channel[0]].values)
         return replace(guess, unit=unit_of_range(QUANTITIES[name], usual))
@@ -703,7 +703,3 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: _Seen) -> Guess:
 def _usual(values: Array) -> float:
     """Return how far they go from zero, but for spikes."""
     return float(np.quantile(np.abs(values), 1.0 - _SPIKES)) if values.size else 0.0
-
-
-def _root_mean_square(values: Array) -> float:
-    return math.sqrt(float(np.mean(np.square(values)))) if values.size else 0.0

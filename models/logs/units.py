@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from codegen.escape import displayed
 from models.logs.log import RecordingError
@@ -20,7 +21,13 @@ SI = {
     LENGTH: "m",
 }  # fmt: skip
 
-TABLES = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
+
+def rows_of(name: str) -> dict[str, Any]:
+    """Return the tables of a file beside this one."""
+    return tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+
+
+TABLES = rows_of("units.toml")
 # By quantity, spelling -> factor to SI; spellings as `_plain` leaves them, in small letters.
 FACTORS: Mapping[str, Mapping[str, float]] = {
     quantity: {spelling: factor for some, factor in rows for spelling in some.split()}

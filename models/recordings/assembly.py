@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from numbers import Real
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,7 @@ from models.recordings.choice import chosen_signals, column_of, has_wheels, miss
 from models.recordings.map import AXES, CUT, LogMap
 from models.recordings.pose import with_pose
 from models.recordings.record import (
+    CHANNELS,
     LARGEST,
     MINIMUM_SAMPLES,
     Recording,
@@ -79,7 +80,10 @@ def recording_of(
     signals, learnt = reading.signals, ""
     if has_speed(signals):
         if has_wheels(signals):
-            learnt = _scale_note(log, signals, log_map, run)
+            try:
+                learnt = scale_text(wheel_scales(log, signals, log_map, run))
+            except RecordingError as error:
+                learnt = f"the wheels are not used: {error}"
         signals = {name: one for name, one in signals.items() if name not in WHEELS}
     spared = ""
 
@@ -305,20 +309,11 @@ def _recording(name: str, segment: Segment, log_map: LogMap, dt: float) -> Recor
         v_x, beta = signals["v_x"], signals[BETA]
         signals["v_y"] = filled(t.size, lambda part: v_x[part] * np.tan(beta[part]))
     force = side_by_side(signals["Fyf"], signals["Fyr"]) if "Fyf" in signals else None
+    signals.setdefault("delta_r", np.zeros(t.size))
     for values in (t, *signals.values()):  # kept as they are, not copied
         values.setflags(write=False)
-    return Recording(
-        name=name,
-        t=t,
-        v_x=signals["v_x"],
-        v_y=signals.get("v_y"),
-        r=signals["r"],
-        delta_f=signals["delta_f"],
-        delta_r=signals.get("delta_r", np.zeros(t.size)),
-        a_y=signals.get("a_y"),
-        a_x=signals.get("a_x"),
-        axle_force=force,
-    )
+    given: dict[str, Any] = {key: signals[key] for key in (*CHANNELS, "a_x") if key in signals}
+    return Recording(name=name, t=t, axle_force=force, **given)
 
 
 def wheel_scales(
@@ -330,16 +325,6 @@ def wheel_scales(
     of_wheels = {name: signals[name] for name in ("v_x", "r", *WHEELS) if name in signals}
     parts = _channels(log, str(log.path), of_wheels, log_map, run)
     return identified_scales(parts, of_wheels, wheel_units(log.headings(), of_wheels))
-
-
-def _scale_note(
-    log: LogFile, signals: Mapping[str, Signal], log_map: LogMap, run: str | None
-) -> str:
-    """Return what v_x tells of the wheels, which nothing else is read of."""
-    try:
-        return scale_text(wheel_scales(log, signals, log_map, run))
-    except RecordingError as error:
-        return f"the wheels are not used: {error}"
 
 
 def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:
