@@ -193,7 +193,9 @@ def root(P: Array) -> Array:
     return half
 
 
-def declared_spread(force: Array, left: Array, before: Array, stretch: Array | float) -> BandSpread:
+def declared_spread(
+    force: Array, left: Array, before: Array, stretch: Array | float = 1.0
+) -> BandSpread:
     """Return the variances (1 - ρ) (m² s² + v), scaled by the factor, and ρ (m² s² + v), fixed.
     force : φ of the model [static axle loads].   left, before : v and v₀ [static axle loads²].
     stretch : s, of errors of the model [-], a number or (k, 1).
