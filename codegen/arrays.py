@@ -126,3 +126,8 @@ def _libraries(_scipy: bool) -> Any:
 
 
 one_thread = _OneThread()
+
+
+def root_mean_square(values: Array) -> float:
+    """Return the root mean square of all values, 0 of none."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else 0.0

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import Array, root_mean_square
 from identifier.axle.car import Car, axle_impulse, car_numbers
 from identifier.estimate.drive import Drive
 from identifier.tire_model import TireModel
@@ -245,5 +245,5 @@ def motion_error(
     with np.errstate(over="ignore", invalid="ignore"):  # of a law that diverged
         F = windows.mean(force)
         residual = a_y - F.sum(axis=1) / m, r_dot - (l_f * F[:, 0] - l_r * F[:, 1]) / I_z
-        lateral, yaw, *sizes = (float(np.sqrt(np.mean(s**2))) for s in (*residual, a_y, r_dot))
+        lateral, yaw, *sizes = map(root_mean_square, (*residual, a_y, r_dot))
     return MotionError(lateral=lateral, yaw=yaw, lateral_rms=sizes[0], yaw_rms=sizes[1])

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from codegen.arrays import Array
+from codegen.arrays import Array, root_mean_square
 from codegen.errors import TireidError
 from identifier.estimate.drive import SLOW, Drive
 from identifier.estimate.model import FittedModel
@@ -257,7 +257,7 @@ class _Likely(NamedTuple):
         slopes = np.zeros((problem.size.size, 2, len(NAMES)))
         slopes[:, :, problem.index] = problem.residuals(self.p).slopes
         slopes[:, :, [INDEX[name] for name in SENSORS]] = 0.0  # of that drive alone
-        slopes *= problem.size[:, None, None] / float(np.sqrt(np.mean(problem.force**2)))
+        slopes *= problem.size[:, None, None] / root_mean_square(problem.force)
         return slopes.reshape(-1, len(NAMES))
 
 

@@ -193,11 +193,9 @@ def online_error(history: History, *, since: float | None = None) -> AxleRmse | 
     return axle_rms(history.axle_force, counted, truth)
 
 
-def force_rms(history: History, *, since: float | None = None) -> AxleRmse | None:
-    """Return the size of the true forces, over the samples that `online_error` counts.
-    since : samples before this time [s] do not count; None counts all.
-    """
+def force_rms(history: History) -> AxleRmse | None:
+    """Return the size of the true forces, over the samples that `online_error` counts."""
     truth = history.recording.axle_force
     if truth is None:
         return None
-    return axle_rms(truth, counted_samples(history.recording, history.method.min_speed, since))
+    return axle_rms(truth, counted_samples(history.recording, history.method.min_speed))

@@ -29,7 +29,7 @@ from models.files import write_atomically
 from models.recordings import Recording
 from models.recordings.portion import Portion
 from models.schema import Table, read_json
-from models.vehicle import Vehicle
+from models.vehicle import DOWNFORCE_SPEED, Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
     from identifier.day import Day
@@ -372,6 +372,12 @@ class TireModel(ABC):
         if self.known_slip is None:
             return ()
         return (Fact("known up to a slip of", np.degrees(self.known_slip), "deg"),)
+
+    def _of_downforce(self) -> list[Fact]:
+        if not self.vehicle.has_downforce:
+            return []
+        more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
+        return [Fact(f"more of all forces at {DOWNFORCE_SPEED:g} m/s", more, "%")]
 
     def summary(self) -> str:
         """Return the estimates, in a few lines; ± is one standard deviation.

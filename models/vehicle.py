@@ -139,6 +139,7 @@ _OF_CHASSIS = ("cg_height", "drive_front_share", "brake_front_share")  # declare
 LENGTHWISE = (*_OF_CHASSIS, "drag_area")  # of a `Vehicle`
 _MOST_HEIGHT = 0.6  # wheelbases: a van that is loaded high has 0.35
 _DRAG_AREA, FULL_SIZE = 0.7, 1.0  # m² of a passenger car; wheelbase [m] below which it has none
+_SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
 _MOST_CENTER_SD = 0.2  # wheelbases: half of where any car has its center of gravity
 _MOST_DRAG = 1.0  # weights, at `DOWNFORCE_SPEED`: a Formula car has about 0.1
 
@@ -364,6 +365,11 @@ class Vehicle:
     def froude_time(self) -> float:
         """Time that scales with the size of a car, sqrt(L/g) [s]: 0.5 for a sedan."""
         return math.sqrt(self.wheelbase / GRAVITY)
+
+    @property
+    def scale(self) -> float:
+        """What times and speeds of a sedan are multiplied by, sqrt(L / 2.7 m) [-]."""
+        return math.sqrt(self.wheelbase / _SEDAN)
 
     @property
     def lowest_speed(self) -> float:

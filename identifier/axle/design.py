@@ -40,7 +40,7 @@ from identifier.method import (
     Track,
     resumed,
 )
-from identifier.setup import Port, Setup
+from identifier.setup import Setup
 from identifier.tire_model import AXLES, Reached, TireModel, brisk_speed
 from models.rules import require_positive
 from models.vehicle import Vehicle
@@ -138,10 +138,7 @@ class AxleIdentifier(Method):
         }
         return Limits(boxes, self._at_bounds)
 
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """Outputs and state of its step, axle_force first."""
-        return PORTS
+    ports = PORTS
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         """Return what a run needs.

@@ -49,7 +49,7 @@ from identifier.tire_model import (
 from models.recordings import Recording
 from models.rules import require_positive
 from models.schema import Table
-from models.vehicle import DOWNFORCE_SPEED, Vehicle
+from models.vehicle import Vehicle
 
 _LARGEST = 1e9  # of the numbers in a file, SI and static axle loads
 _LARGEST_WEIGHT = 100.0  # static axle loads: no unit of a tire carries more
@@ -234,10 +234,7 @@ class AxleModel(TireModel):
             unsure = 100.0 * np.diag(self.band.relative_sd(known))
             lines.append(Fact("standard deviation there over the prior's", unsure, "%"))
         lines.append(Fact("time of learning", self.excitation[:, 1], "s"))
-        if self.vehicle.has_downforce:
-            more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
-            lines.append(Fact(f"more of all forces at {DOWNFORCE_SPEED:g} m/s", more, "%"))
-        return tuple(lines)
+        return (*lines, *self._of_downforce())
 
     def mounted_on(self, vehicle: Vehicle) -> "AxleModel":
         # It was measured on this car alone.
@@ -259,9 +256,7 @@ class AxleModel(TireModel):
             model_error=None,  # of the road that taught
         )
 
-    @property
-    def lagged(self) -> bool:
-        return True
+    lagged = True
 
     def curve_expression(self, alpha: Any, v_x: Any) -> Any:
         at = curve_at_speed(alpha, v_x, self.W, self.ladder, self.vehicle)

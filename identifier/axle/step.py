@@ -160,7 +160,7 @@ def _forward(s: SimpleNamespace, steps: tuple[int, ...]) -> _Forward:
     )
 
 
-def build_frozen(steps: tuple[int, ...], *, pressed: bool = False) -> ca.Function:
+def build_frozen(steps: tuple[int, ...], *, pressed: bool) -> ca.Function:
     """Return the frozen model as a step: weights in, axle_force [N], slips [rad] out, (2,)."""
     ports, s = symbols(**_forward_ports(len(steps) + 1, pressed=pressed))
     f = _forward(s, steps)

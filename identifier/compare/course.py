@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen import Scan
-from codegen.arrays import Array
+from codegen.arrays import Array, root_mean_square
 from identifier.compare.zeros import replayed
 from identifier.evidence import (
     BRISK,
@@ -208,7 +208,7 @@ def side_slip(history: History, min_speed: float, truth: Array | None) -> SideSl
     counts = counted_samples(recording, min_speed)
     v_x, error = recording.v_x[counts], (v_y - truth)[counts]
     slip = np.degrees(np.arctan2(v_y[counts], v_x) - np.arctan2(truth[counts], v_x))
-    rms = float(np.sqrt(np.mean(slip**2)))
+    rms = root_mean_square(slip)
     within = None if sd is None else 100.0 * np.mean(np.abs(error) <= SIGMAS * sd[counts])
     return SideSlip(
         v_y=v_y,

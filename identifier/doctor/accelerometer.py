@@ -13,7 +13,6 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.estimate.drive import SMOOTHED, Drive, box, gradient, thinned
-from identifier.estimate.priors import SEDAN
 from identifier.estimate.solve import DELAYS, autocorrelation_time
 from identifier.motion.model import SENSORS, true_signals
 from identifier.motion.parameters import INDEX
@@ -50,11 +49,11 @@ class Accelerometer:
         self, segments: Sequence[Recording], drives: Sequence[Drive], vehicle: Vehicle
     ) -> None:
         self.drives, L = drives, vehicle.wheelbase
-        roll = 0.008 * float(np.sqrt(L / SEDAN))  # s, by which weight follows it
+        roll = 0.008 * vehicle.scale  # s, by which weight follows it
         self.mean = np.array([0.0, 0.97, 0.0, 0.0, 0.0])  # a body rolls by 0 to 6 degrees per g
         self.usual = np.array([0.04, 0.03, roll, 0.012 * L, 1e-6])
         self.memory = 0.0
-        width = float(np.sqrt(L / SEDAN)) * SMOOTHED
+        width = vehicle.scale * SMOOTHED
         self.measured = [
             box(thinned(one.needed("a_y"), drive.every), round(width / drive.dt) | 1)
             for one, drive in zip(segments, drives, strict=True)

@@ -24,7 +24,7 @@ from identifier.doctor.pieces import segments_of
 from identifier.doctor.suspects import NOTES, SUSPECTS, TURNING, Suspect
 from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
-from identifier.estimate.priors import SEDAN, Priors
+from identifier.estimate.priors import Priors
 from identifier.estimate.solve import Problem, around_beliefs, descend, normal, starts
 from identifier.motion.model import SENSORS
 from identifier.motion.parameters import INDEX
@@ -509,7 +509,7 @@ def prepared(recording: Recording, vehicle: Vehicle) -> Search | None:
     segments = segments_of(
         recording, vehicle, longest=logs * RULES.longest, pieces=logs * RULES.pieces
     )
-    fastest = min(RULES.interval, RULES.interval * math.sqrt(vehicle.wheelbase / SEDAN) + 0.004)
+    fastest = min(RULES.interval, RULES.interval * vehicle.scale + 0.004)
     bare = [replace(one, a_y=None) for one in segments]
     drives = [_inside(Drive.of(one, vehicle, fastest=fastest)) for one in bare]
     if sum(np.count_nonzero(one.counts) * one.dt for one in drives) < RULES.shortest:

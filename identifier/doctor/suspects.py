@@ -13,7 +13,6 @@ from identifier.measured import with_doubt
 from models.recordings import Repair
 from models.vehicle import Vehicle
 
-_SEDAN = 2.7  # m, wheelbase of whose size the numbers are
 _DEGREES = math.degrees(1.0)  # in a rad
 _INERTIA = (0.5, 1.6)  # of I_z/(m l_f l_r); cars on the road have 0.9 to 1.1
 _SMALL = 1.0  # [m] wheelbase, below which a model car may have as little
@@ -29,7 +28,7 @@ _OPPOSITES = {  # of what a size says, where it is negative
     "too far back": "too far forward",
     "grow with speed, as by a downforce": "shrink with speed, as by a lift",
 }
-_POWERS: Mapping[str, float] = {"": 0.0, "length": 1.0, "speed": 0.5, "rate": -0.5}
+_POWERS: Mapping[str, float] = {"": 0.0, "length": 2.0, "speed": 1.0, "rate": -1.0}  # of the scale
 NOTES = ("center_of_gravity", "yaw_inertia", "downforce")  # of the car: never an alarm, never sure
 
 
@@ -77,7 +76,7 @@ class Suspect(NamedTuple):
         return ("downforce_f", "downforce_r") if pair else (self.parameter,)
 
     def scaled(self, value: float, vehicle: Vehicle) -> float:
-        return float(value * (vehicle.wheelbase / _SEDAN) ** _POWERS[self.grows])
+        return float(value * vehicle.scale ** _POWERS[self.grows])
 
     def size(self, value: float) -> float:
         match self.code:

@@ -73,10 +73,7 @@ class FittedBand(Band):
 
     here: _Here | None = None
 
-    @property
-    def calibrated(self) -> bool:
-        """Whether its width is more than noise of the sensors: always."""
-        return True
+    calibrated = True  # its width is more than noise of the sensors, always
 
     @property
     def origin(self) -> str:

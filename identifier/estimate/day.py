@@ -7,7 +7,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.day import ENOUGH, INSTALLED, NUMBERS, WHERE, Day, usual_errors
 from identifier.estimate.drive import SLOW, Drive, hardest, thinned
-from identifier.estimate.priors import SEDAN, Priors
+from identifier.estimate.priors import Priors
 from identifier.estimate.solve import estimate
 from identifier.motion.parameters import INDEX
 from models.recordings import Recording
@@ -91,7 +91,7 @@ def steering_zeros(recording: Recording, vehicle: Vehicle) -> Array:
     long segment; other ones have that of the one before. Tires need not be known.
     """
     L, slowest, rows, starts = vehicle.wheelbase, SLOW * vehicle.froude_speed, [], []
-    every = max(round(_SLOWLY * np.sqrt(L / SEDAN) / recording.dt), 1)
+    every = max(round(_SLOWLY * vehicle.scale / recording.dt), 1)
     for one in long_segments(recording, vehicle):
         signals = recording.v_x, recording.r, recording.delta_f
         v_x, r, delta = (thinned(signal[one], every) for signal in signals)

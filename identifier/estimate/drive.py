@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen.arrays import Array, thinning
-from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
 from models.recordings.record import ALL
 from models.recordings.samples import tears
@@ -150,7 +149,7 @@ def _piece(
     """Return time, signals and rates of a segment; its first sample does not count."""
     v_y = recording.needed("v_y")
 
-    scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
+    scale = vehicle.scale
     count = round(SMOOTHED * scale / dt) | 1
     raw = (recording.v_x, v_y, recording.r, recording.delta_f, recording.delta_r)
     v_x, v_y, r, delta_f, delta_r = (box(thinned(signal[piece], every), count) for signal in raw)

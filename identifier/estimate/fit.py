@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
-from codegen.arrays import Array, one_thread
+from codegen.arrays import Array, one_thread, root_mean_square
 from identifier.estimate.day import days_of, long_segments, steering_zeros
 from identifier.estimate.drive import FASTEST, Drive, hardest
 from identifier.estimate.information import CHANGES, Information
@@ -19,7 +19,7 @@ from identifier.estimate.latent import Learnt, accelerometer_off, latent_priors,
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes
 from identifier.estimate.posterior import Posterior, Reach, Segment
-from identifier.estimate.priors import SEDAN, Priors
+from identifier.estimate.priors import Priors
 from identifier.estimate.roads import Roads, with_roads
 from identifier.estimate.solve import (
     ENOUGH,
@@ -182,7 +182,7 @@ def _missed(recordings: Sequence[Recording], model: FittedModel) -> float:
     for one in (part for whole in recordings for part in _alone(whole, model.vehicle)):
         drive = Drive.of(one, model.vehicle)
         v_x, r = drive.signals[drive.counts][:, [0, 2]].T
-        rms = float(np.sqrt(np.mean((v_x * r / GRAVITY) ** 2))) if v_x.size else 0.0
+        rms = root_mean_square(v_x * r / GRAVITY)
         if rms <= _FORCELESS:
             continue
         p = model.on(one).on(model.p)
@@ -229,7 +229,7 @@ def _reach(
 ) -> Reach:
     """Return what drives reached, by the estimate of them."""
     found = Reach(segments=tuple(_segments(drives, roads)))
-    later = _LASTS * min(float(np.sqrt(vehicle.wheelbase / SEDAN)), 1.0)
+    later = _LASTS * min(vehicle.scale, 1.0)
     for i, one in enumerate(drives):
         on = one.counts
         if not on.any():
@@ -286,7 +286,7 @@ def _blocks(
     """Yield drives that last no longer together.   alone : whether each is of one recording."""
     group: list[Drive] = []
     length = 0.0
-    small = _COARSE * float(np.sqrt(vehicle.wheelbase / SEDAN)) < 1.0
+    small = _COARSE * vehicle.scale < 1.0
     fastest = FASTEST * (_COARSE if coarse and not small else 1.0)
     for recording in recordings:
         n = max(round(longest / recording.dt), 1)

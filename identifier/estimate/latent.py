@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from codegen import Scan
-from codegen.arrays import Array, one_thread
+from codegen.arrays import Array, one_thread, root_mean_square
 from identifier.estimate.day import steering_zeros
 from identifier.estimate.drive import hardest
 from identifier.estimate.nodes import JERKS, Nodes, earlier, low_passed
 from identifier.estimate.posterior import Posterior
-from identifier.estimate.priors import OF_AXLES, OF_CAR, SEDAN, Priors
+from identifier.estimate.priors import OF_AXLES, OF_CAR, Priors
 from identifier.estimate.solve import around_beliefs, beliefs_cost, bounded_step, car_numbers
 from identifier.motion.nodes import LATENT_NAMES, MEASURED, STATES, node_scan
 from identifier.motion.parameters import INDEX, NAMES
@@ -159,7 +159,7 @@ def latent_priors(vehicle: Vehicle, beliefs: Priors, off: "Off | None" = None) -
     beliefs : of the car, of one of these, or of a log that came before.
     off : what was found of the accelerometer, so that more of it may be left.
     """
-    scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
+    scale = vehicle.scale
     information, moves = beliefs.information.copy(), beliefs.moves.copy()
     fixed = [INDEX[name] for name in ("ln_sway", *OF_V_Y)]
     information[fixed], information[:, fixed], moves[fixed] = 0.0, 0.0, False
@@ -212,8 +212,8 @@ class _Latent:
         self.free = np.flatnonzero(priors.moves[self.index])
         self.priors = priors
         self._car = car_numbers(vehicle)
-        s, L = float(np.sqrt(vehicle.wheelbase / SEDAN)), vehicle.wheelbase
-        self.scale = s
+        self.scale = s = vehicle.scale
+        L = vehicle.wheelbase
         self._believed = np.diag(priors.information)[self.moves]
         self._times = np.array([trust.error_time * s, trust.bank_time * s])
         per = np.array([1.0 / s, 1.0])
@@ -517,7 +517,7 @@ def learn_latent(
     apart = ((best.z - other[0])[:, 0] / v_x)[on]
     share = 1.0 / (1.0 + np.exp(min(other[2] - best.cost, 50.0)))
     alike = share > _ALIKE and bool(on.any())  # else one of them explains the drive far worse
-    parted = float(np.sqrt(np.mean(apart**2))) if alike else 0.0
+    parted = root_mean_square(apart) if alike else 0.0
     index = problem.index[problem.index < P]
     moved = problem.index < P
     away = (other[1] - best.p)[index]
@@ -571,7 +571,7 @@ def accelerometer_off(recording: Recording, vehicle: Vehicle, priors: Priors) ->
     priors : as of `_Latent`.
     """
     part = hardest(recording, _LATE_SPAN)
-    scale, dt, L = float(np.sqrt(vehicle.wheelbase / SEDAN)), recording.dt, vehicle.wheelbase
+    scale, dt, L = vehicle.scale, recording.dt, vehicle.wheelbase
     # Interpolation averages noise: what is smooth is not changed by it.
     smooth = low_passed(recording.needed("a_y"), JERKS / scale, dt)
     piece, small = replace(recording, a_y=smooth), _SMALL_DELAY * scale

@@ -52,9 +52,7 @@ class FitMethod(Method):
         """Return the method for a car: its size sets the lowest speed."""
         return cls(min_speed=vehicle.lowest_speed, dt=dt)
 
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        return PORTS
+    ports = PORTS
 
     @property
     def whole(self) -> WholeLog:

@@ -39,7 +39,7 @@ from models.recordings import Recording
 from models.recordings.portion import Portion
 from models.rules import require_positive
 from models.schema import Table
-from models.vehicle import DOWNFORCE_SPEED, Vehicle, load_ratio
+from models.vehicle import Vehicle, load_ratio
 
 _Found = TypeVar("_Found")
 _WARM = 300  # samples before a part of a long drive, over which lag and sway settle
@@ -143,9 +143,7 @@ class FittedModel(TireModel):
             play=self["steering_play"],
         )
 
-    @property
-    def lagged(self) -> bool:
-        return True
+    lagged = True
 
     @property
     def give(self) -> Array:
@@ -269,10 +267,7 @@ class FittedModel(TireModel):
 
     def facts(self) -> tuple[Fact, ...]:
         lines = [Fact("identified up to a slip of", np.degrees(self.known_slip), "deg")]
-        if self.vehicle.has_downforce:
-            more = 100.0 * (self.vehicle.load_ratio(DOWNFORCE_SPEED) - 1.0)
-            lines.append(Fact(f"more of all forces at {DOWNFORCE_SPEED:g} m/s", more, "%"))
-        return tuple(lines)
+        return (*lines, *self._of_downforce())
 
     # Another car, another road, another form.
 

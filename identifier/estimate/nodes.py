@@ -21,7 +21,6 @@ from identifier.estimate.drive import (
     gradient,
     slope_on,
 )
-from identifier.estimate.priors import SEDAN
 from identifier.motion.model import DAMPING
 from models.recordings import Recording, RecordingError
 from models.recordings.record import ALL
@@ -106,7 +105,7 @@ def _piece(
     recording: Recording, some: slice, vehicle: Vehicle, every: int, a_y: Array, ln_sway: float
 ) -> tuple[Array, Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return t, given, measured, counts and goes of a segment."""
-    dt, scale = recording.dt, float(np.sqrt(vehicle.wheelbase / SEDAN))
+    dt, scale = recording.dt, vehicle.scale
     slowest = SLOW * vehicle.froude_speed
 
     def mean(signal: Array) -> Array:

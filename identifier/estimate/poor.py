@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.estimate.drive import SMOOTHED, hardest
-from identifier.estimate.priors import SEDAN
 from models.recordings import Recording
 from models.recordings.samples import FAR, resolution, white_noise
 from models.vehicle import Vehicle
@@ -65,7 +64,7 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
     v_y = recording.logged_v_y
     if v_y is None:
         return recording
-    scale = float(np.sqrt(vehicle.wheelbase / SEDAN))
+    scale = vehicle.scale
     new = _new_values(v_y)
     rare = len(new) < len(v_y) and _interval(new) * recording.dt > _RARE * scale
     new = new if rare else np.arange(len(v_y))

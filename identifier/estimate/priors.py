@@ -38,8 +38,6 @@ _PLAY_SD = 0.02  # [rad] of a play that a log asks for: servos of 1:10 cars have
 _LARGEST_PLAY = 0.1  # [rad]
 _TAILS = 1.0  # degrees of freedom of their priors
 
-SEDAN = 2.7  # m, the wheelbase for which times and speeds are given; they go with its root
-
 
 class _Belief(NamedTuple):
     """A prior: mean, standard deviation and bounds.
@@ -142,7 +140,7 @@ class Priors:
         apart : whether bias and angle of v_y are believed apart, without `_SHARED_ERROR`.
         """
         L = vehicle.wheelbase
-        unit = {"": 1.0, "L": L, "v": float(np.sqrt(L / SEDAN))}
+        unit = {"": 1.0, "L": L, "v": vehicle.scale}
         p = len(NAMES)
         mean, sd, low, high = np.zeros(p), np.zeros(p), np.full(p, -INF), np.full(p, INF)
         table = {f"{name}_{axle}": one for name, one in OF_AXLES.items() for axle in "fr"} | OF_CAR

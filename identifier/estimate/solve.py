@@ -20,7 +20,7 @@ from codegen.arrays import Array
 from identifier.axle.slip import Sway
 from identifier.estimate.drive import Drive
 from identifier.estimate.posterior import Posterior
-from identifier.estimate.priors import OF_CAR, SEDAN, Priors
+from identifier.estimate.priors import OF_CAR, Priors
 from identifier.motion.model import CarNumbers, motion_scan
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import GRAVITY, Vehicle
@@ -135,7 +135,7 @@ class Problem:
 
     def thinned(self) -> "Problem":
         """Return the problem of one road with means of samples, for first guesses."""
-        longest = _COARSE * min(float(np.sqrt(self.vehicle.wheelbase / SEDAN)), 1.0)
+        longest = _COARSE * min(self.vehicle.scale, 1.0)
         times = [max(1, int(longest / one.dt)) for one in self.drives]
         if max(times) == 1 and self.labels is None:
             return self
@@ -330,7 +330,7 @@ def starts(problem: Problem) -> list[Array]:
         return begins
     b, zero = float(np.median(v_y[straight])), float(np.median(delta[straight]))
     fast = float(np.median(v_x[straight]))
-    usual = OF_CAR["v_y_bias"].sd * float(np.sqrt(problem.vehicle.wheelbase / SEDAN))
+    usual = OF_CAR["v_y_bias"].sd * problem.vehicle.scale
     if abs(b) > 0.4 * usual or abs(zero) > 0.4 * OF_CAR["steering_zero"].sd:
         for bias, angle in ((b, 0.0), (0.0, b / fast)):
             one = mean.copy()

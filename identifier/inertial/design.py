@@ -34,7 +34,7 @@ from identifier.method import (
     Method,
     Track,
 )
-from identifier.setup import Port, Setup
+from identifier.setup import Setup
 from identifier.tire_model import TireModel
 from models.rules import require_positive, require_within
 from models.vehicle import GRAVITY, Vehicle
@@ -145,7 +145,7 @@ class InertialIdentifier(Method):
 
     @classmethod
     def beginning_with(
-        cls, model: TireModel | None, vehicle: Vehicle, *, dt: float = 0.01
+        cls, model: TireModel | None, vehicle: Vehicle, *, dt: float
     ) -> "tuple[InertialIdentifier, TireModel | None]":
         """Return the design for a car with these tires, and what its run begins with.
         model : a fit is held, what an axle identifier learnt is gone on from; others help nothing.
@@ -177,9 +177,7 @@ class InertialIdentifier(Method):
         }
         return Limits(boxes)
 
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        return PORTS
+    ports = PORTS
 
     def setup(self, vehicle: Vehicle, start: TireModel | None = None) -> Setup:
         W, beside = self.prior.means(vehicle, self.ladder)

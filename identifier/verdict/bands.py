@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import Array, root_mean_square
 from identifier.axle.band import (
     AT_SPEEDS,
     CENTERS,
@@ -110,7 +110,7 @@ def calibrated(
     def teach(of_parts: Recording) -> TireModel:
         return learn(of_parts, history.vehicle, history.method, start, until)
 
-    speed = float(np.sqrt(np.mean(found.windows.mean(recording.v_x) ** 2)))
+    speed = root_mean_square(found.windows.mean(recording.v_x))
     given = BandCalibration.declared(speed)
     errors = _errors_elsewhere(teach, model.vehicle, recording, found, given)
     given = replace(given, noise=sensor_noise(recording, model.vehicle))

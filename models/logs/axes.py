@@ -105,8 +105,7 @@ def _gridded(seen: Mapping[str, Channel], names: Sequence[str]) -> dict[str, Arr
     at = begin + _STEP * np.arange(max(min((end - begin) // _STEP, _MOST), 0.0))
     found: dict[str, Array] = {}
     for name in names if at.size >= _FEWEST else ():
-        good = np.isfinite(seen[name].values)
-        t, values = seen[name].t[good], seen[name].values[good]
+        t, values = seen[name].t, seen[name].values
         found[name] = np.full(at.size, np.nan)
         if t.size > 1:
             steps = np.diff(t) * (values[1:] + values[:-1]) / 2.0
@@ -139,7 +138,9 @@ def ground(
     place : channels of a position by letter.   heading, steering : "" where there is none.
     """
     t = seen[place["x"]].t
-    if t.size < _FEWEST or ("y" in place and not heading):
+    used = [*place.values(), *filter(None, (heading, steering))]
+    few = min(seen[name].t.size for name in used) < _FEWEST
+    if few or ("y" in place and not heading):
         return "y", 1.0
     lag = max(1, int(_WINDOW / float(np.median(np.diff(t)))))
 
@@ -172,7 +173,7 @@ def along_axes(
     speed, yaw_rate, lateral, steering : channels of the forward speed, r, a_y and δ by their names;
         but for the speed in no triad; "" where there is none.
     """
-    there = {name for name, one in seen.items() if np.isfinite(one.values).sum() > 1}
+    there = {name for name, one in seen.items() if one.t.size > 1}
     usable = [one for one in found if there.issuperset(one.names.values())]
     in_triads = [name for one in usable for name in one.names.values()]
     named = [one for one in (speed, yaw_rate, lateral, steering) if one]

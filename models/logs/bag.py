@@ -6,7 +6,6 @@ counts from the first message that is read of any topic.
 """
 
 import re
-import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -38,6 +37,7 @@ from models.logs.growing import Growing
 from models.logs.log import Listed, RecordingError, dense, few
 from models.logs.magic import BAG_METADATA, MCAP, ROS1, SQLITE
 from models.logs.stamps import typical_rate
+from models.logs.units import rows_of
 from models.schema import CHUNK, most_unpacked, read_text
 
 _NS = 1e9  # in a second
@@ -49,7 +49,7 @@ _MOST_BYTES = 1 << 24  # of messages that are read at a time, at most
 _STAMPS = ("header.stamp.", "stamp.")
 _TIME = ("sec", "nanosec")
 
-_TABLES = tomllib.loads(Path(__file__).with_name("ros.toml").read_text(encoding="utf-8"))
+_TABLES = rows_of("ros.toml")
 _KNOWN: Mapping[str, str] = _TABLES["known"]  # definitions by type
 _PACKAGES = tuple(_TABLES["packages"]["known"].split())  # whose types have units
 

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from codegen.arrays import LONG, Array, blocks, filled, large
 from models.logs.can import CALENDAR
-from models.logs.log import Channel, RecordingError
-from models.logs.stamps import not_rising, since
+from models.logs.log import Channel
+from models.logs.stamps import since
 
 _GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
 _SLOWER = 0.4  # share of empty cells from which a channel is taken to be slower than its rows
@@ -68,14 +68,16 @@ def without_empty(channel: Channel, *, cut: bool = False) -> Channel:
     """Return a channel without the empty cells that a slower channel has in a table.
     cut : whether `holes` are left out too; else they stay, and are refused.
     """
-    kept = ~np.isnan(channel.values)
-    if kept.all() or not kept.any() or (not cut and holes(channel).size):
+    there = ~np.isnan(channel.values)
+    if not there.any() or (not cut and holes(channel).size):
         return channel
-    return _kept(channel, kept)
+    return kept(channel, there)
 
 
-def _kept(channel: Channel, kept: NDArray[np.bool_]) -> Channel:
-    t, values, rows = channel.t[kept], channel.values[kept], channel.rows[kept]
+def kept(channel: Channel, some: NDArray[np.bool_]) -> Channel:
+    if some.all():
+        return channel
+    t, values, rows = channel.t[some], channel.values[some], channel.rows[some]
     return replace(channel, t=t, values=values, rows=rows)
 
 
@@ -97,7 +99,7 @@ def without_codes(channel: Channel) -> tuple[Channel, str]:
     step = np.fmax.reduce(np.abs(np.diff(rest)), initial=0.0)
     codes = [one for one in ends if np.fmin.reduce(np.abs(rest - one)) > _FAR * step > 0.0]
     said = ", ".join(f"{one:.9g}" for one in codes)
-    return _kept(channel, ~np.isin(values, codes)) if codes else channel, said
+    return kept(channel, ~np.isin(values, codes)), said
 
 
 def _are_codes(numbers: Array) -> NDArray[np.bool_]:
@@ -132,12 +134,6 @@ def typical_step(t: Array) -> float:
     middle = [(steps.size - 1) // 2, steps.size // 2]
     steps.partition(middle)  # where it lies, which of a long log is on disk
     return float(np.mean(steps[middle]))
-
-
-def are_one_clock(raws: Sequence[Raw]) -> bool:
-    """Whether all signals are sampled at the same instants."""
-    first = raws[0].t
-    return all(raw.t is first or np.array_equal(raw.t, first) for raw in raws[1:])
 
 
 def on_one_clock(raws: Mapping[str, Raw], dt: float, longest: float) -> list[Segment]:
@@ -217,9 +213,3 @@ def _sampled(raw: Raw, grid: Array, dt: float, interval: float) -> Array:
     goes_on = (last > 0) & (step <= _GAP_INTERVALS * interval) & (ahead > _ON_STEP * dt)
     share = np.minimum(ahead, step) / np.where(step > 0.0, step, 1.0)
     return np.where(goes_on, now + share * (now - raw.values[before]), now)
-
-
-def require_rising(label: str, raw: Raw) -> None:
-    wrong = np.flatnonzero(~(np.diff(raw.t) > 0.0))
-    if wrong.size:
-        raise RecordingError(f"{label}: t {not_rising(raw.t, raw.rows, raw.place)}")

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -121,7 +121,8 @@ class GroupedLog(Generic[_P]):
             return self._timed(names)
         requested = chosen(self.path, names, {one[0].name: one for one in self.channels})
         require_small(self.path, sum(one.samples for one, _ in requested))
-        found: dict[str, tuple[Array, Array, Any]] = {}
+        units = {one.name: one.unit for one, _ in requested}
+        found: dict[str, Channel] = {}
         with one_line(self.path, self.what):
             for clock, t, values in self.samples(requested):
                 rows, what = np.arange(1, t.size + 1), Clock(0, f"the clock of {clock}", "s", "")
@@ -130,13 +131,12 @@ class GroupedLog(Generic[_P]):
                 )
                 self._mended.extend(stamps.notes)
                 rows = stamps.of(rows)
-                found |= {n: (stamps.t, stamps.of(one), rows) for n, one in values.items()}
-        place = self.place
-        return tuple(
-            Channel(name=one.name, unit=one.unit, t=t, values=values_of, place=place, rows=rows)
-            for one, _ in requested
-            for t, values_of, rows in [found[one.name]]
-        )
+                for name, one in values.items():
+                    found[name] = Channel(
+                        name=name, unit=units[name], t=stamps.t, values=stamps.of(one),
+                        place=self.place, rows=rows,
+                    )  # fmt: skip
+        return tuple(map(found.__getitem__, names))
 
     def _timed(self, names: Sequence[str]) -> tuple[Channel, ...]:
         clock, *found = replace(self, clock_name="").read([self.clock_name, *names])

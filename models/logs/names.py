@@ -10,18 +10,16 @@ that are equal none is taken.
 import itertools
 import math
 import re
-import tomllib
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from codegen.arrays import Array
+from codegen.arrays import Array, root_mean_square
 from models.logs.axes import Triad, along_axes, ground, triads
-from models.logs.clock import without_codes
+from models.logs.clock import kept, without_codes
 from models.logs.log import Channel, Heading, LogFile, RecordingError
 from models.logs.signals import BETA, COLUMNS, POSE, QUANTITIES, WHEELS, Signal, quantity_of
 from models.logs.spelling import unit_in_name, without_units
@@ -37,6 +35,7 @@ from models.logs.units import (
     are_same,
     is_given,
     quantities,
+    rows_of,
     to_si,
     unit_of_range,
 )
@@ -78,7 +77,7 @@ class _Rule(NamedTuple):
     words: tuple[str, ...]
 
 
-_TABLES = tomllib.loads(Path(__file__).with_name("names.toml").read_text(encoding="utf-8"))
+_TABLES = rows_of("names.toml")
 _WORDS = {name: some.replace("|", " ").split() for name, some in _TABLES["words"].items()}
 
 
@@ -189,9 +188,6 @@ class Proposal:
         kept = [name for name in QUANTITIES if self.is_sure(name)]
         if "v_y" in kept and BETA in kept:
             kept.remove(BETA)
-        forces = {"Fyf", "Fyr"}
-        if len(forces & set(kept)) == 1:
-            kept = [name for name in kept if name not in forces]
         return {
             name: Signal(channel=one.channel, unit=one.unit, sign=one.sign, factor=one.factor)
             for name in kept
@@ -244,10 +240,11 @@ def _name_confidence(signal: str, name: str) -> float:
     while name.startswith("/") and len(listed) > 1 and listed[-1] in _GENERIC:
         listed = listed[:-1]
     rule, words = _RULES[signal], _with_parts(listed)
-    ends = ["".join(listed[k:]) for k in range(len(listed))]
+    stems = [listed]
     while len(listed) > 1 and listed[-1] in _SOURCES:
         listed = listed[:-1]
-        ends += ["".join(listed[k:]) for k in range(len(listed))]
+        stems.append(listed)
+    ends = ["".join(one[k:]) for one in stems for k in range(len(one))]
     if rule.known & {ends[0], "".join(listed)}:
         return _KNOWN
     if _with_parts(_words_of(_field(name))).union(ends) & rule.never:
@@ -310,7 +307,8 @@ def propose(
             continue
         hand, least = _rank(ranked[0])[0], ranked[0].confidence - _APART
         equal = [one for one in ranked if one.confidence > least and _rank(one)[0] == hand]
-        equal.sort(key=lambda one: -_rate(seen[one.channel[0]]))
+        rates = {one: np.nan_to_num(typical_rate(seen[one.channel[0]].t)) for one in equal}
+        equal.sort(key=lambda one: -float(f"{rates[one]:.1g}"))  # but for jitter
         guesses[name] = equal[0]
         others = [one for one in equal[1:] if not _are_one(name, equal[0], one, seen)]
         if others:
@@ -319,9 +317,10 @@ def propose(
     return Proposal(guesses={**guesses, **pose}, rivals=rivals)
 
 
-_PLACE = re.compile(_TABLES["pose"]["place"])
-_ANGLE = re.compile(_TABLES["pose"]["angle"])
-_TURN = re.compile(_TABLES["pose"]["turn"])
+_FORMS = [
+    (re.compile(_TABLES["pose"][form]), quantity, mark)
+    for form, quantity, mark in (("place", LENGTH, ""), ("angle", ANGLE, "h"), ("turn", ANGLE, "q"))
+]
 _TURNED = {"h", "qy", "qw"}
 _NO_POSE = set(_TABLES["pose"]["never"].split())
 
@@ -332,7 +331,7 @@ def poses(headings: Sequence[Heading]) -> dict[str, dict[str, list[Heading]]]:
     for one in map(_with_given_unit, headings):
         words = "_".join(_words_of(without_units(one.name, one.unit)[0]))
         plausible = quantities(one.unit) if is_given(one.unit) else (LENGTH, ANGLE)
-        for form, wanted, mark in ((_PLACE, LENGTH, ""), (_ANGLE, ANGLE, "h"), (_TURN, ANGLE, "q")):
+        for form, wanted, mark in _FORMS:
             found = form.fullmatch(words)
             of = set((found["of"] or "").split("_")) if found else set()
             if found and wanted in plausible and not of & _NO_POSE:
@@ -401,7 +400,7 @@ def _with_signs(
     def completed(guess: Guess) -> Guess:
         name = guess.channel[0]
         sign = signs.get(frozenset(_words_of(name)), "")
-        if not sign or name not in seen or np.nanmin(seen[name].values, initial=0.0) < 0.0:
+        if not sign or name not in seen or np.min(seen[name].values, initial=0.0) < 0.0:
             return guess
         return replace(_said(guess, f"its sign is in {sign!r}"), sign=sign)
 
@@ -467,30 +466,24 @@ def _are_one(name: str, one: Guess, other: Guess, seen: _Seen) -> bool:
     if len(set(names)) > 1:
         return False
     first, second = (seen[guess.channel[0]] for guess in (one, other))
-    good, there = np.isfinite(first.values), np.isfinite(second.values)
-    if not good.any() or not there.any():
+    if not first.t.size or not second.t.size:
         return False
     scales = [to_si(guess.unit, quantity_of(name, guess.unit), name) for guess in (one, other)]
-    here = scales[0] * first.values[good]
-    beside = scales[1] * np.interp(first.t[good], second.t[there], second.values[there])
-    return _root_mean_square(here - beside) <= _SAME * _root_mean_square(here)
-
-
-def _rate(channel: Channel) -> float:
-    """Return the samples per second [Hz], so roughly that jitter does not matter; 0 of too few."""
-    rate = typical_rate(channel.t)
-    return 0.0 if math.isnan(rate) else float(f"{rate:.1g}")
+    here = scales[0] * first.values
+    beside = scales[1] * np.interp(first.t, second.t, second.values)
+    return root_mean_square(here - beside) <= _SAME * root_mean_square(here)
 
 
 def _seen(log: LogFile, names: list[str], run: str | None) -> dict[str, Channel]:
-    """Return channels by name; without those that cannot be read."""
+    """Return channels by name, of samples that have a value; without those that cannot be read."""
     runs = log.runs()
     chosen = run if run is not None or not runs else runs[0]
     if not names:
         return {}
     try:
         read = log.read(names, chosen)
-        return {name: without_codes(one)[0] for name, one in zip(names, read, strict=True)}
+        coded = (without_codes(one)[0] for one in read)
+        return {one.name: kept(one, np.isfinite(one.values)) for one in coded}
     except RecordingError:
         if len(names) == 1:
             return {}
@@ -588,13 +581,12 @@ def _looked(signal: str, guess: Guess, seen: _Seen) -> Guess:
         if name not in seen:
             return replace(guess, confidence=0.0)
         values = seen[name].values
-        finite = values[np.isfinite(values)]
-        finite = finite[:: max(1, finite.size // _LOOKED_AT)]
-        if not finite.size or (signal != "delta_r" and np.ptp(finite) == 0.0):
+        values = values[:: max(1, values.size // _LOOKED_AT)]
+        if not values.size or (signal != "delta_r" and np.ptp(values) == 0.0):
             left = guess.confidence * (STILL if guess.confidence < _STANDARD else 1.0)
             return replace(_said(guess, "it never changes"), confidence=left)
-        size = max(size, float(np.abs(finite).max()))
-        usual = max(usual, _usual(finite))
+        size = max(size, float(np.abs(values).max()))
+        usual = max(usual, _usual(values))
     if guess.confidence == _STANDARD or signal in WHEELS:
         return guess
     if not guess.unit:
@@ -671,7 +663,7 @@ def _levered(guess: Guess, best: Mapping[str, Guess], seen: _Seen) -> Guess:
     turning = "a_y" if "a_y" in best and _is_given(best["a_y"]) else "r"
     there = {"v_x": best["v_x"], turning: best[turning], "delta_f": guess}
     v, turn, delta = (
-        _root_mean_square(seen[one.channel[0]].values) * to_si(one.unit, QUANTITIES[name], name)
+        root_mean_square(seen[one.channel[0]].values) * to_si(one.unit, QUANTITIES[name], name)
         for name, one in there.items()
     )
     turn = turn if turning == "r" else turn / max(v, 1e-9)
@@ -688,7 +680,7 @@ def _is_given(guess: Guess) -> bool:
 def _in_turning(name: str, there: Mapping[str, Guess], seen: _Seen) -> Guess:
     """Return the guess of one of them in the unit that v_x, r and a_y together have."""
     guess = there[name]
-    sizes = {one: _root_mean_square(seen[there[one].channel[0]].values) for one in there}
+    sizes = {one: root_mean_square(seen[there[one].channel[0]].values) for one in there}
     if len(there) < 3 or not all(sizes.values()):
         usual = _usual(seen[guess.channel[0]].values)
         return replace(guess, unit=unit_of_range(QUANTITIES[name], usual))
@@ -709,11 +701,5 @@ def _in_turning(name: str, there: Mapping[str, Guess], seen: _Seen) -> Guess:
 
 
 def _usual(values: Array) -> float:
-    """Return how far the finite ones go from zero, but for spikes."""
-    finite = values[np.isfinite(values)]
-    return float(np.quantile(np.abs(finite), 1.0 - _SPIKES)) if finite.size else 0.0
-
-
-def _root_mean_square(values: Array) -> float:
-    finite = values[np.isfinite(values)]
-    return math.sqrt(float(np.mean(np.square(finite)))) if finite.size else 0.0
+    """Return how far they go from zero, but for spikes."""
+    return float(np.quantile(np.abs(values), 1.0 - _SPIKES)) if values.size else 0.0

@@ -5,17 +5,15 @@ axle forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is posit
 """
 
 import math
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from codegen.arrays import Array, filled
 from codegen.escape import displayed
 from models.logs.log import RecordingError
-from models.logs.units import FORCE, RATE, TURNS, quantities
+from models.logs.units import FORCE, RATE, TURNS, quantities, rows_of
 
 BETA = "beta"
 INSTEAD = {"v_y": BETA, BETA: "v_y"}  # one of them is read, never both
@@ -23,7 +21,7 @@ AXLES = (("wheel_fl", "wheel_fr"), ("wheel_rl", "wheel_rr"))
 WHEELS = (*AXLES[0], *AXLES[1], "wheel")  # turns or speeds, the last of one encoder: for v_x
 POSE = ("x", "y", "heading")  # position and angle from x to y, of which v_x, v_y and r are made
 NEEDED = ("v_x", "v_y", "r", "delta_f")  # beta may stand in for v_y, or a_y, less surely
-_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+_TABLE = rows_of("signals.toml")
 QUANTITIES: Mapping[str, str] = {name: one["quantity"] for name, one in _TABLE.items()}
 # What a column is called where it differs.
 COLUMNS: Mapping[str, str] = {n: one["column"] for n, one in _TABLE.items() if "column" in one}
@@ -124,20 +122,15 @@ class Signal:
         )
 
     def _value(self, parts: Sequence[Array], quantity: str) -> Array:
-        total: Array = parts[0] if len(parts) == 1 else np.sum(parts, axis=0)
-        if len(parts) > 1 and quantity != FORCE:
-            total = total / len(parts)
-        if self.factor != 1.0:
-            total = total * self.factor
-        if self.offset != 0.0:
-            total = total - self.offset
+        total = (np.sum if quantity == FORCE else np.mean)(parts, axis=0)
+        total = total * self.factor - self.offset
         if self.table:
             hand, road = np.array(self.table).T
             inside: Array = np.interp(total, hand, road)
             first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
             below, above = np.minimum(total - hand[0], 0.0), np.maximum(total - hand[-1], 0.0)
             return np.asarray(inside + first * below + last * above)
-        return total if self.ratio == 1.0 else total / self.ratio
+        return np.asarray(total / self.ratio)
 
 
 def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:

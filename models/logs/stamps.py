@@ -56,8 +56,6 @@ _CALLED = (*NAMES, *_INTERVALS)
 # [s] after which counters begin again: of ticks in words of bits; of decimals and of the clock.
 _OF_BITS = [2.0**bits * tick for bits in (8, 16, 24, 32) for tick in (1e-3, 1e-4, 1e-6, 1e-9)]
 _ROUND = [*(10.0**k for k in range(-2, 5)), 60.0, 3600.0]
-# Between 1980 and 2100 in each unit: a number so large counts from 1970.
-_EPOCHS = {"s": (3e8, 4.2e9), "ms": (3e11, 4.2e12), "us": (3e14, 4.2e15), "ns": (3e17, 4.2e18)}
 _MICROSECONDS = 1e6
 _TICKS = tuple(10.0**-k for k in range(10))  # [s]: what stamps may be rounded to
 
@@ -336,7 +334,7 @@ def _rises_evenly(steps: Array) -> bool:
 def _unit(t: Array, advice: str) -> tuple[str, bool]:
     finite = t[np.isfinite(t)]
     largest = float(np.abs(finite).max()) if finite.size else 0.0
-    for unit, (low, high) in _EPOCHS.items():
+    for unit, (low, high) in TABLES["clock"]["epochs"].items():
         if low < largest < high and advice in ("", unit) and _step(finite, unit) <= 10.0:
             return unit, True
     if advice:

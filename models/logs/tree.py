@@ -85,7 +85,7 @@ class _Found(NamedTuple):
     said: tuple[str, ...] = ()
 
 
-def signals_of(tree: Mapping[str, Tree], rate: float = 0.0) -> _Found:
+def signals_of(tree: Mapping[str, Tree], rate: float) -> _Found:
     """Return the channels of a tree, in its order; their names may repeat.
     rate : of vectors of one length that have no time beside them [Hz]; 0 takes a number fs, dt or
         the like of the tree, if there is one.

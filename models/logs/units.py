@@ -8,6 +8,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from codegen.escape import displayed
 from models.logs.log import RecordingError
@@ -20,7 +21,13 @@ SI = {
     LENGTH: "m",
 }  # fmt: skip
 
-TABLES = tomllib.loads(Path(__file__).with_name("units.toml").read_text(encoding="utf-8"))
+
+def rows_of(name: str) -> dict[str, Any]:
+    """Return the tables of a file beside this one."""
+    return tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
+
+
+TABLES = rows_of("units.toml")
 # By quantity, spelling -> factor to SI; spellings as `_plain` leaves them, in small letters.
 FACTORS: Mapping[str, Mapping[str, float]] = {
     quantity: {spelling: factor for some, factor in rows for spelling in some.split()}
@@ -36,15 +43,7 @@ _SPELLED = {word: unit for unit, some in TABLES["spellings"].items() for word in
 _WORD = re.compile(
     "(?<![a-z'])(?:" + "|".join(sorted(_SPELLED, key=len, reverse=True)) + ")(?![a-z'])"
 )
-# Where nothing tells a unit: beyond which number it is no SI unit, and which it is then. A hand
-# wheel goes further. No car turns faster than once in a second, or drives at 430 km/h.
 HAND_WHEEL = "angle of a hand wheel"
-_FARTHEST = {
-    SPEED: (120.0, "km/h"),
-    ANGLE: (0.8, "deg"),
-    HAND_WHEEL: (3.0 * math.pi, "deg"),
-    RATE: (2.0 * math.pi, "deg/s"),
-}
 _SMALLEST_ACCELERATION = 2.5  # [m/s²]: a drive that does not reach it teaches no tire: it is in g
 
 
@@ -102,7 +101,7 @@ def unit_of_range(quantity: str, largest: float) -> str:
     """
     if quantity == ACCELERATION:
         return "g" if largest < _SMALLEST_ACCELERATION else ""
-    limit, unit = _FARTHEST.get(quantity, (math.inf, ""))
+    limit, unit = TABLES["farthest"].get(quantity, (math.inf, ""))
     return unit if largest > limit else ""
 
 

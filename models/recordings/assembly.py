@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from numbers import Real
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,11 +12,9 @@ from codegen.arrays import Array, filled
 from models.logs.clock import (
     Raw,
     Segment,
-    are_one_clock,
     gaps,
     holes,
     on_one_clock,
-    require_rising,
     typical_step,
     without_codes,
     without_empty,
@@ -34,11 +32,13 @@ from models.logs.signals import (
     signed,
 )
 from models.logs.spelling import without_unit
+from models.logs.stamps import not_rising
 from models.logs.units import PER_SECOND, is_given, to_si
 from models.recordings.choice import chosen_signals, column_of, has_wheels, missing_signals
 from models.recordings.map import AXES, CUT, LogMap
 from models.recordings.pose import with_pose
 from models.recordings.record import (
+    CHANNELS,
     LARGEST,
     MINIMUM_SAMPLES,
     Recording,
@@ -54,16 +54,6 @@ _SLOWEST_CHANNEL = 0.11  # [s]: longest typical interval of a channel, 10 Hz wit
 _FASTEST = 5e-4  # [s]: shortest step by which a unit of the time is guessed
 _SHORTEST = 1.0  # [s]: a segment of less teaches nothing, since learning waits half a second
 _LEAST_LOW_PASS = 0.01  # Hz: nothing of a drive passes, and the filter's numbers are still right
-
-_FIELDS = {
-    "Fyf": "axle_force",
-    "Fyr": "axle_force",
-    BETA: "delta_f",
-    "x": "t",
-    "y": "t",
-    "heading": "delta_f",
-    **dict.fromkeys(WHEELS, "v_x"),
-}
 
 
 class _Segments(NamedTuple):
@@ -90,7 +80,10 @@ def recording_of(
     signals, learnt = reading.signals, ""
     if has_speed(signals):
         if has_wheels(signals):
-            learnt = _scale_note(log, signals, log_map, run)
+            try:
+                learnt = scale_text(wheel_scales(log, signals, log_map, run))
+            except RecordingError as error:
+                learnt = f"the wheels are not used: {error}"
         signals = {name: one for name, one in signals.items() if name not in WHEELS}
     spared = ""
 
@@ -104,7 +97,8 @@ def recording_of(
                 raise RecordingError(
                     f"{label}: there are {raw.t.size} rows, at least {MINIMUM_SAMPLES} needed"
                 )
-            require_rising(label, raw)
+            if not (np.diff(raw.t) > 0.0).all():
+                raise RecordingError(f"{label}: t {not_rising(raw.t, raw.rows, raw.place)}")
             require_often(label, raw.t, log.clock)
         return named, raws, said, _segments(label, named, raws, log_map, dt)
 
@@ -201,7 +195,7 @@ def _require_finite(label: str, name: str, channel: Channel) -> None:
 
 
 def _require_of_a_car(label: str, name: str, values: Array, channel: Channel) -> None:
-    most = LARGEST[_FIELDS.get(name, name)]
+    most = LARGEST[name]
     bad = np.flatnonzero(np.abs(values) > most)
     if bad.size:
         raise RecordingError(
@@ -231,8 +225,9 @@ def _segments(
             for name, signal in signals.items()
         }
 
-    if are_one_clock(every):
-        found, t = [], every[0].t
+    t = every[0].t
+    if all(raw.t is t or np.array_equal(raw.t, t) for raw in every):
+        found = []
         columns = combined({key: raw.values for key, raw in raws.items()})
         for begin, end in pairwise([0, *gaps(t, log_map.longest_gap).tolist(), t.size]):
             if end - begin > 1:
@@ -314,20 +309,11 @@ def _recording(name: str, segment: Segment, log_map: LogMap, dt: float) -> Recor
         v_x, beta = signals["v_x"], signals[BETA]
         signals["v_y"] = filled(t.size, lambda part: v_x[part] * np.tan(beta[part]))
     force = side_by_side(signals["Fyf"], signals["Fyr"]) if "Fyf" in signals else None
+    signals.setdefault("delta_r", np.zeros(t.size))
     for values in (t, *signals.values()):  # kept as they are, not copied
         values.setflags(write=False)
-    return Recording(
-        name=name,
-        t=t,
-        v_x=signals["v_x"],
-        v_y=signals.get("v_y"),
-        r=signals["r"],
-        delta_f=signals["delta_f"],
-        delta_r=signals.get("delta_r", np.zeros(t.size)),
-        a_y=signals.get("a_y"),
-        a_x=signals.get("a_x"),
-        axle_force=force,
-    )
+    given: dict[str, Any] = {key: signals[key] for key in (*CHANNELS, "a_x") if key in signals}
+    return Recording(name=name, t=t, axle_force=force, **given)
 
 
 def wheel_scales(
@@ -339,16 +325,6 @@ def wheel_scales(
     of_wheels = {name: signals[name] for name in ("v_x", "r", *WHEELS) if name in signals}
     parts = _channels(log, str(log.path), of_wheels, log_map, run)
     return identified_scales(parts, of_wheels, wheel_units(log.headings(), of_wheels))
-
-
-def _scale_note(
-    log: LogFile, signals: Mapping[str, Signal], log_map: LogMap, run: str | None
-) -> str:
-    """Return what v_x tells of the wheels, which nothing else is read of."""
-    try:
-        return scale_text(wheel_scales(log, signals, log_map, run))
-    except RecordingError as error:
-        return f"the wheels are not used: {error}"
 
 
 def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:

@@ -9,7 +9,7 @@ the right throughout (SAE, NED) obeys the same laws.
 
 import numpy as np
 
-from codegen.arrays import Array, thinning
+from codegen.arrays import Array, root_mean_square, thinning
 from models.bicycle import measured_slip
 from models.logs.log import RecordingError
 from models.recordings.evidence import (
@@ -147,7 +147,7 @@ def world_axes(recording: Recording) -> str | None:
     course, r = found
     turns = np.abs(r) > 0.2 * np.percentile(np.abs(r), 99)
     course, r = course[turns], r[turns]
-    if r.size * WINDOW < 2.0 or not float(np.sqrt(np.mean(r**2))) > 0.01:
+    if r.size * WINDOW < 2.0 or not root_mean_square(r) > 0.01:
         return None
     slope = float(course @ r) / float(r @ r)
     if not (abs(abs(slope) - 1.0) < 0.2 and abs(correlation(course, r)) > 0.9):
@@ -303,7 +303,7 @@ def _check_steering(w: Means, turn: Steering) -> str | None:
     L = turn.wheelbase
     if turn.correlation < 0.7:
         return None
-    v = float(np.sqrt(np.mean(w.v_x**2)))
+    v = root_mean_square(w.v_x)
     longest = 7.5 + 0.03 * v**2
     if longest < L and proportional(w):
         in_degrees = "degrees? multiply it by pi/180"
@@ -353,7 +353,7 @@ def _check_forces(w: Means, turn: Steering | None) -> str | None:
     summed force implies, over the cube of the effective wheelbase.
     """
     a = w.acceleration
-    if w.force is None or np.sqrt(np.mean(a**2)) < 0.3:
+    if w.force is None or root_mean_square(a) < 0.3:
         return None
     for column, force in zip(("Fyf", "Fyr"), w.force.T, strict=True):
         together = correlation(force, a)
@@ -408,7 +408,7 @@ def vehicle_contradiction(recording: Recording, vehicle: Vehicle) -> str | None:
     """Return how a recording contradicts a vehicle, by the rules of `check_against_vehicle`."""
     w = windows(recording)
     a = w.acceleration
-    if w.r.size * STRIDE < 2.0 or np.sqrt(np.mean(a**2)) < 0.3:
+    if w.r.size * STRIDE < 2.0 or root_mean_square(a) < 0.3:
         return None
     l_f, l_r = vehicle.l_f, vehicle.l_r
     slip = None
@@ -424,7 +424,7 @@ def vehicle_contradiction(recording: Recording, vehicle: Vehicle) -> str | None:
     turn, other = steering(w), ""
     if turn is not None and turn.correlation > 0.7:
         L = shortest_wheelbase(w, turn)
-        v = float(np.sqrt(np.mean(w.v_x**2)))
+        v = root_mean_square(w.v_x)
         lowest, highest = (l_f + l_r) / 3.0, 3.0 * (l_f + l_r) + 0.03 * v**2
         if not lowest < L < highest:
             return (
@@ -463,7 +463,7 @@ def _falls(alpha: Array, pushed: Array) -> float | None:
     alpha : [rad] (k,).   pushed : force, or acceleration (k,).
     """
     together = correlation(alpha, pushed)
-    return together if together < -0.3 and np.sqrt(np.mean(alpha**2)) > 0.003 else None
+    return together if together < -0.3 and root_mean_square(alpha) > 0.003 else None
 
 
 def _check_rear_rises(alpha: Array, w: Means, l_r: float, other: str) -> str | None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import LONG, Array, filled, thinning
+from codegen.arrays import LONG, Array, filled, root_mean_square, thinning
 from models.recordings.record import Recording
 from models.vehicle import GRAVITY
 
@@ -277,14 +277,25 @@ def course_rate(recording: Recording) -> tuple[Array, Array] | None:
     return (turned, both.mean(recording.r)) if enough else None
 
 
-def steering(w: Means) -> Steering | None:
+def steering(w: Means, keep: NDArray[np.bool_] | bool = True) -> Steering | None:
     """Effective wheelbase sqrt(sum (v_x delta)^2 / sum r^2), or None when nothing turns.
 
     It is the wheelbase L of a neutral car; understeer adds K v_x^2. Samples with the tail out,
     where a driver may countersteer, do not count. Needs 2 s of turning, in which r and the steering
     go together beyond chance.
+    keep : which windows count (k,).
     """
-    return _wheelbase(w, np.ones(w.r.size, dtype=np.bool_))
+    keep = keep & w.grips
+    r, kinematic = w.r, w.v_x * w.delta
+    if not keep.any():
+        return None
+    together = pair(r[keep], kinematic[keep])
+    felt = 0.0 if w.a_y is None else float(np.std(w.a_y))
+    turned, steered = (root_mean_square(w.v_x * one) for one in (r, kinematic))
+    moving = max(turned, felt, steered / _LONGEST)
+    if together.sign == 0 or moving < _LEAST:
+        return None
+    return Steering(together.ratio, together.correlation)
 
 
 def proportional(w: Means) -> bool:
@@ -311,23 +322,8 @@ def shortest_wheelbase(w: Means, turn: Steering) -> float:
     steered by less than half the usual peak.
     """
     size = np.abs(w.delta)
-    small = _wheelbase(w, size < 0.5 * np.percentile(size, 95))
+    small = steering(w, size < 0.5 * np.percentile(size, 95))
     return turn.wheelbase if small is None else min(turn.wheelbase, small.wheelbase)
-
-
-def _wheelbase(w: Means, keep: NDArray[np.bool_]) -> Steering | None:
-    """Return the effective wheelbase over some of the windows, None without excitation."""
-    keep = keep & w.grips
-    r, kinematic = w.r, w.v_x * w.delta
-    if not keep.any():
-        return None
-    together = pair(r[keep], kinematic[keep])
-    felt = 0.0 if w.a_y is None else float(np.std(w.a_y))
-    turned, steered = (float(np.sqrt(np.mean((w.v_x * one) ** 2))) for one in (r, kinematic))
-    moving = max(turned, felt, steered / _LONGEST)
-    if together.sign == 0 or moving < _LEAST:
-        return None
-    return Steering(together.ratio, together.correlation)
 
 
 def computed_v_y(recording: Recording) -> str | None:
@@ -361,7 +357,7 @@ def computed_v_y(recording: Recording) -> str | None:
     slope = 1.0 if a_y is None else float(w.mean(a_y) @ turn / (turn @ turn))
     if np.percentile(np.abs(turn), 95) > _LARGEST_TURN or not _SLOPE[0] < slope < _SLOPE[1]:
         return None  # units
-    usual = float(np.sqrt(np.mean(v_x**2)))
+    usual = root_mean_square(v_x)
     slips = [
         v_x * (behind(v_x * r, usual / push) / push - recording.delta_r)
         for push in GRAVITY * _LOADS_PER_RAD

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import Array, root_mean_square
 from models.logs.clock import Raw, gaps, typical_step
 from models.logs.log import RecordingError
 from models.logs.signals import POSE, QUANTITIES, Signal
@@ -62,8 +62,8 @@ def with_pose(
         values = signals[name].value([raw.values], QUANTITIES[name])
         pose[name] = raw._replace(values=values)
     motion = _motion_of(label, pose, signals, declared)
-    sideways = float(np.sqrt(np.mean(motion.v_y.values**2)))
-    if sideways < _NO_SLIP * float(np.sqrt(np.mean(motion.v_x.values**2))):
+    sideways = root_mean_square(motion.v_y.values)
+    if sideways < _NO_SLIP * root_mean_square(motion.v_x.values):
         raise RecordingError(
             f"{label}: the pose never leaves its heading, as one that is integrated from wheels: "
             "vy is not in it; give the pose of another sensor, or leave it out"

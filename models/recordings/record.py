@@ -23,6 +23,8 @@ from codegen.arrays import LONG, Array, blocks, filled, large
 from models.bicycle import measured_slip
 from models.files import write_atomically
 from models.logs.log import RecordingError
+from models.logs.signals import COLUMNS, QUANTITIES
+from models.logs.units import FORCE, TABLES
 from models.rules import LARGEST_FORCE
 
 MINIMUM_SAMPLES = 10  # of a segment: fewer are no recording
@@ -39,10 +41,9 @@ _MISSING = {
 }
 
 # Beyond these, in SI, a number is no signal of a car whatever its unit: degrees, g and km/h fit.
-LARGEST = {
-    "t": 1e12, "v_x": 1e4, "v_y": 1e4, "r": 1e4, "delta_f": 1e5, "delta_r": 1e5, "a_x": 1e5,
-    "a_y": 1e5, "axle_force": LARGEST_FORCE,
-}  # fmt: skip
+_MOST: Mapping[str, float] = TABLES["largest"] | {FORCE: LARGEST_FORCE}
+LARGEST = {name: _MOST[quantity] for name, quantity in QUANTITIES.items()}
+LARGEST |= {"t": 1e12, "axle_force": LARGEST_FORCE}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -469,12 +470,12 @@ def write_recording(recording: Recording, path: str | Path) -> Path:
 
 def _columns(recording: Recording) -> dict[str, Array]:
     """Return the signals that there are, by the standard names of columns."""
-    signals = {
-        "t": recording.t, "vx": recording.v_x, "vy": recording.logged_v_y, "r": recording.r,
-        "delta_f": recording.delta_f, "delta_r": recording.delta_r, "ay": recording.a_y,
-        "ax": recording.a_x,
-    }  # fmt: skip
-    columns = {name: signal for name, signal in signals.items() if signal is not None}
+    logged = recording.as_logged()
+    columns = {
+        COLUMNS.get(name, name): signal
+        for name in _SIGNALS[:-1]
+        if (signal := getattr(logged, name)) is not None
+    }
     if recording.axle_force is not None:
         columns["Fyf"], columns["Fyr"] = recording.axle_force.T
     return columns

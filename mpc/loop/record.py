@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import Array, root_mean_square
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from mpc.cars import CarState, DoubleTrackCar
@@ -228,7 +228,7 @@ def scores(drive: Drive) -> Scores:
     }
     solve_ms = 1e3 * drive.solve_time
     return Scores(
-        rms_e_y_m=float(np.sqrt(np.mean(drive.e_y**2))),
+        rms_e_y_m=root_mean_square(drive.e_y),
         peak_e_y_m=float(np.abs(drive.e_y).max()),
         completed=drive.completed,
         failures=failures,

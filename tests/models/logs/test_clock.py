@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from codegen import arrays
 from models.logs.clock import (
     Raw,
-    are_one_clock,
     gaps,
     holes,
     on_one_clock,
@@ -159,12 +158,6 @@ def test_empty_cells_of_a_slower_channel_are_no_holes_but_single_ones_are():
     )
     cut = without_empty(broken, cut=True)
     assert cut.t.size == 90 and np.array_equal(cut.values, cut.t) and cut.rows[0] == 1
-
-
-def test_clocks_are_one_where_their_numbers_are():
-    t = DT * np.arange(10)
-    assert are_one_clock([raw(t, t), raw(t.copy(), t)])
-    assert not are_one_clock([raw(t, t), raw(t + 1e-9, t)])
 
 
 @pytest.mark.parametrize("n", [2, 3, 999, 1000, 5000])
