@@ -28,6 +28,7 @@ _TAIL_OUT = 0.15  # [rad]: sideslip against the turn beyond which a driver may c
 # doctor's and without, beside computed ones; 0 of 720 clean logs of 80 others were one.
 _LOADS_PER_RAD = np.geomspace(4.0, 40.0, 7)  # stiffness of a rear axle: none is stiffer
 _BEHIND = 0.6  # [s], the slowest low pass that it may be behind
+_FORGOTTEN = 8.0  # time constants after which it has forgotten
 _COMPUTED = 0.25  # of what the best tire misses of v_y, that a formula misses at most,
 _AT_RANDOM = 0.2  # and of what is then left, that goes with the motion at most,
 _EXACTLY = 0.01  # unless so little of both is left
@@ -339,12 +340,11 @@ def computed_v_y(recording: Recording) -> str | None:
     v_x, r, dt = recording.v_x, recording.r, recording.dt
     if y is None or len(w) < _FEWEST or not np.ptp(r) > 0.0:
         return None
-    from scipy.optimize import minimize_scalar  # takes long to import
-    from scipy.signal import lfilter
 
     def behind(x: Array, tau: float) -> Array:
-        share = dt / (tau + dt)
-        return np.asarray(lfilter([share], [1.0, share - 1.0], x, zi=[(1.0 - share) * x[0]])[0])
+        kernel = (tau / (tau + dt)) ** np.arange(1 + round(_FORGOTTEN * tau / dt))
+        before = np.full(kernel.size - 1, x[0])
+        return np.convolve(np.append(before, x), kernel / kernel.sum(), mode="valid")
 
     def rest(of: Array, *beside: Array) -> Array:
         q, _ = np.linalg.qr(np.column_stack([np.ones(len(w)), *map(w.mean, (v_x, *beside))]))
@@ -362,11 +362,15 @@ def computed_v_y(recording: Recording) -> str | None:
         v_x * (behind(v_x * r, usual / push) / push - recording.delta_r)
         for push in GRAVITY * _LOADS_PER_RAD
     ]
-    tau = minimize_scalar(
-        lambda tau: left(y, behind(r, tau)), bounds=(0.0, _BEHIND), method="bounded"
-    ).x
-    formulas = ("r", r), ("r", behind(r, tau)), ("vx delta_f", v_x * recording.delta_f)
     needed = min(left(y + one, r) for one in slips)
+    tau, taus = 0.0, np.linspace(0.0, _BEHIND, 13)
+    for _ in range(4):
+        misses = [left(y, behind(r, one)) for one in taus]
+        tau = float(taus[np.argmin(misses)])
+        if min(*misses, left(y), left(y, v_x * recording.delta_f)) > needed:
+            return None
+        taus = np.abs(tau + (taus[1] - taus[0]) * np.linspace(-1.0, 1.0, 7))
+    formulas = ("r", r), ("r", behind(r, tau)), ("vx delta_f", v_x * recording.delta_f)
     of, x = min(formulas, key=lambda one: left(y, one[1]))
     beside = [x] if left(y) > _COMPUTED * needed else []
     missed = left(y, *beside)
