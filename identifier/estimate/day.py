@@ -6,7 +6,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.day import ENOUGH, INSTALLED, NUMBERS, WHERE, Day, usual_errors
-from identifier.estimate.drive import SLOW, Drive, hardest, thinned
+from identifier.estimate.drive import FASTEST, SLOW, Drive, hardest, thinned
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import estimate
 from identifier.motion.parameters import INDEX
@@ -17,6 +17,7 @@ _STEERED = np.array([name.startswith("steering") for name in NUMBERS])
 _ZEROS = 3  # of NUMBERS, that change from day to day
 _ANOTHER = 30.0  # squared deviations of a segment's zeros from those of the whole: another day
 _LONGEST = 600.0  # [s] of a log that are looked at: those of hardest cornering
+_ROUGH = 0.04  # [s] of a sedan, to which samples are averaged to see whether days differ
 _LEAST_DOUBT = 0.02  # of what was identified, in standard deviations of the table
 _GENTLE = 0.4  # g, up to which steering without v_y tells its zero, and
 _SLOWLY = 0.25  # [s] of a sedan, over which samples are averaged for it: of 16 random cars, two
@@ -27,13 +28,16 @@ _FINE = 5e-4  # [rad] of noise, within which least absolute deviations are squar
 _ROUNDS = 5  # of those
 
 
-def day_of(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) -> Day:
+def day_of(
+    recording: Recording, vehicle: Vehicle, p: Array, covariance: Array, fastest: float = FASTEST
+) -> Day:
     """Return the errors of a log's sensors with the tires held, by its motion alone.
 
     What is installed (steering gain, place of the v_y sensor) is believed about what was
     identified, as sure as that is, the rest about zero. Of a log with less than 15 s of driving
     they are those of the identification drive; a v_y that was estimated has none.
     p, covariance : of the tires, as `motion.parameters` lists them (p,), (p, p).
+    fastest : sampling interval to which samples are averaged [s].
     """
     table, usual = Priors.of(vehicle), usual_errors(vehicle)
     taught, doubt = p[WHERE], covariance[np.ix_(WHERE, WHERE)]
@@ -44,7 +48,7 @@ def day_of(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) 
         return Day.of(value, P, (expected, usual), recording.v_x[on], anew=False)
     if np.count_nonzero(on) * recording.dt < ENOUGH:
         return Day.of(taught, doubt, (taught, usual), recording.v_x[on], anew=False)
-    drive = Drive.of(recording, vehicle, hardest(recording, _LONGEST))
+    drive = Drive.of(recording, vehicle, hardest(recording, _LONGEST), fastest=fastest)
     v_x = drive.signals[drive.counts, 0]
     mean, moves = p.copy(), np.zeros(p.size, dtype=bool)
     information = np.zeros_like(table.information)
@@ -72,16 +76,26 @@ def days_of(
     Of several logs in a row each long segment has a day of its own where they differ clearly, and
     short ones have that of the one before; else there is one.
     """
+    given = vehicle, p, covariance
+    return tuple(
+        (0 if k == 0 else one.start, day_of(recording.taken(one), *given))
+        for k, one in enumerate(days_apart(recording, *given))
+    ) or ((0, day_of(recording, *given)),)
+
+
+def days_apart(recording: Recording, vehicle: Vehicle, p: Array, covariance: Array) -> list[slice]:
+    """Return the long segments of a log where they differ as days do; none where they are alike."""
     long, z = long_segments(recording, vehicle), slice(0, _ZEROS)
-    if len(long) > 1:
-        each = [day_of(recording.taken(one), vehicle, p, covariance) for one in long]
-        weights = [np.linalg.inv(one.covariance[z, z]) for one in each]
-        pulls = [W @ one.value[z] for W, one in zip(weights, each, strict=True)]
-        mean = np.linalg.solve(np.sum(weights, axis=0), np.sum(pulls, axis=0))
-        away = [one.value[z] - mean for one in each]
-        if max(float(d @ W @ d) for W, d in zip(weights, away, strict=True)) > _ANOTHER:
-            return tuple(zip([0, *(one.start for one in long[1:])], each, strict=True))
-    return ((0, day_of(recording, vehicle, p, covariance)),)
+    rough = _ROUGH * min(vehicle.scale, 1.0)
+    if len(long) < 2:
+        return []
+    each = [day_of(recording.taken(one), vehicle, p, covariance, rough) for one in long]
+    weights = [np.linalg.inv(one.covariance[z, z]) for one in each]
+    pulls = [W @ one.value[z] for W, one in zip(weights, each, strict=True)]
+    mean = np.linalg.solve(np.sum(weights, axis=0), np.sum(pulls, axis=0))
+    away = [one.value[z] - mean for one in each]
+    far = max(float(d @ W @ d) for W, d in zip(weights, away, strict=True))
+    return long if far > _ANOTHER else []
 
 
 def steering_zeros(recording: Recording, vehicle: Vehicle) -> Array:

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from codegen.arrays import Array, one_thread, root_mean_square
-from identifier.estimate.day import days_of, long_segments, steering_zeros
+from identifier.estimate.day import days_apart, long_segments, steering_zeros
 from identifier.estimate.drive import FASTEST, Drive, hardest
 from identifier.estimate.information import CHANGES, Information
 from identifier.estimate.latent import Learnt, accelerometer_off, latent_priors, learn_latent
@@ -159,7 +159,7 @@ def fit(
 
         def are_apart(by: FittedModel) -> bool:
             one_rate = len({one.dt for one in measured}) == 1
-            return one_rate and len(days_of(joined(measured), vehicle, by.p, by.covariance)) > 1
+            return one_rate and bool(days_apart(joined(measured), vehicle, by.p, by.covariance))
 
         apart = are_apart(model)
         share = 0.0 if apart else _missed(measured, model)
