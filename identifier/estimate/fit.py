@@ -185,9 +185,13 @@ def _missed(recordings: Sequence[Recording], model: FittedModel) -> float:
         rms = root_mean_square(v_x * r / GRAVITY)
         if rms <= _FORCELESS:
             continue
-        p = model.on(one).on(model.p)
-        e = simulate(drive, p, model.vehicle)["residual"][drive.counts]
-        shares.append(float(np.sqrt(np.mean(e**2, axis=0)).max()) / rms)
+        for day in (None, model.on):  # its own zeros only where those of all do not do
+            p = model.p if day is None else day(one).on(model.p)
+            e = simulate(drive, p, model.vehicle)["residual"][drive.counts]
+            share = float(np.sqrt(np.mean(e**2, axis=0)).max()) / rms
+            if share <= _NOTHING_FITS:
+                break
+        shares.append(share)
     return max(shares)
 
 
