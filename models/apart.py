@@ -20,7 +20,7 @@ try:
     import fcntl
     import resource
 except ImportError:  # not on Windows
-    resource = None  # type: ignore[assignment]
+    resource = None  # type: ignore[assignment]  # a module else
 
 _T = TypeVar("_T")
 
@@ -113,7 +113,7 @@ def serve() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # for what a library prints
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's
     fcntl.fcntl(ask, fcntl.F_SETOWN, os.getpid())
-    while ask.peek(1):  # type: ignore[union-attr]
+    while ask.peek(1):  # type: ignore[union-attr]  # a buffered reader
         os.environ[VARIABLE], memory, seconds, function, args = pickle.load(ask)
         used = resource.getrusage(resource.RUSAGE_SELF)
         _limit(resource.RLIMIT_DATA, memory)

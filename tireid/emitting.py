@@ -11,9 +11,8 @@ import numpy as np
 from codegen.writing import write_file
 from identifier.export.ggv import ggv_text
 from identifier.export.slipx import slipx_files
-from identifier.export.steady import steady_text
+from identifier.export.steady import Understeer, steady_text, understeer_gradient
 from identifier.export.tir import tire_properties
-from identifier.export.understeer import Understeer, understeer_gradient
 from identifier.tire_model import AXLES, TireModel
 from models.files import resolved, write_atomically
 from tireid.output import OutputError, output_folder, require_free

@@ -83,11 +83,11 @@ def _piece_findings(recording: Recording) -> list[Finding]:
 
 
 def _computed(pieces: tuple[Recording, ...]) -> Finding | None:
-    """Return a v_y that follows a formula in most pieces, with which nothing else can be told."""
-    told = [one for one in map(computed_v_y, pieces) if one is not None]
-    if 2 * len(told) <= len(pieces):
+    """Return a v_y that follows a formula in most pieces, with which nothing else can be found."""
+    words = [one for one in map(computed_v_y, pieces) if one is not None]
+    if 2 * len(words) <= len(pieces):
         return None
-    return _found("computed", "v_y", math.nan, CERTAIN, told[0])
+    return _found("computed", "v_y", math.nan, CERTAIN, words[0])
 
 
 def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:

@@ -83,10 +83,10 @@ def long_log(table: Table) -> GroupedLog[Any] | None:
     t = in_seconds(clock, stamps)
     order = np.argsort(codes, kind="stable")
     edges = np.searchsorted(codes[order], np.arange(1, len(words_of)))
-    told = None if unit is None else cells.words[unit]
+    written = None if unit is None else cells.words[unit]
     found = []
     for word, rows in zip(words_of, np.split(order, edges), strict=True):
-        there = [told.names[k] for k in np.unique(told.codes[rows])] if told else []
+        there = [written.names[k] for k in np.unique(written.codes[rows])] if written else []
         given = [one for one in there if is_given(one)] or [unit_in_name(word)]
         if not all(are_same(given[0], one) for one in given):
             raise RecordingError(

@@ -65,7 +65,7 @@ _GIVEN_STEP = re.compile(
 # RaceCapture describes a channel in one cell: "Speed"|"mph"|0.0|150.0|10, its range and rate.
 _DESCRIBED = re.compile(r'"?(?P<name>[^"|]+)"?\|"?(?P<unit>[^"|]*)"?(?:\|[-+.\deE]*){1,3}')
 # A channel that is described by lines, not by its column: "Channel : Speed", "Ch 1 = Speed [km/h]".
-_TOLD = re.compile(
+_LISTED = re.compile(
     r"\W*(?:(?:channel|ch|signal|column|col|kanal|spalte|name|field|parameter)(?: ?name| ?\d+)?"
     r"|(?P<unit>units?|einheit)(?: ?\d+)?)\s*[:=]\s*(?P<what>.*\S)\s*",
     re.I,
@@ -392,25 +392,25 @@ def _listed(lines: list[_Line], way: _Way) -> tuple[list[_Line], int] | None:
 
     Of one name less than columns the first column is the time.
     """
-    told: list[list[str]] = []
+    listed: list[list[str]] = []
     last = 0
     for line in lines:
-        if (found := _TOLD.fullmatch(line.text)) and (told or not found["unit"]):
+        if (found := _LISTED.fullmatch(line.text)) and (listed or not found["unit"]):
             last = line.number
             if found["unit"]:
-                told[-1][1] = found["what"]
+                listed[-1][1] = found["what"]
             else:
-                told.append([found["what"], ""])
-    if len(told) < 2 or way.width - len(told) not in (0, 1):
+                listed.append([found["what"], ""])
+    if len(listed) < 2 or way.width - len(listed) not in (0, 1):
         return None
-    told = [["Time", ""]] * (way.width - len(told)) + told
+    listed = [["Time", ""]] * (way.width - len(listed)) + listed
     rows = (k for k in range(last, len(lines)) if len(lines[k].cells) == way.width)
     first = next((k for k in rows if _is_data(lines[k], way, 0)), None)
     names, units = (
-        way.delimiter.join(map('"{}"'.format, some)) for some in zip(*told, strict=True)
+        way.delimiter.join(map('"{}"'.format, some)) for some in zip(*listed, strict=True)
     )
     zone = [_Line(last, text, way.delimiter) for text in (units, names)]
-    return None if first is None else (zone[not any(one[1] for one in told) :], first)
+    return None if first is None else (zone[not any(one[1] for one in listed) :], first)
 
 
 def _header_zone(lines: list[_Line], way: _Way) -> tuple[list[_Line], int]:
@@ -528,8 +528,10 @@ def _racelogic(path: Path, lines: list[str], encoding: str, at: dict[str, int]) 
             units = [word if is_unit(word) else "" for word in last]
     if "channel units" in at:
         units = _with_channel_units(lines, at, names, units)
-    told = (_OF_THE_BOX.get(name.lower(), "") for name in names)
-    units = [one if one == "hhmmss" else unit or one for one, unit in zip(told, units, strict=True)]
+    known = (_OF_THE_BOX.get(name.lower(), "") for name in names)
+    units = [
+        one if one == "hhmmss" else unit or one for one, unit in zip(known, units, strict=True)
+    ]
     first = at["data"] + 1
     data = [cells for line in lines[first:] if len(cells := cells_of(line, BLANKS)) == len(names)]
     way = _way([line for line in lines[first:] if line.strip()][-_TAIL:])

@@ -690,7 +690,7 @@ def not_rising(t: Array, rows: NDArray[np.int64], place: str, *, restarts: bool 
     steps = np.diff(t[k : k + LONGEST_IN_MEMORY])
     moves = int(np.count_nonzero(steps > 0.0))
     if k == 0 and not moves:
-        return said + "it never moves: declare the column of the time"
+        return said + "it never moves: declare the column of the time, or --rate HZ"
     if moves and steps.size / moves >= _SHARED:
         return said + (
             f"stamps are rounded, {steps.size / moves:.3g} samples share one, and no even clock "

@@ -17,9 +17,8 @@ from identifier.estimate.priors import Priors
 from identifier.estimate.solve import car_numbers
 from identifier.export.ggv import ggv_text, limits
 from identifier.export.slipx import slipx_files
-from identifier.export.steady import steady_text
+from identifier.export.steady import steady_text, understeer_gradient
 from identifier.export.tir import tire_properties
-from identifier.export.understeer import understeer_gradient
 from identifier.methods import make_method
 from identifier.motion.model import pushed_function
 from identifier.motion.parameters import INDEX
