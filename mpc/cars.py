@@ -38,8 +38,9 @@ class CarState(NamedTuple):
     inner: Any
 
 
-# Who holds the speed: without an integral, which would lag behind a profile.
-_HOLDING = Driver(gain=2.0, integral_gain=0.0, acceleration_limit=4.0)
+BRAKES = 9.0  # m/s²: hardest braking and driving of who holds the speed
+# Without an integral, which would lag behind a profile.
+_HOLDING = Driver(gain=4.0, integral_gain=0.0, acceleration_limit=BRAKES)
 
 
 class DoubleTrackCar:

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from identifier.paper.design import PaperIdentifier as PaperIdentifier
     from identifier.plan import plan as plan
     from identifier.prediction import Prediction as Prediction
+    from identifier.speed_limits import SpeedLimits as SpeedLimits
+    from identifier.speed_limits import speed_limits as speed_limits
     from identifier.tire_model import TireModel as TireModel
     from identifier.verdict import Verdict as Verdict
     from models.recordings import LogMap as LogMap
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
     from models.vehicle import Vehicle as Vehicle
     from models.vehicle import sedan as sedan
     from mpc import path as _path
+    from mpc.path.speed import SpeedProfile as SpeedProfile
+    from mpc.path.speed import speed_profile as speed_profile
     from tireid import errors as errors
     from tireid.driving.learn import sample_recording as sample_recording
     from tireid.driving.runs import drive as drive
@@ -61,10 +65,12 @@ _NAMES = {  # by the module that they lie in
     "identifier.paper.design": "PaperIdentifier",
     "identifier.plan": "plan",
     "identifier.prediction": "Prediction",
+    "identifier.speed_limits": "SpeedLimits speed_limits",
     "identifier.tire_model": "TireModel",
     "identifier.verdict": "Verdict",
     "models.recordings": "LogMap Recording Repair Wheels read_recording read_repaired",
     "models.vehicle": "Vehicle sedan",
+    "mpc.path.speed": "SpeedProfile speed_profile",
     "tireid.driving.learn": "sample_recording",
     "tireid.driving.runs": "drive",
     "tireid.emitting": "emit",

@@ -16,6 +16,7 @@ from mpc.tires.tire import Car, Point
 
 LARGEST_SLIP = 0.25  # rad: an axle slides long before
 _SHARES = (0.02, 0.04, 0.08, 0.16, 0.28, 0.44, 0.64, 1.0)  # of the largest slip that is judged
+_SPEED = 20.0  # m/s, of a force that is compared
 _MOST_GRIP = 1.8  # static axle loads: no road tire has more
 _LEAST_GRIP = 0.03  # static axle loads at a slip of 0.1 rad and more: less is no road
 _WRONG_WAY = 0.03  # static axle loads that a force may push the wrong way, for offsets of sensors
@@ -57,6 +58,12 @@ def tire_complaint(tire: PredictionTire, v_x: float, largest: float = LARGEST_SL
         if not (push[0].sum(axis=0)[0] > 0.0):
             return f"the force of the {axle} axle does not rise with slip"
     return None
+
+
+def largest_push(tire: PredictionTire) -> Array:
+    """Return the largest force of each axle, straight ahead, (2,) [static axle loads]."""
+    slip, forces = _forces(tire, _SPEED, LARGEST_SLIP)
+    return np.asarray((forces * np.sign(slip))[0].max(axis=-1).mean(axis=-1))
 
 
 def _forces(tire: PredictionTire, v_x: float, largest: float) -> tuple[Array, Array]:

@@ -53,10 +53,11 @@ class Learner:
     planned steering rate by no more than they allow.
 
     Attributes: supervisor.
+    steers : False leaves the tracker its tire, and only watches the road.
     """
 
-    def __init__(self, supervisor: Supervisor) -> None:
-        self.supervisor = supervisor
+    def __init__(self, supervisor: Supervisor, *, steers: bool = True) -> None:
+        self.supervisor, self._steers = supervisor, steers
         self._sensors = Consistency(supervisor.identifier.method.dt)
         self._steered: deque[float] = deque()  # what was asked of the wheels, newest last [rad]
         self._left = 0.0  # time in which to arrive [s]
@@ -80,7 +81,8 @@ class Learner:
             rules = self.supervisor.rules
             self._quick = decision.verdict is not Verdict.LEARNT
             self._left = rules.quick_blend if self._quick else rules.blend
-        self._move(tracker)
+        if self._steers:
+            self._move(tracker)
         return f"{decision.verdict.value}: {decision.reason}" if decision and changed else None
 
     def _requested(self, tracker: Tracker) -> float | None:

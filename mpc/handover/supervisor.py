@@ -10,7 +10,12 @@ from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
 from models.vehicle import Vehicle
-from mpc.handover.certificate import LARGEST_SLIP, law_complaint, tire_complaint
+from mpc.handover.certificate import (
+    LARGEST_SLIP,
+    largest_push,
+    law_complaint,
+    tire_complaint,
+)
 from mpc.handover.judge import ChiSquare, Judge, Window
 from mpc.handover.road import Road, look_at_road
 from mpc.handover.rules import Decision, Rules, Verdict
@@ -122,6 +127,7 @@ class Supervisor:
         self._sample, self._lost = (0.0, 0.0, 0.0, 0.0), 0
         self._baseline = 1.0  # mean chi-square of the tire in use
         self._road = Road(in_use)
+        self._first, self._weighed, self._friction = largest_push(in_use), in_use, 1.0
         # What was steered with and what was learnt, and since when [s], to go back to.
         self._steered = [(-math.inf, in_use, self._road)]
         self._models: list[tuple[float, TireModel | None]] = [(-math.inf, identifier.start)]
@@ -133,6 +139,14 @@ class Supervisor:
     def t(self) -> float:
         """Time since the first sample [s]."""
         return self._samples * self._dt
+
+    @property
+    def friction(self) -> float:
+        """Friction of the road over that of the first tire in use, as it is known now [-]."""
+        if self._weighed is not self.target:
+            self._weighed = self.target
+            self._friction = float((largest_push(self.target) / self._first).min())
+        return self._friction
 
     def observe(
         self, v_x: float, v_y: float, r: float, delta: float, *, fault: str | None = None

@@ -14,9 +14,11 @@ import numpy as np
 from models.sensors import is_measured
 from mpc.cars import CarState, DoubleTrackCar
 from mpc.loop.lateral import LateralVelocity
+from mpc.loop.pace import Earned
 from mpc.loop.record import COMPLETED, Drive, Recorder
-from mpc.loop.sensing import CarSensors, Measured, Measures, SpeedProfile
+from mpc.loop.sensing import CarSensors, Measured, Measures
 from mpc.path.path import Path, Projection
+from mpc.path.speed import SpeedProfile
 from mpc.realtime.instance import Measurement
 from mpc.realtime.tracker import Tracker
 
@@ -38,7 +40,7 @@ def drive(
     car: DoubleTrackCar,
     tracker: Tracker,
     *,
-    speed: SpeedProfile | float,
+    speed: SpeedProfile | Earned | float,
     sensors: Measures | None = None,
     delay: int = 1,
     rng: np.random.Generator,
@@ -55,7 +57,8 @@ def drive(
     """Drive a car along a path.
 
     path : to follow, from s = 0.   tracker : which steers; it is reset.
-    speed : wanted along the path, [m/s] where it is a number.
+    speed : wanted along the path, [m/s] where it is a number; one that is earned may be replaced
+    on the way.
     sensors : of the car; None measures exactly.
     lateral : tells v_y, and a_y in the plane of the road, in place of the sensors; None takes what
     they show.
@@ -73,6 +76,9 @@ def drive(
         raise ValueError(f"delay must not be negative, it is {delay}")
     if not blind > 0.0:
         raise ValueError(f"blind must be positive, it is {blind}")
+    earned = speed if isinstance(speed, Earned) else None
+    if isinstance(speed, Earned):
+        speed = speed.profile
     profile = speed if isinstance(speed, SpeedProfile) else SpeedProfile(path, speed)
     sensors = sensors if sensors is not None else CarSensors()
     goal = path.length * (laps if path.closed else 1.0)
@@ -96,6 +102,9 @@ def drive(
         last_s = projected.s
         if learner is not None:
             record.note(state.t, learner.observe(measured, tracker))
+        if earned is not None:
+            record.note(state.t, earned.observe(measured, projected.s, place.v_x))
+            profile = earned.profile
         ahead = profile.ahead(projected.s, place.v_x, tracker.times, car.speed_gain)
         situation = Measurement(
             e_y=projected.e_y,

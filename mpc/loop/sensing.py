@@ -7,9 +7,7 @@ from functools import cache
 from typing import NamedTuple, TypeAlias, cast
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from codegen.arrays import Array
 from models.faults import FaultError, SensorFault
 from models.friction import Friction
 from models.maneuvers import StepSteer
@@ -18,7 +16,6 @@ from models.sensors import Sensor, SensorError
 from models.tires import Tire
 from models.vehicle import GRAVITY, Vehicle
 from mpc.cars import CarState
-from mpc.path.path import Path
 
 _BIAS_A_Y = 0.05  # m/s²: standard deviation from one unit to the next
 _BIAS_R = 0.001  # rad/s: standard deviation from one unit to the next
@@ -176,86 +173,6 @@ class FaultySensors:
 
 
 Measures: TypeAlias = CarSensors | FaultySensors  # what a loop measures a car with
-
-# The wanted speed along a path, and what a tracker is given of the road ahead.
-#
-# v(s): wanted speed [m/s] at the samples of the path. The car's speed v_x runs to it with the time
-# constant 1/k of the driver's gain, so that ahead it is v(s(t)) + (v_x - v(s)) exp(-k t).
-
-
-class _Preview(NamedTuple):
-    """The road at some times ahead, each (k,): arc length [m], curvature [1/m], speed [m/s]."""
-
-    s: Array
-    kappa: Array
-    v_x: Array
-
-
-class SpeedProfile:
-    """A wanted speed along a path.
-    v : wanted speed [m/s], a number or one for each sample of the path, (n,).
-    """
-
-    def __init__(self, path: Path, v: ArrayLike) -> None:
-        self.v: Array = np.broadcast_to(np.asarray(v, dtype=np.float64), path.s.shape).copy()
-        if not (self.v > 0.0).all() or not np.isfinite(self.v).all():
-            raise ValueError(f"speeds must be positive and finite, the least is {self.v.min()}")
-        self.path = path
-        pace = 0.5 * (1.0 / self.v[1:] + 1.0 / self.v[:-1])
-        self._t = np.concatenate([[0.0], np.cumsum(pace * np.diff(path.s))])
-        self._acceleration = self.v * np.gradient(self.v, path.s)
-
-    @property
-    def lap_time(self) -> float:
-        """Time from the first to the last sample at the wanted speed [s]."""
-        return float(self._t[-1])
-
-    def at(self, s: ArrayLike) -> Array:
-        """Return the wanted speed [m/s] in the shape of s.
-
-        s : arc length [m].
-        """
-        return self.path.along(self.v, s)
-
-    def reference(self, s: float, gain: float) -> float:
-        """Return what to ask of a proportional driver, so that it does not lag behind [m/s].
-
-        s : arc length [m].
-        gain : acceleration that the driver asks for, per error of the speed [1/s].
-        """
-        beyond = not self.path.closed and not 0.0 <= s <= self.path.length
-        slope = 0.0 if beyond else float(self.path.along(self._acceleration, s))
-        return float(self.at(s)) + slope / gain
-
-    def ahead(self, s: float, v_x: float, t: Array, gain: float) -> _Preview:
-        """Return the road that the car will be on.
-
-        s : arc length now [m].   v_x : speed now [m/s].   t : times from now [s], (k,).
-        gain : of the driver [1/s].
-        """
-        error, fades = v_x - float(self.at(s)), np.exp(-gain * t)
-        there = self._place(self.time_at(s) + t) + error * (1.0 - fades) / gain
-        return _Preview(there, self.path.curvature(there), self.at(there) + error * fades)
-
-    def time_at(self, s: float) -> float:
-        """Return the time at which a car at the wanted speed is at s, laps included."""
-        if self.path.closed:
-            laps, within = divmod(s, self.path.length)
-            return laps * self.lap_time + float(np.interp(within, self.path.s, self._t))
-        if s > self.path.length:
-            return self.lap_time + (s - self.path.length) / float(self.v[-1])
-        return float(np.interp(s, self.path.s, self._t)) + min(s, 0.0) / float(self.v[0])
-
-    def _place(self, t: Array) -> Array:
-        """Return where a car at the wanted speed is, laps included: the inverse of `time_at`."""
-        if self.path.closed:
-            laps = np.floor(t / self.lap_time)
-            within = np.interp(t - laps * self.lap_time, self._t, self.path.s)
-            return np.asarray(laps * self.path.length + within)
-        before, after = np.minimum(t, 0.0), np.maximum(t - self.lap_time, 0.0)
-        there = np.interp(t, self._t, self.path.s)
-        return np.asarray(there + before * self.v[0] + after * self.v[-1])
-
 
 # How hard a car can corner, found by driving it: steered more and more at constant speed.
 #

@@ -14,6 +14,7 @@ from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.run import identify
 from identifier.tire_model import TireModel
 from identifier.verdict import Verdict
+from models.vehicle import GRAVITY
 from mpc.path import BUILT_IN
 from tireid import report as page
 from tireid.commands import certificate_table
@@ -53,17 +54,17 @@ from tireid.verdicts import (
 
 LANE_CHANGE, _SLIPPERY = "drive", "drive_slippery"  # folders beside the report
 _FILM = FORMATS[0]
-_CASES = {  # path, share of the grip, drops of friction [m] and to what, tires; in a number's words
+_CASES = {  # path, a_y in bends [g], drops of friction [m] and to what, tires; in a number's words
     LANE_CHANGE: (
         "iso-3888-2",
-        0.9,
+        0.79,
         (),
         (FROZEN, LINEAR, ORACLE),
-        "in the lane change at 90 % of the grip",
+        "in the lane change at 0.79 g",
     ),
     _SLIPPERY: (
         "slalom",
-        0.57,
+        0.5,
         ((110.0, 0.5),),
         (LEARNING, FROZEN, LINEAR),
         "where friction drops to half",
@@ -84,8 +85,8 @@ def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
     compiler.
     """
     found: dict[str, Driven] = {}
-    for name, (path, share, drops, labels, _) in _CASES.items() if find_compiler() else ():
-        wish = SpeedWish(share, None)
+    for name, (path, a_y, drops, labels, _) in _CASES.items() if find_compiler() else ():
+        wish = SpeedWish(a_y=a_y * GRAVITY)
         setup = Setup(path=BUILT_IN[path](), vehicle=story.car, mu=1.0, drops=drops, wish=wish)
         conditions = Conditions(setup=setup, delay=2, noise=True, seed=0, laps=1.0)
         source = "frozen ones identified on the slalom"
@@ -122,8 +123,8 @@ def drive_section(driven: Mapping[str, Driven], folder: Path) -> page.Section:
         *_scores(slippery, "Deviation and the rest along the path."),
         *known_blocks(slippery.drives.runs, slippery.figures),
         (
-            "The lane change of ISO 3888-2 at 90 % of the lateral acceleration that the tires "
-            "can give: with the frozen model the tracker drives as well as with the true tires. "
+            "The lane change of ISO 3888-2 at 0.79 g, nine tenths of what the tires can give: with "
+            "the frozen model the tracker drives as well as with the true tires. "
             f"The film is {LANE_CHANGE}/drive.{_FILM}."
         ),
         *_scores(driven[LANE_CHANGE], "Deviation and the rest along the lane change."),

@@ -15,14 +15,15 @@ from identifier.tire_model import TireModel
 from models.faults import KINDS, SIZED, FaultError, SensorFault
 from models.rules import require_within
 from models.schema import require_few
-from models.vehicle import Vehicle
+from models.vehicle import GRAVITY, Vehicle
 from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
+from mpc.path.speed import SHARE
 from tireid.commands import options as shared
 from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION, learning_drive
 from tireid.driving.results import NO_FILM, Drives, headline, write_drive_report
-from tireid.driving.setup import Setup, SpeedWish
+from tireid.driving.setup import BY_TIRES, Setup, SpeedWish
 from tireid.figures.film import FORMATS
 from tireid.learning import identify
 from tireid.output import output_folder
@@ -31,6 +32,10 @@ from tireid.verdicts import warn_of
 
 _NOT_COMPLETED = 1
 _TIGHTEST = 1.1  # radius of a turn over the wheelbase: wheels at 42 deg, as no car goes farther
+CONFIRM = (
+    "earn the speed: begin at 45 % of what the tires allow, and go on as the car holds it and "
+    "nothing says that the friction is another"
+)
 _EPILOG = (
     "Without --weights, frozen tires are identified first: the same car drives on "
     f"an open field for {DURATION:g} s, steered at random and ever harder until it "
@@ -53,9 +58,10 @@ def declare(new: Any) -> None:
             f"{', '.join(BUILT_IN)}, or way-points with the columns X_m, Y_m (%(default)s)",
         ),
         "--speed WHAT": (
-            "90%",
-            "share of the grip that the tightest bend takes, or a speed (17m/s, 60km/h); "
-            "constant on an open path; a share on a closed one brakes for bends (%(default)s)",
+            TIRES,
+            f"{TIRES}: {100.0 * SHARE:.0f} %% of what the identified tires allow, braking for "
+            "bends, or another share of that (70%%); or told: a lateral acceleration in the tightest bend "
+            "(0.4g, 4m/s2), constant on an open path, or a speed (17m/s, 60km/h) (%(default)s)",
         ),
     }
     shared.add_options(parser, str, given)
@@ -74,6 +80,7 @@ def declare(new: Any) -> None:
     shared.add_day(parser)
     shared.add_method(parser)
     shared.add_vehicle(parser)
+    shared.add_options(parser, bool, {"--confirm": CONFIRM})
     numbers = {
         "--mu": (1.0, "friction of the road (%(default)s)"),
         "--delay MS": (
@@ -123,10 +130,13 @@ def run(options: argparse.Namespace) -> int:
     setup = conditions.setup
     driving.require_compiler()
     with output_folder(options.out, force=options.force) as folder:
-        say(headline(conditions))
         if driving.ORACLE in labels:
             setup.oracle()  # what cannot be is said before the car drives
         source, learnt = frozen_tires(options, labels, conditions)
+        conditions = conditions.on(learnt)
+        hours = options.laps * conditions.setup.time_at(setup.path.s[-2]) / 3600.0
+        require_few(ValueError, f"--path {setup.path.name}", hours, "hours", "hours of driving")
+        say(headline(conditions))
         if learnt is not None:
             learnt.save(folder / "weights.json")
         drives = Drives.driven(conditions, labels, learnt, source)
@@ -139,31 +149,38 @@ def run(options: argparse.Namespace) -> int:
     return 0 if drives.runs[0].scores.completed else _NOT_COMPLETED
 
 
-_PLAIN = 1.5  # a number without a unit up to here is a share of the grip
+TIRES = "tires"
+_SPEEDS = {"%": 0.01, "g": GRAVITY, "m/s2": 1.0, "m/s²": 1.0, "m/s": 1.0, "km/h": 1.0 / 3.6}
 
 
 def _parse_speed(text: str) -> SpeedWish:
     """Return what --speed says.
 
-    text : 90% or 0.9 of the grip, 17m/s or 60km/h.
+    text : tires, 70% of what they allow, 0.4g or 4m/s2, 17m/s or 60km/h.
     """
-    found = re.fullmatch(r"\s*([-+.\deE]+?)\s*(%|m/s|km/h)?\s*", text, re.ASCII)
+    if text.strip() == TIRES:
+        return BY_TIRES
+    units = "|".join(map(re.escape, _SPEEDS))
+    found = re.fullmatch(rf"\s*([-+.\deE]+?)\s*({units})?\s*", text, re.ASCII)
     value, unit = math.nan, None
     with suppress(ValueError):
         value, unit = (float(found[1]), found[2]) if found else (value, unit)
     if not 0.0 < value < math.inf:
-        raise ValueError(f"--speed wants a share of the grip or a speed (90%, 17m/s), not {text!r}")
-    if unit is None and value > _PLAIN:
-        raise ValueError(f"--speed {text} has no unit: write {text}%, {text}m/s or {text}km/h")
+        raise ValueError(
+            "--speed wants tires, a share of what they allow, an acceleration or a speed "
+            f"({TIRES}, 70%, 0.4g, 17m/s), not {text!r}"
+        )
+    if unit is None:
+        raise ValueError(f"--speed {text} has no unit: write {text}%, {text}g or {text}m/s")
+    value *= _SPEEDS[unit]
     if unit in ("m/s", "km/h"):
-        speed = value / (3.6 if unit == "km/h" else 1.0)
-        if not 3.0 <= speed <= 100.0:
-            raise ValueError(f"--speed must be 3 to 100 m/s, it is {speed:.3g} m/s")
-        return SpeedWish(None, speed)
-    share = value / (100.0 if unit == "%" else 1.0)
-    if not 0.05 <= share <= _PLAIN:
-        raise ValueError(f"--speed must be 5 to 150 % of the grip, it is {100.0 * share:.3g} %")
-    return SpeedWish(share, None)
+        require_within(ValueError, 3.0, 100.0, **{"--speed in m/s": value})
+        return SpeedWish(speed=value)
+    if unit == "%":
+        require_within(ValueError, 0.05, 1.5, **{"share of --speed": value})
+        return SpeedWish(share=value)
+    require_within(ValueError, 0.2, 30.0, **{"--speed in m/s²": value})
+    return SpeedWish(a_y=value)
 
 
 def _parse_drop(text: str) -> tuple[float, float]:
@@ -228,7 +245,7 @@ def conditions_of(options: argparse.Namespace) -> driving.Conditions:
         if not path.closed and s >= path.length:
             raise ValueError(f"--mu-drop {s:g} is beyond the path, which is {path.length:.0f} m")
     setup = Setup(path=path, vehicle=vehicle, mu=options.mu, drops=drops, wish=wish)
-    conditions = driving.Conditions(
+    return driving.Conditions(
         setup=setup,
         delay=driving.delay_periods(1e-3 * options.delay, "--delay"),
         noise=options.noise,
@@ -237,10 +254,8 @@ def conditions_of(options: argparse.Namespace) -> driving.Conditions:
         faults=tuple(parse_fault(text, options.sensors) for text in options.fault),
         caution=options.caution,
         kind=options.sensors,
+        confirm=options.confirm,
     )
-    hours = options.laps * setup.time_at(setup.path.s[-2]) / 3600.0
-    require_few(ValueError, f"--path {path.name}", hours, "hours", "hours of driving")
-    return conditions
 
 
 def frozen_tires(
@@ -248,7 +263,7 @@ def frozen_tires(
 ) -> tuple[str, TireModel | None]:
     """Return where frozen tires come from, and the model where one is needed."""
     setup, stored = conditions.setup, shared.model_of_day(options)
-    if not {driving.FROZEN, driving.LEARNING} & set(labels):
+    if not {driving.FROZEN, driving.LEARNING} & set(labels) and setup.wish.share is None:
         return "no tires were identified", None
     if stored is not None:
         _require_its_car(options, stored.vehicle, setup)
@@ -258,14 +273,15 @@ def frozen_tires(
         setup.car(open_field=True),
         conditions.sensors,
         np.random.default_rng([conditions.seed, 1]),
-        grip=setup.grip,
+        grip=9.0,
         seed=conditions.seed,
         lateral=conditions.lateral(),
     )
     run = identify(recording, setup.vehicle, method, check=False)
     warn_of(run.verdict, f"the identification drive of {law}")
     assert recording.a_y is not None
-    learnt = run.tire if conditions.caution > 0.0 else run.freeze()
+    banded = conditions.caution > 0.0 or setup.wish.share is not None
+    learnt = run.tire if banded else run.freeze()
     return (
         f"frozen ones identified by {law} on {recording.duration:.0f} s of random steering on an "
         f"open field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"

@@ -53,8 +53,7 @@ def headline(conditions: Conditions) -> str:
     setup = conditions.setup
     v = setup.speeds()
     speed = f"{v.min():.1f} m/s" if np.ptp(v) < 0.05 else f"{v.min():.1f} to {v.max():.1f} m/s"
-    wish = setup.wish.share
-    share = "" if wish is None else f", {100.0 * wish:.0f} % of a grip of {setup.grip:.1f} m/s²"
+    share = setup.wish.words + ", earned on the way" * conditions.confirm
     drops = "".join(f", {mu:g} from {s:g} m on" for s, mu in setup.drops)
     noise = "sensor noise" if conditions.noise else "no noise"
     noise += f", caution {conditions.caution:g}" if conditions.caution > 0.0 else ""
@@ -100,9 +99,13 @@ class Drives(NamedTuple):
             "length_m": setup.path.length,
             "closed": setup.path.closed,
             "laps": conditions.laps,
-            "speed": {"share": setup.wish.share, "m_s": setup.wish.speed},
+            "speed": {
+                "share": setup.wish.share,
+                "a_y_m_s2": setup.wish.a_y,
+                "m_s": setup.wish.speed,
+                "confirm": conditions.confirm,
+            },
             "speed_m_s": {"min": float(v.min()), "max": float(v.max())},
-            "grip_m_s2": setup.grip,
             "mu": setup.mu,
             "mu_drops": [{"s_m": s, "mu": mu} for s, mu in setup.drops],
             "tires": [run.label for run in self.runs],

@@ -1,7 +1,7 @@
 """One drive for each tire that a tracker is given: linear, frozen, true, or learnt on the way."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,15 +13,17 @@ from identifier.axle.model import begun
 from identifier.inertial import InertialIdentifier
 from identifier.methods import continuing
 from identifier.run import OnlineIdentifier
+from identifier.speed_limits import speed_limits
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
-from models.rules import require_within
+from models.rules import require_positive, require_within
 from models.vehicle import Vehicle
 from mpc.handover.learner import Learner
 from mpc.handover.supervisor import Supervisor
 from mpc.loop.drive import LearningTires
 from mpc.loop.drive import drive as drive_tracker
 from mpc.loop.lateral import LateralVelocity
+from mpc.loop.pace import Earned
 from mpc.loop.record import Drive, Scores, scores
 from mpc.loop.sensing import (
     CarSensors,
@@ -30,12 +32,12 @@ from mpc.loop.sensing import (
     imu_and_localization,
     inertial_unit,
 )
-from mpc.path import Path
+from mpc.path import Path, SpeedProfile
 from mpc.problem import Problem
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
 from tireid.driving.known import Known, Witness
-from tireid.driving.setup import PERIOD, WIDEST, Setup, SpeedWish
+from tireid.driving.setup import BY_TIRES, PERIOD, WIDEST, Setup, SpeedWish
 from tireid.progress import Progress
 
 _NOTED = 0.1  # change of the grip that is worth a note
@@ -84,9 +86,10 @@ class _BacksOff:
         return grip if said is None else f"{said}; {grip}"
 
 
-def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
+def make_learner(learnt: TireModel, vehicle: Vehicle, *, steers: bool = True) -> Learner:
     """Return what goes on learning while the tracker drives, and hands over what is fit.
 
+    steers : False only watches the road.
     v_y is there, measured or estimated: what was learnt without it goes on by the axle identifier.
     """
     learnt = begun(learnt)
@@ -97,7 +100,7 @@ def make_learner(learnt: TireModel, vehicle: Vehicle) -> Learner:
     if learnt.kind == AxleModel.kind:
         method = AxleIdentifier.for_vehicle(vehicle, dt=PERIOD)
     identifier = OnlineIdentifier(method, vehicle, PERIOD, learnt)
-    return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)))
+    return Learner(Supervisor(identifier, prediction_tire(learnt, vehicle)), steers=steers)
 
 
 LINEAR, FROZEN, ORACLE, LEARNING = TIRES = ("linear", "frozen", "oracle", "learning")
@@ -112,6 +115,7 @@ class Conditions:
     ----------
     kind : of the sensors, of `SENSORS`; imu measures no v_y.
     caution : share of what is not known of the tires that the tracker fears, from 0 to 1.
+    confirm : whether the speed has to be earned on the way.
     """
 
     setup: Setup
@@ -122,6 +126,7 @@ class Conditions:
     faults: tuple[SensorFault, ...] = ()
     kind: str = FULL
     caution: float = 0.0
+    confirm: bool = False
 
     def __post_init__(self) -> None:
         path = self.setup.path
@@ -134,6 +139,17 @@ class Conditions:
         require_within(ValueError, *FRICTIONS, friction=self.setup.mu)
         require_within(ValueError, 0.0, 1.0, caution=self.caution)
         self.setup.vehicle.require_chassis()
+
+    def on(self, learnt: TireModel | None) -> "Conditions":
+        """Return the same on these tires, where they tell how fast."""
+        if learnt is None or self.setup.wish.share is None:
+            return self
+        try:
+            limits = speed_limits(learnt)
+        except ValueError as error:
+            remedy = "say how fast instead: --speed 0.4g, speeds=15.0"
+            raise ValueError(f"no speed follows from these tires: {error}; {remedy}") from None
+        return replace(self, setup=self.setup._replace(limits=limits))
 
     @property
     def sensors(self) -> CarSensors:
@@ -229,15 +245,23 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
     informed = label == ORACLE and setup.drops
     learner: LearningTires | None = _Informer(setup) if informed else None
     beside, witness = learner, None
-    if label == LEARNING:
+    profile = setup.profile()
+    speed: SpeedProfile | Earned = profile
+    watcher = None
+    if label == LEARNING or (conditions.confirm and label == FROZEN):
         assert learnt is not None
-        learner = make_learner(learnt, setup.vehicle)
-        beside = witness = Witness(learner, PERIOD)
+        watcher = make_learner(learnt, setup.vehicle, steers=label == LEARNING)
+        learner = beside = watcher
+        if label == LEARNING:
+            beside = witness = Witness(watcher, PERIOD)
+    if conditions.confirm:
+        road = watcher and watcher.supervisor
+        speed = Earned(profile, PERIOD, lambda: road.friction if road else 1.0)
     driven = drive_tracker(
         setup.path,
         setup.car(),
         tracker,
-        speed=setup.profile(),
+        speed=speed,
         sensors=FaultySensors(conditions.sensors, conditions.faults),
         delay=conditions.delay,
         rng=np.random.default_rng([conditions.seed, 2]),
@@ -266,8 +290,8 @@ def drive(
     vehicle: Vehicle,
     tire: TireModel | None = None,
     *,
-    speed: float | None = None,
-    share: float = 0.9,
+    speeds: SpeedProfile | float | None = None,
+    confirm: bool = False,
     friction: float = 1.0,
     delay: float = 0.02,
     learning: bool = False,
@@ -284,9 +308,10 @@ def drive(
     path : to follow, of `tireid.paths`, or `tireid.paths.Path.from_csv`.
     vehicle : the car, with a chassis.
     tire : the identified tires; None takes the linear tires of the vehicle.
-    speed : constant speed [m/s]; None drives at a share of the grip.
-    share : of the lateral acceleration that the tightest bend takes, over what the tires can give;
-        a closed path brakes for bends.
+    speeds : a profile of `tireid.speed_profile`, or a constant speed [m/s]; None plans the profile
+        of the identified tires.
+    confirm : whether the speed has to be earned: it begins at .45 of the limits, and goes on as the
+        car holds what it drives and nothing says that the friction is another.
     friction : of the road over that of the tire's measurement [-].
     delay : from a measurement until its command acts, a multiple of 0.01 s [s].
     learning : go on learning from the tire while driving, and hand over what is fit.
@@ -308,15 +333,22 @@ def drive(
     VehicleError
         Where the vehicle has no chassis.
     ValueError
-        Where a number is not that of a drive, there is no tire to go on learning from, or no C
-        compiler for the tracker.
+        Where a number is not that of a drive, there is no tire to go on learning from or to plan
+        speeds of, speeds are of another path, or no C compiler is there for the tracker.
     """
-    for name, value in (("share", share), ("speed", speed)):
-        if value is not None and not value > 0.0:
-            raise ValueError(f"{name} must be positive, it is {value:g}")
-    if learning and tire is None:
-        raise ValueError("learning goes on from a tire: none is given")
-    wish = SpeedWish(share if speed is None else None, speed)
+    if isinstance(speeds, SpeedProfile):
+        wish = SpeedWish(profile=speeds)
+    elif speeds is not None:
+        require_positive(ValueError, speeds=speeds)
+        wish = SpeedWish(speed=speeds)
+    else:
+        wish = BY_TIRES
+    for needed, why in (
+        (learning, "learning goes on from a tire"),
+        (wish is BY_TIRES, "speeds are planned of identified tires"),
+    ):
+        if needed and tire is None:
+            raise ValueError(f"{why}: none is given")
     setup = Setup(path=path, vehicle=vehicle, mu=friction, drops=(), wish=wish)
     conditions = Conditions(
         setup=setup,
@@ -326,6 +358,7 @@ def drive(
         laps=laps,
         kind=sensors,
         caution=caution,
+        confirm=confirm,
     )
     label = LINEAR if tire is None else LEARNING if learning else FROZEN
-    return run_drive(label, conditions, tire)
+    return run_drive(label, conditions.on(tire), tire)

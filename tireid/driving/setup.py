@@ -1,27 +1,27 @@
 """What is driven: a path, a car on its road, and how fast.
 
-Grip is that of the true tire in steady cornering on the friction of the start.
+How fast it is follows from what is known of its tires or is told, never from the road.
 """
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from codegen.arrays import Array
+from identifier.speed_limits import SpeedLimits
 from models.friction import Friction, FrictionChange
-from models.tires import Tire
-from models.vehicle import Vehicle
-from mpc.cars import DoubleTrackCar
-from mpc.loop.sensing import SpeedProfile, cornering_limit
-from mpc.path import Path, grip_speed, steady_speed
+from models.vehicle import GRAVITY, Vehicle
+from mpc.cars import BRAKES, DoubleTrackCar
+from mpc.path import Path, SpeedProfile, speed_profile, steady_speed
+from mpc.path.speed import SHARE
 from mpc.tires import PredictionTire, oracle_tire
 
 WIDEST = 2.0  # deviation at which a car is off the path [m]
-FASTEST = 30.0  # on a closed course [m/s]
-ACCELERATION = 2.0  # on a closed course at friction 1 [m/s²]
-BRAKING = 3.0  # on a closed course at friction 1 [m/s²]
+FASTEST = 30.0  # m/s
+# Share of a told lateral acceleration to drive and brake with: 2 and 3 m/s² on a dry road.
+_DRIVES, _BRAKES = 0.22, 0.33
 PERIOD = 0.01  # control period [s]
 
 PLANT = "double-track"
@@ -31,10 +31,26 @@ _oracle: Callable[..., PredictionTire] = cache(oracle_tire)
 
 
 class SpeedWish(NamedTuple):
-    """How fast to drive: a share of the grip, or a speed [m/s]; one of them is None."""
+    """How fast to drive; one of them is not None.
 
-    share: float | None
-    speed: float | None
+    share : of what the identified tires allow [-].   a_y : in the tightest bend [m/s²].
+    speed : [m/s].   profile : along the path.
+    """
+
+    share: float | None = None
+    a_y: float | None = None
+    speed: float | None = None
+    profile: SpeedProfile | None = None
+
+    @property
+    def words(self) -> str:
+        """What is not seen of the speeds themselves."""
+        if self.share is not None:
+            return f", {100.0 * self.share:.0f} % of what the identified tires allow"
+        return "" if self.a_y is None else f", up to {self.a_y / GRAVITY:.3g} g in bends"
+
+
+BY_TIRES = SpeedWish(share=SHARE)
 
 
 class Setup(NamedTuple):
@@ -44,6 +60,7 @@ class Setup(NamedTuple):
     ----------
     mu : friction of the road over that of the tire's measurement, before the first drop [-].
     drops : arc length [m] and friction from there on.
+    limits : of the identified tires, which a wish for a share of them needs.
     """
 
     path: Path
@@ -51,6 +68,7 @@ class Setup(NamedTuple):
     mu: float
     drops: tuple[tuple[float, float], ...]
     wish: SpeedWish
+    limits: SpeedLimits | None = None
 
     def car(self, *, open_field: bool = False) -> DoubleTrackCar:
         """Return a car on the road, or on a field that has the friction of the start everywhere."""
@@ -62,38 +80,19 @@ class Setup(NamedTuple):
 
         mu : its friction; None is that of the start.
         """
-        return _oracle(self.vehicle, self._tire(), self.mu if mu is None else mu)
-
-    def _tire(self) -> Tire:
-        return self.car(open_field=True).tire
-
-    @property
-    def grip(self) -> float:
-        """Largest lateral acceleration on the road of the start [m/s²]."""
-        return cornering_limit(self.vehicle, self._tire(), self.mu)
-
-    def speeds(self) -> Array:
-        """Return the wanted speed at the samples of the path, (n,) [m/s].
-
-        On an open path it is constant; on a closed one it brakes for the bends and accelerates.
-        """
-        if self.wish.share is None:
-            assert self.wish.speed is not None
-            return np.full(self.path.s.size, self.wish.speed)
-        a_y = self.wish.share * self.grip
-        if not self.path.closed:
-            return np.full(self.path.s.size, steady_speed(self.path, a_y_max=a_y))
-        return grip_speed(
-            self.path,
-            a_y_max=a_y,
-            v_max=FASTEST,
-            a_accel=self.mu * ACCELERATION,
-            a_brake=self.mu * BRAKING,
-        )
+        tire = self.car(open_field=True).tire
+        return _oracle(self.vehicle, tire, self.mu if mu is None else mu)
 
     def profile(self) -> SpeedProfile:
-        """Return the wanted speed along the path."""
-        return SpeedProfile(self.path, self.speeds())
+        """Return the wanted speed along the path.
+
+        Where a_y is told it is constant on an open path; a closed one brakes for the bends.
+        """
+        return _profile(self.path, self.wish, self.limits)
+
+    def speeds(self) -> Array:
+        """Return the wanted speed at the samples of the path, (n,) [m/s]."""
+        return self.profile().v
 
     def friction(self) -> Friction:
         """Return the road with its drops.
@@ -118,3 +117,22 @@ class Setup(NamedTuple):
         s : arc length [m]; a closed course counts laps.
         """
         return self.profile().time_at(s)
+
+
+@lru_cache(maxsize=4)
+def _profile(path: Path, wish: SpeedWish, limits: SpeedLimits | None) -> SpeedProfile:
+    if wish.profile is not None:
+        if wish.profile.path is not path:
+            raise ValueError(f"speeds are of the path {wish.profile.path.name}, not {path.name}")
+        return wish.profile
+    if wish.speed is not None:
+        return SpeedProfile(path, wish.speed)
+    if wish.a_y is not None:
+        if not path.closed:
+            return SpeedProfile(path, steady_speed(path, a_y_max=wish.a_y))
+        told = SpeedLimits.told(wish.a_y, _DRIVES * wish.a_y, _BRAKES * wish.a_y)
+        return speed_profile(path, told, share=1.0, v_max=FASTEST)
+    if limits is None:
+        raise ValueError("no tires were identified that tell how fast: say a speed")
+    assert wish.share is not None
+    return speed_profile(path, limits, share=wish.share, v_max=FASTEST, brakes=BRAKES)

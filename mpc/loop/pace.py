@@ -1,0 +1,64 @@
+"""A speed that is earned on the way: no faster than the car has shown that it can turn.
+
+Tires that were learnt on a dry road say nothing of a wet one, and a car that enters a bend too fast
+is lost before any alarm. So a drive begins at a share of the limits that the wet road has, too, and
+goes on to `GROWTH` times the largest one that it held without an alarm.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mpc.loop.sensing import Measured
+from mpc.path.speed import SpeedProfile
+
+FIRST = 0.45  # of the limits: a wet road has half of a dry one
+GROWTH = 1.08  # chosen on cars on .6 of the friction that they learnt on
+KEPT = 0.35  # of a_y: braking that may always be taken
+_TIME = 0.2  # s, over which a_y is averaged
+_EVERY = 0.02  # change of the share that is worth another profile
+_ALARM = 0.98  # friction over the identified one, below which it is lost
+
+
+class Earned:
+    """Plans the speed of a drive anew as the car shows what it holds.
+
+    Attributes: profile, in use; share, of the limits that it uses.
+
+    Parameters
+    ----------
+    profile : the fastest one, of `speed_profile`.
+    period : of the samples [s].
+    friction : of the road over the identified one, as it is known now [-].
+    """
+
+    def __init__(self, profile: SpeedProfile, period: float, friction: Callable[[], float]) -> None:
+        if profile.planned is None:
+            raise ValueError("a told speed cannot be earned: confirm goes with identified tires")
+        (self._planner, self._most), self._friction = profile.planned, friction
+        self._weight = period / _TIME
+        self._a_y, self._held, self._ratio = 0.0, 0.0, 1.0
+        self.share = min(self._most, FIRST)
+        self.profile = self._planner.profile(self.share)
+
+    def observe(self, measured: Measured, s: float, v: float) -> str | None:
+        """Take a sample; return what was decided where the speed is another from here on.
+
+        s : arc length, laps included [m].   v : speed [m/s].
+        """
+        limits = self._planner.limits
+        if np.isfinite(measured.a_y):
+            self._a_y += self._weight * (measured.a_y - self._a_y)
+        ratio = self._friction()
+        if ratio < _ALARM and ratio < self._ratio:  # what was held was held on another road
+            self._held = 0.0
+        self._ratio = ratio
+        self._held = max(self._held, abs(self._a_y) / float(np.interp(v, limits.v, limits.a_y)))
+        share = min(self._most * ratio, max(FIRST, GROWTH * self._held))
+        if 0.0 <= share - self.share < _EVERY:
+            return None
+        self.share = share
+        whole = self._planner.profile(share)
+        kept = KEPT * float(limits.a_y[0])
+        self.profile = self._planner.begun(whole, share, s, v, kept)
+        return f"drives at {share:.2f} of the limits"
