@@ -374,7 +374,7 @@ def _engine(engine: Engine) -> Callable[[float], float]:
         return lambda at: float(np.interp(at, speeds, gives))
     require_positive(ValueError, engine=engine)
     given = float(engine)
-    return lambda at: given
+    return lambda _: given
 
 
 def steady_speed(path: Path, *, a_y_max: float, share: float = 1.0) -> float:

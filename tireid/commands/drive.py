@@ -33,7 +33,7 @@ from tireid.verdicts import warn_of
 _NOT_COMPLETED = 1
 _TIGHTEST = 1.1  # radius of a turn over the wheelbase: wheels at 42 deg, as no car goes farther
 CONFIRM = (
-    "earn the speed: begin at 45 % of what the tires allow, and go on as the car holds it and "
+    "earn the speed: begin at 45 %% of what the tires allow, and go on as the car holds it and "
     "nothing says that the friction is another"
 )
 _EPILOG = (
@@ -60,8 +60,9 @@ def declare(new: Any) -> None:
         "--speed WHAT": (
             TIRES,
             f"{TIRES}: {100.0 * SHARE:.0f} %% of what the identified tires allow, braking for "
-            "bends, or another share of that (70%%); or told: a lateral acceleration in the tightest bend "
-            "(0.4g, 4m/s2), constant on an open path, or a speed (17m/s, 60km/h) (%(default)s)",
+            "bends, or another share of that (70%%); or told: a lateral acceleration in the "
+            "tightest bend (0.4g, 4m/s2), constant on an open path, or a speed (17m/s, 60km/h) "
+            "(%(default)s)",
         ),
     }
     shared.add_options(parser, str, given)
