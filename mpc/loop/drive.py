@@ -119,7 +119,7 @@ def drive(
         if record.plan_is_due:
             there = profile.ahead(projected.s, place.v_x, tracker.plan_times, car.speed_gain)
             record.plan(command, there.s)
-        record.add(state, here, sensed, v_ref, command, given)
+        record.add(state, here, sensed, projected.e_y, v_ref, command, given)
         waiting.append(command.steering)
         try:
             state = car.step(state, waiting.popleft(), v_ref)

@@ -49,6 +49,7 @@ class Drive:
     axle_force : side force of the axles, frame of the body [N], (n, 2).
     s, e_y, e_psi, kappa : arc length [m], deviation to the left [m], heading against the path
         [rad] and curvature of the path [1/m], (n,).
+    e_y_seen : deviation as the car measured it, (n,) [m].
     v_ref : wanted speed [m/s], (n,).
     command : steering angle decided on at this period, which acts `delay` periods later [rad],
         (n,).
@@ -81,6 +82,7 @@ class Drive:
     e_y: Array
     e_psi: Array
     kappa: Array
+    e_y_seen: Array
     v_ref: Array
     command: Array
     measured: Mapping[str, Array]
@@ -115,7 +117,7 @@ class Drive:
 
 
 _OF_THE_CAR = ("t", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "axle_force")
-_OTHERS = ("s", "e_y", "e_psi", "kappa", "v_ref", "command", "solve_time", "status")
+_OTHERS = ("s", "e_y", "e_psi", "kappa", "e_y_seen", "v_ref", "command", "solve_time", "status")
 
 
 class Recorder:
@@ -158,13 +160,14 @@ class Recorder:
         state: CarState,
         here: Projection,
         measured: Measured,
+        e_y_seen: float,
         v_ref: float,
         command: Command,
         given: LateralEstimate | None = None,
     ) -> None:
         """Keep a period.
 
-        v_ref : wanted speed [m/s].
+        e_y_seen : deviation as it was measured [m].   v_ref : wanted speed [m/s].
         """
         if given is not None:
             self._estimates.append(given)
@@ -173,7 +176,7 @@ class Recorder:
         e_psi = here.heading_error(state.psi)
         self._others.append(
             (
-                *(here.s, here.e_y, e_psi, here.kappa, v_ref),
+                *(here.s, here.e_y, e_psi, here.kappa, e_y_seen, v_ref),
                 *(command.steering, command.solve_time_s, float(command.status)),
             )
         )

@@ -1,0 +1,97 @@
+"""Lap after lap: drive on the identified tires, learn from the lap, go again.
+
+The share of the limits grows where the car's own sensors saw it stay near its path, and shrinks
+where they did not; the limits themselves grow slowly, whatever was learnt.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from identifier.speed_limits import SpeedLimits, speed_limits
+from identifier.tire_model import TireModel
+from models.vehicle import Vehicle
+from mpc.cars import BRAKES
+from mpc.loop.record import Drive
+from mpc.path import Path, SpeedProfile, speed_profile
+from mpc.path.speed import SHARE, Engine
+from tireid.driving.runs import ClosedLoop, drive
+from tireid.driving.setup import PERIOD
+from tireid.learning import identify
+from tireid.run import Run
+
+_BEYOND_KNOWN = 1.1  # times the force within the known slip, on the first lap
+_LIMITS_GROW = 1.03  # from lap to lap, at most
+_GROWS, _SHRINKS = 1.03, 0.97  # of the share, from lap to lap
+_MOST = 0.95  # of the limits
+_NEAR = 0.10  # m from the path, as the car sees it, up to which it may go faster
+_SEEN = 0.2  # s, over which what it sees is averaged
+
+
+class Lap(NamedTuple):
+    """A lap that was driven.
+
+    tire : that it was planned and steered on.   share : of the limits.   seen : largest deviation
+    from the path as the car saw it [m].   learnt : from the lap; None where it was not completed.
+    """
+
+    tire: TireModel
+    limits: SpeedLimits
+    share: float
+    profile: SpeedProfile
+    driven: ClosedLoop
+    seen: float
+    learnt: Run | None
+
+
+def first_limits(tire: TireModel) -> SpeedLimits:
+    """Return the limits of a first lap: hardly beyond what the tires are known to give."""
+    known = float(speed_limits(tire, beyond=1.0).a_y[0])
+    return speed_limits(tire).at_most(_BEYOND_KNOWN * known)
+
+
+def drive_laps(
+    path: Path,
+    vehicle: Vehicle,
+    tire: TireModel,
+    laps: int,
+    *,
+    share: float = SHARE,
+    engine: Engine | None = None,
+    v_max: float | None = None,
+    confirm: bool = False,
+    friction: float = 1.0,
+    seed: int = 0,
+) -> Iterator[Lap]:
+    """Yield lap after lap, until one is not completed; the arguments are those of `drive`.
+
+    A lap that speaks against its tires teaches nothing.
+
+    engine, v_max : as of `speed_profile`.
+    """
+    limits = first_limits(tire)
+    for number in range(laps):
+        profile = speed_profile(
+            path, limits, share=share, engine=engine, brakes=BRAKES, v_max=v_max
+        )
+        driven = drive(
+            path, vehicle, tire, speeds=profile, confirm=confirm, friction=friction,
+            seed=seed + number,
+        )  # fmt: skip
+        if not driven.scores.completed:
+            yield Lap(tire, limits, share, profile, driven, _seen(driven.drive), None)
+            return
+        learnt = identify(driven.drive.recording(), vehicle, start=tire, check=False)
+        lap = Lap(tire, limits, share, profile, driven, _seen(driven.drive), learnt)
+        yield lap
+        share = min(_MOST, _GROWS * share) if lap.seen <= _NEAR else _SHRINKS * share
+        if learnt.verdict.valid:
+            tire = learnt.tire
+            limits = speed_limits(tire).at_most(_LIMITS_GROW * float(limits.a_y[0]))
+
+
+def _seen(driven: Drive) -> float:
+    """Return the largest deviation that the car saw, averaged over its noise [m]."""
+    n = min(round(_SEEN / PERIOD), len(driven))
+    return float(np.abs(np.convolve(driven.e_y_seen, np.full(n, 1.0 / n), mode="valid")).max())
