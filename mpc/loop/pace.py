@@ -17,6 +17,7 @@ GROWTH = 1.08  # chosen on cars on .6 of the friction that they learnt on
 KEPT = 0.35  # of a_y: braking that may always be taken
 _TIME = 0.2  # s, over which a_y is averaged
 _EVERY = 0.02  # change of the share that is worth another profile
+_NOTED = 0.1  # change that is worth a note
 _ALARM = 0.98  # friction over the identified one, below which it is lost
 
 
@@ -39,10 +40,11 @@ class Earned:
         self._weight = period / _TIME
         self._a_y, self._held, self._ratio = 0.0, 0.0, 1.0
         self.share = min(self._most, FIRST)
+        self._noted = self.share
         self.profile = self._planner.profile(self.share)
 
     def observe(self, measured: Measured, s: float, v: float) -> str | None:
-        """Take a sample; return what was decided where the speed is another from here on.
+        """Take a sample; return what was decided where that is worth a note.
 
         s : arc length, laps included [m].   v : speed [m/s].
         """
@@ -61,4 +63,7 @@ class Earned:
         whole = self._planner.profile(share)
         kept = KEPT * float(limits.a_y[0])
         self.profile = self._planner.begun(whole, share, s, v, kept)
+        if abs(share - self._noted) < _NOTED:
+            return None
+        self._noted = share
         return f"drives at {share:.2f} of the limits"
