@@ -138,6 +138,11 @@ class Conditions:
             raise ValueError(f"sensors must be one of {', '.join(SENSORS)}, not {self.kind!r}")
         require_within(ValueError, *FRICTIONS, friction=self.setup.mu)
         require_within(ValueError, 0.0, 1.0, caution=self.caution)
+        wish = self.setup.wish
+        if self.confirm and wish.share is None and not (wish.profile and wish.profile.planned):
+            raise ValueError(
+                "confirm earns the speed of identified tires, not a told one: leave --speed out"
+            )
         self.setup.vehicle.require_chassis()
 
     def on(self, learnt: TireModel | None) -> "Conditions":
@@ -345,7 +350,7 @@ def drive(
         wish = BY_TIRES
     for needed, why in (
         (learning, "learning goes on from a tire"),
-        (wish is BY_TIRES, "speeds are planned of identified tires"),
+        (wish is BY_TIRES, "speeds such as 15.0 m/s, or a tire that tells them, are needed"),
     ):
         if needed and tire is None:
             raise ValueError(f"{why}: none is given")
