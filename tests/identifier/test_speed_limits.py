@@ -37,7 +37,8 @@ def test_what_is_allowed_both_axles_of_the_model_can_give():
     model = fitted(PRESSED, sd=1e-6, load_transfer=0.35, **use)
     found = ti.speed_limits(model)
     slips = [np.linspace(0.0, 2.0 * known, 400) for known in model.known_slip]
-    peak = [model.force(alpha)[:, i].max() for i, alpha in enumerate(slips)] / PRESSED.axle_loads
+    peak = np.array([model.force(alpha)[:, i].max() for i, alpha in enumerate(slips)])
+    peak /= PRESSED.axle_loads
     for sign, side in ((1.0, found.push), (-1.0, found.brake)):
         for v, a_y, most in zip(found.v, found.a_y, side.most, strict=True):
             a_x = sign * most - PRESSED.drag * v**2

@@ -11,7 +11,7 @@ from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
 from mpc.loop.drive import COMPLETED, GUIDES, drive
 from mpc.loop.record import scores
-from mpc.loop.sensing import CarSensors, Measured, SpeedProfile, inertial_unit
+from mpc.loop.sensing import CarSensors, Measured, inertial_unit
 from mpc.path.path import Path
 from mpc.realtime import Command
 

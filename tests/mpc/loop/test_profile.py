@@ -5,7 +5,7 @@ import pytest
 
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop.sensing import SpeedProfile
+from mpc.path import SpeedProfile
 from mpc.path.path import Path
 from tests.mpc.loop.test_drive import ring as ring
 
