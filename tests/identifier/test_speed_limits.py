@@ -1,6 +1,7 @@
 """What tires allow over speed: by hand, by another reading of the model, and falling with doubt."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -52,8 +53,8 @@ def test_more_doubt_is_never_faster():
     sure, doubtful = fitted(sd=0.05), fitted(sd=0.22)
     path = ti.paths.handling_course()
     least = ti.speed_limits(doubtful)
-    some = [ti.speed_limits(sure, confidence=level, beyond=1.0) for level in (0.6, 0.95, 0.999)]
-    for more, less in zip(some, some[1:], strict=False):
+    some = [ti.speed_limits(sure, confidence=sure_of, beyond=1.0) for sure_of in (0.6, 0.95, 0.999)]
+    for more, less in pairwise(some):
         assert (less.a_y <= more.a_y).all() and (less.brake.most <= more.brake.most + 1e-9).all()
     assert (some[1].a_y <= ti.speed_limits(sure).a_y).all(), "farther than is known it is more"
     fast, slow = (

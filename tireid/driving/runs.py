@@ -235,6 +235,7 @@ def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> Prediction
 def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> ClosedLoop:
     """Drive the path once with the tracker on a tire."""
     setup, problem = conditions.setup, Problem()
+    profile = setup.profile()
     model = given_tire(label, setup, learnt)
     lag = setup.vehicle.require_chassis().steering_lag
     try:
@@ -250,7 +251,6 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
     informed = label == ORACLE and setup.drops
     learner: LearningTires | None = _Informer(setup) if informed else None
     beside, witness = learner, None
-    profile = setup.profile()
     speed: SpeedProfile | Earned = profile
     watcher = None
     if label == LEARNING or (conditions.confirm and label == FROZEN):

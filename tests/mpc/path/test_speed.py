@@ -145,7 +145,8 @@ def test_a_start_changes_the_speed_by_no_more_than_the_car_can(path):
     times = np.array([found.time_at(float(place)) for place in fine])
     assert times[0] == 0.0
     np.testing.assert_allclose(found.place(times), fine, atol=1e-6)
-    np.testing.assert_allclose(np.diff(times), path.step * 0.5 * (1 / v[1:] + 1 / v[:-1]), rtol=0.01)
+    pace = 0.5 * (1 / v[1:] + 1 / v[:-1])
+    np.testing.assert_allclose(np.diff(times), path.step * pace, rtol=0.01)
     np.testing.assert_allclose(found.v[found.s >= s], found.at(found.s[found.s >= s]))
     ends = s + path.length if path.closed else path.length
     assert found.lap_time == pytest.approx(found.time_at(ends))
