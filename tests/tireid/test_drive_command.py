@@ -37,9 +37,10 @@ def bend(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def result(bend, tmp_path_factory):
-    """Frozen tires that learnt for 15 s, and linear ones, both at 90 % of the grip."""
+    """Frozen tires that learnt for 15 s, and linear ones, both up to 0.77 g."""
     out = tmp_path_factory.mktemp("result") / "out"
     words = ["drive", "--path", bend, "--tires", "frozen", "linear", "--out", out]
+    words += ["--speed", "0.77g"]
     learns_shortly(words, 15.0)
     return out
 
@@ -115,7 +116,7 @@ def test_everything_is_written(result):
 def test_stored_weights_steer_alike_and_the_hash_tells_what_went_in(
     result, bend, tmp_path, undrawn
 ):
-    words = ["drive", "--path", bend, "--film", "none"]
+    words = ["drive", "--path", bend, "--film", "none", "--speed", "0.77g"]
     words += ["--weights", result / "weights.json"]
     for name, more in (("same", []), ("other", ["--seed", "1"])):
         assert typed(*words, *more, "--out", tmp_path / name) == 0
@@ -129,7 +130,7 @@ def test_stored_weights_steer_alike_and_the_hash_tells_what_went_in(
 @pytest.mark.heavy
 def test_learning_and_oracle_are_told_of_a_friction_that_drops(result, bend, out, capsys, undrawn):
     words = ["drive", "--path", bend, "--tires", "learning", "oracle", "--film", "none"]
-    words += ["--weights", result / "weights.json", "--speed", "60%"]
+    words += ["--weights", result / "weights.json", "--speed", "0.51g"]
     capsys.readouterr()
     assert typed(*words, "--mu-drop", "30:0.5", "--out", out) == 0
     printed = capsys.readouterr().out
@@ -152,7 +153,7 @@ def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
 def test_a_car_that_leaves_its_path_is_told_with_exit_code_1(bend, out, capsys, undrawn):
     words = ["drive", "--path", bend, "--tires", "linear", "--film", "none"]
     capsys.readouterr()
-    assert typed(*words, "--speed", "140%", "--out", out) == 1
+    assert typed(*words, "--speed", "1.2g", "--out", out) == 1
     assert "no: left the path by more than 2 m" in capsys.readouterr().out
     assert summary_of(out)["completed"] is False
 
@@ -221,6 +222,7 @@ def test_tires_of_another_car_lead_somewhere(bend, tmp_path, out, capsys, undraw
     assert "tireid init" in said and "docs/driving.md" in said
     replace(tire, vehicle=replace(car, name="mine")).save(tmp_path / "mine.json")
     words = ["drive", "--path", bend, "--weights", tmp_path / "mine.json", "--film", "none"]
+    words += ["--speed", "0.7g"]
     assert typed(*[*words, "--out", out]) == 0
 
 

@@ -178,7 +178,7 @@ def _parse_speed(text: str) -> SpeedWish:
         require_within(ValueError, 3.0, 100.0, **{"--speed in m/s": value})
         return SpeedWish(speed=value)
     if unit == "%":
-        require_within(ValueError, 0.05, 1.5, **{"share of --speed": value})
+        require_within(ValueError, 5.0, 150.0, **{"--speed in %": 100.0 * value})
         return SpeedWish(share=value)
     require_within(ValueError, 0.2, 30.0, **{"--speed in m/s²": value})
     return SpeedWish(a_y=value)
