@@ -227,7 +227,7 @@ REFUSED = {
         (lambda: drive(laps=2.0), "laps are of a closed path"),
         (lambda: drive(learning=True), "none is given"),
         (lambda: drive(speeds=None), "speeds such as 15.0 m/s, or a tire that tells them"),
-        (lambda: drive(confirm=True), "confirm earns the speed of identified tires, not a told"),
+        (lambda: drive(confirm=True), "confirm goes with --speed tires, or with a share"),
         (lambda: drive(speeds=SpeedProfile(LINE, 9.0)), "speeds are of the path .*, not of ISO"),
     ],
 }

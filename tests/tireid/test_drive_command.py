@@ -150,6 +150,22 @@ def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
     assert "data:image/webp;base64," in page
 
 
+@pytest.mark.heavy
+def test_without_a_speed_the_tires_tell_it_and_confirm_lets_it_be_earned(
+    result, bend, tmp_path, capsys, undrawn
+):
+    words = ["drive", "--path", bend, "--film", "none", "--weights", result / "weights.json"]
+    for name, more in (("sure", []), ("earned", ["--confirm"])):
+        assert typed(*words, *more, "--out", tmp_path / name) == 0
+    assert "82 % of what the identified tires allow, earned on the way" in capsys.readouterr().out
+    sure, earned = (table_of(tmp_path / name / "drive.csv") for name in ("sure", "earned"))
+    allowed = ti.speed_limits(load_model(result / "weights.json"))
+    assert 0.7 * allowed.a_y[0] < np.abs(sure["a_y_m_s2"]).max() < allowed.a_y[0]
+    assert earned["v_x_m_s"][0] < 0.8 * sure["v_x_m_s"][0]
+    told = summary_of(tmp_path / "earned")["inputs"]["speed"]
+    assert told == {"share": 0.82, "a_y_m_s2": None, "m_s": None, "confirm": True}
+
+
 def test_a_car_that_leaves_its_path_is_told_with_exit_code_1(bend, out, capsys, undrawn):
     words = ["drive", "--path", bend, "--tires", "linear", "--film", "none"]
     capsys.readouterr()
@@ -184,6 +200,8 @@ def test_the_drive_to_learn_on_slides_but_neither_spins_nor_tips():
         (["--delay", "15"], "--delay must be 0 to 100 ms in steps of 10 ms, it is 15"),
         (["--laps", "nan"], "laps must be positive"),
         (["--seed", "-1"], "--seed must not be negative"),
+        (["--speed", "0.9"], "--speed 0.9 has no unit: write 0.9%, 0.9g or 0.9m/s"),
+        (["--speed", "0.5g", "--confirm"], "--confirm goes with --speed tires, or with a share"),
         (["--weights", "nowhere.json"], "nowhere.json"),
         (["--weights", "a.json", "--paper"], "give only one of --weights, --paper"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),

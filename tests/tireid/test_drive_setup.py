@@ -8,6 +8,7 @@ import pytest
 from identifier.speed_limits import SpeedLimits
 from models.vehicle import GRAVITY, sedan
 from mpc.path import Path, speed_profile
+from tests.identifier.export.test_emitted import fitted, network
 from tireid.commands.drive import parse_fault
 from tireid.driving.results import headline
 from tireid.driving.runs import Conditions
@@ -64,6 +65,17 @@ def test_how_fast_a_share_of_the_tires_is_never_follows_from_the_road(monkeypatc
         dry._replace(limits=None).speeds()
     with pytest.raises(AssertionError, match="the true tire"):
         dry.oracle()
+
+
+def test_tires_that_are_not_sure_tell_no_speed():
+    drive = setup(COURSE, SpeedWish(share=0.7))
+    case = Conditions(setup=drive, delay=2, noise=True, seed=7, laps=1.0)
+    with pytest.raises(
+        ValueError, match=r"no speed follows .* no band; say how fast instead: --sp"
+    ):
+        case.on(network())
+    assert case.on(fitted()).setup.speeds().max() > 5.0
+    assert case.on(None) is case
 
 
 def test_speeds_are_those_of_the_path_that_is_driven():

@@ -234,8 +234,6 @@ def conditions_of(options: argparse.Namespace) -> driving.Conditions:
     if name not in BUILT_IN and not FilePath(name).suffix:
         raise ValueError(f"--path: there is no path {name!r}; {', '.join(BUILT_IN)}, or FILE.csv")
     vehicle, wish = shared.read_vehicle(options), _parse_speed(options.speed)
-    if options.confirm and wish.share is None:
-        raise ValueError("--confirm goes with --speed tires, or with a share of what they allow")
     radius = _TIGHTEST * vehicle.wheelbase
     path = (
         BUILT_IN[name]()

@@ -141,7 +141,7 @@ class Conditions:
         wish = self.setup.wish
         if self.confirm and wish.share is None and not (wish.profile and wish.profile.planned):
             raise ValueError(
-                "confirm earns the speed of identified tires, not a told one: leave --speed out"
+                "--confirm goes with --speed tires, or with a share of what they allow"
             )
         self.setup.vehicle.require_chassis()
 
