@@ -45,11 +45,15 @@ class Preview(NamedTuple):
 class SpeedProfile:
     """A wanted speed along a path; a closed path is driven lap after lap.
 
-    Attributes: path; v, wanted speed at its samples, (n,) [m/s]; limited_by, what limits it there:
-    turn, drive, brake (the tires), engine or v_max; axle, front or rear, which one slides first
-    there; (n,) of words each, both empty where the speed was told; planned, by what and within
-    which share of the limits, or None.
+    Attributes: path; planned, by what and within which share of the limits, or None.
+
+    Parameters
+    ----------
+    path : to drive.
     v : wanted speed [m/s], a number or one for each sample of the path, (n,).
+    limited_by : what limits it there, (n,): turn, drive, brake (the tires), engine or v_max;
+        empty where the speed was told.
+    axle : front or rear, which one slides first there, (n,); empty where the speed was told.
     """
 
     def __init__(
@@ -105,6 +109,8 @@ class SpeedProfile:
     def at(self, s: ArrayLike) -> Array:
         """Return the wanted speed [m/s] in the shape of s.
 
+        Parameters
+        ----------
         s : arc length [m].
         """
         return self.path.along(self.v, s)
@@ -112,6 +118,8 @@ class SpeedProfile:
     def reference(self, s: float, gain: float) -> float:
         """Return what to ask of a proportional driver, so that it does not lag behind [m/s].
 
+        Parameters
+        ----------
         s : arc length [m].
         gain : acceleration that the driver asks for, per error of the speed [1/s].
         """
@@ -122,7 +130,11 @@ class SpeedProfile:
     def ahead(self, s: float, v_x: float, t: Array, gain: float) -> Preview:
         """Return the road that the car will be on.
 
-        s : arc length now [m].   v_x : speed now [m/s].   t : times from now [s], (k,).
+        Parameters
+        ----------
+        s : arc length now [m].
+        v_x : speed now [m/s].
+        t : times from now [s], (k,).
         gain : of the driver [1/s].
         """
         error, fades = v_x - float(self.at(s)), np.exp(-gain * t)
@@ -139,7 +151,12 @@ class SpeedProfile:
         return float(np.interp(s, self.path.s, self._t)) + min(s, 0.0) / float(self.v[0])
 
     def place(self, t: Array) -> Array:
-        """Return where a car at the wanted speed is, laps included: the inverse of `time_at`."""
+        """Return where a car at the wanted speed is, laps included: the inverse of `time_at`.
+
+        Parameters
+        ----------
+        t : times [s], (k,).
+        """
         if self.path.closed:
             laps = np.floor(t / self.lap_time)
             within = np.interp(t - laps * self.lap_time, self._t, self.path.s)
