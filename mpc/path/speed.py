@@ -154,8 +154,15 @@ class _Lead(SpeedProfile):
     """
 
     def __init__(self, profile: SpeedProfile, s: Array, v: Array) -> None:
-        self.__dict__.update(profile.__dict__)
         self._profile, self._lead_s, self._lead_v = profile, s, v
+        path, begins = profile.path, float(s[0])
+        super().__init__(
+            path,
+            np.where(path.s < begins, profile.v, self.at(path.s)),
+            limited_by=profile.limited_by,
+            axle=profile.axle,
+            planned=profile.planned,
+        )
         pace = 0.5 * (1.0 / v[1:] + 1.0 / v[:-1])
         self._lead_t = np.concatenate([[0.0], np.cumsum(pace * np.diff(s))])
         self._lead_a = v * np.gradient(v, s)
