@@ -169,9 +169,6 @@ class SpeedProfile:
 class _Lead(SpeedProfile):
     """A profile that begins on the way at another speed and goes over into it.
 
-    Attributes at the samples are those of the lap that begins there; before it an open path has
-    the speed of the start.
-
     s : arc length, rising [m], (k,).   v : speeds there [m/s], (k,); the last one is the profile's.
     why, axle : what limits there, and which axle, as in the profile, (k,).
     """
@@ -179,35 +176,24 @@ class _Lead(SpeedProfile):
     def __init__(
         self, profile: SpeedProfile, s: Array, v: Array, why: ArrayLike, axle: ArrayLike
     ) -> None:
-        self.__dict__.update(profile.__dict__)
         self._profile, self._lead_s, self._lead_v = profile, s, v
+        path, begins = profile.path, float(s[0])
+        leads = (path.s >= begins) & (path.s < s[-1])
+        at = np.searchsorted(s, path.s[leads], side="right") - 1
+        named = [profile.limited_by.copy(), profile.axle.copy()]
+        for mine, theirs in zip(named, (why, axle), strict=True):
+            mine[leads] = np.asarray(theirs)[at]
+        super().__init__(
+            path,
+            np.where(path.s < begins, profile.v, self.at(path.s)),
+            limited_by=named[0],
+            axle=named[1],
+            planned=profile.planned,
+        )
         pace = 0.5 * (1.0 / v[1:] + 1.0 / v[:-1])
         self._lead_t = np.concatenate([[0.0], np.cumsum(pace * np.diff(s))])
         self._lead_a = v * np.gradient(v, s)
         self._after = profile.time_at(float(s[-1])) - float(self._lead_t[-1])
-        path, first = profile.path, float(s[0])
-        places, end = path.s, path.length
-        if path.closed:
-            laps, within = divmod(first, end)
-            places, end = places + end * (laps + (places < within)), first + end
-        self._places, self._end, self.v = places, end, self.at(places)
-        leads = (places >= first) & (places < s[-1])
-        at = np.searchsorted(s, places[leads], side="right") - 1
-        named = (("limited_by", why), ("axle", axle), ("_acceleration", self._lead_a))
-        for name, values in named:
-            mine = getattr(profile, name).copy()
-            mine[leads] = np.asarray(values)[at]
-            setattr(self, name, mine)
-
-    @property
-    def lap_time(self) -> float:
-        """Time from the start to the end of an open path, or for a lap [s]."""
-        return self.time_at(self._end)
-
-    @property
-    def t(self) -> Array:
-        """Time since the start at the wanted speed, negative before it [s], (n,)."""
-        return np.array([self.time_at(float(place)) for place in self._places])
 
     def at(self, s: ArrayLike) -> Array:
         s = np.asarray(s, dtype=np.float64)

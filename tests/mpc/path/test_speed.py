@@ -148,9 +148,10 @@ def test_a_start_changes_the_speed_by_no_more_than_the_car_can(path):
     pace = 0.5 * (1 / v[1:] + 1 / v[:-1])
     np.testing.assert_allclose(np.diff(times), path.step * pace, rtol=0.01)
     np.testing.assert_allclose(found.v[found.s >= s], found.at(found.s[found.s >= s]))
-    ends = s + path.length if path.closed else path.length
-    assert found.lap_time == pytest.approx(found.time_at(ends))
-    assert found.lap_time > (whole.lap_time if path.closed else 0.0)
+    assert set(found.limited_by[(found.s >= s) & (found.s < s + 2.0)]) <= {"drive", "engine"}
+    standing = speed_profile(path, TOLD, start=(0.0, 3.0), **GIVEN)
+    assert standing.v[0] == 3.0 and standing.lap_time > whole.lap_time
+    assert standing.lap_time == pytest.approx(standing.time_at(path.length), rel=1e-6)
 
 
 def test_a_straight_is_driven_at_v_max_and_has_no_limit_of_its_own():
