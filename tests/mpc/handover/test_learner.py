@@ -70,7 +70,7 @@ def test_the_drop_is_noted_in_time(drives):
 
 
 def test_who_only_watches_finds_the_friction_and_leaves_the_tire(drives, car, learnt):
-    """On the sensors of the car that learnt: half the friction behind the drop, and no other tire."""
+    """On the sensors of the car that learnt: half the friction behind the drop."""
     identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(car), car, 0.01, learnt)
     watcher = Learner(Supervisor(identifier, prediction_tire(learnt)), steers=False)
     tracker = SimpleNamespace(delay=0.06, period=0.01, steering=0.0)  # whose tire nobody sets
