@@ -74,15 +74,17 @@ def test_who_only_watches_finds_the_friction_and_leaves_the_tire(drives, car, le
     identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(car), car, 0.01, learnt)
     watcher = Learner(Supervisor(identifier, prediction_tire(learnt)), steers=False)
     tracker = SimpleNamespace(delay=0.06, period=0.01, steering=0.0)  # whose tire nobody sets
-    driven, found = drives[1], []
+    driven, found, said = drives[1], [], []
     for k in range(len(driven)):
         seen = Measured(**{name: float(values[k]) for name, values in driven.measured.items()})
-        watcher.observe(seen, tracker)
+        said.append(watcher.observe(seen, tracker))
         tracker.steering = float(driven.command[k])
         found.append(watcher.supervisor.friction)
     before = np.array(found)[driven.X < PLACE]
     assert (before > 0.85).all() and before[0] == 1.0
     assert 0.4 < min(found) < 0.65
+    notes = {note.split(":")[0] for note in said if note}
+    assert "friction lost" in notes and "learnt tire" not in notes
 
 
 def test_no_handover_makes_the_plan_jump_more_than_noise_does(drives):
