@@ -50,7 +50,7 @@ class Earned:
         limits = self._planner.limits
         if np.isfinite(measured.a_y):
             self._a_y += self._weight * (measured.a_y - self._a_y)
-        ratio = self._friction()
+        ratio = min(self._friction(), 1.0)  # more grip than learnt is no reason to hurry
         if ratio < _ALARM and ratio < self._ratio:  # what was held was held on another road
             self._held = 0.0
         self._ratio = ratio
