@@ -72,11 +72,14 @@ class DoubleTrackCar:
         self.period = period
         self.speed_gain = _HOLDING.gain
 
-    def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> CarState:
-        """Return the car rolling straight ahead.
+    def start(
+        self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0, kappa: float = 0.0
+    ) -> CarState:
+        """Return the car rolling straight ahead, or turning without any force yet.
         v_x : speed [m/s].   X, Y : position of the center of gravity [m].   psi : heading [rad].
+        kappa : curvature of its turn [1/m].
         """
-        return self._state(self._plant.start(v_x, X=X, Y=Y, psi=psi))
+        return self._state(self._plant.start(v_x, X=X, Y=Y, psi=psi, kappa=kappa))
 
     def step(self, state: CarState, command: float, v_ref: float) -> CarState:
         """Return the car one period later.

@@ -306,15 +306,20 @@ class StepwisePlant:
         values = {"x": np.zeros(N_STATES), "constants": constants, "places": places}
         return Stepper(scan, values), Stepper(scan, values, self._every + 1)
 
-    def start(self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0) -> PlantState:
-        """Return the car rolling straight ahead.
+    def start(
+        self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0, kappa: float = 0.0
+    ) -> PlantState:
+        """Return the car rolling straight ahead, or turning without any force yet.
         v_x : speed [m/s].   X, Y : position of the center of gravity [m].   psi : heading [rad].
+        kappa : curvature of its turn [1/m].
         """
         if not v_x > 0.0:
             raise ValueError(f"v_x must be positive at the start, it is {v_x}")
         x = np.zeros(N_STATES)
         x[[0, 5, 6, 7]] = v_x, X, Y, psi
-        return self._run(self._steppers[0], 0, 1, x, np.zeros(2), v_x)
+        car = self.plant.vehicle
+        x[[1, 2, 12]] = kappa * v_x * car.l_r, kappa * v_x, np.arctan(kappa * car.wheelbase)
+        return self._run(self._steppers[0], 0, 1, x, np.array([x[12], 0.0]), v_x)
 
     def step(self, state: PlantState, command: Array, v_ref: float) -> PlantState:
         """Return the plant one period later.

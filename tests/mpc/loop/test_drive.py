@@ -25,7 +25,7 @@ class Driver:
     times = np.array([0.1, 0.2])
     plan_times = np.array([0.0, 0.1, 0.2])
 
-    def reset(self):
+    def reset(self, steering=0.0):
         self.seen = []
 
     def step(self, m):
@@ -58,6 +58,12 @@ def ring():
 
 def car(**keys):
     return DoubleTrackCar(sedan(), **keys)
+
+
+def test_a_lap_that_begins_in_a_turn_begins_turning(ring):
+    driven = drive(ring, car(), Driver(), speed=8.0, delay=2, rng=np.random.default_rng(0))
+    assert driven.r[0] == pytest.approx(8.0 / 30.0, rel=1e-2)
+    assert driven.delta[0] == pytest.approx(sedan().wheelbase / 30.0, rel=1e-2)
 
 
 def seeded(seed=1):
