@@ -258,7 +258,6 @@ def frozen_tires(
         setup.car(open_field=True),
         conditions.sensors,
         np.random.default_rng([conditions.seed, 1]),
-        grip=setup.grip,
         seed=conditions.seed,
         lateral=conditions.lateral(),
     )
