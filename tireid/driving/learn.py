@@ -1,7 +1,4 @@
-"""A drive to learn tires on, of a simulated car.
-
-Nobody tells the driver how much grip there is: he steers ever harder until his sensors show it.
-"""
+"""A drive to learn tires on, of a simulated car, whose driver is told of no grip."""
 
 import math
 from dataclasses import replace
@@ -25,7 +22,7 @@ _RATE_LIMIT = 1.0  # rad/s at the road wheels
 _FORGOTTEN = 0.5  # s before a car spins that are not learnt from
 _SPUN = math.tan(math.radians(15.0))  # of the side slip
 
-# How swings grow. Chosen on 72 random cars of three tire shapes and frictions of 0.2 to 1.2.
+# How swings grow: chosen on 72 random cars of three tire shapes, on roads of friction 0.2 to 1.2.
 _FIRST = 1.0  # m/s², of the first swing of a car that does not slip
 _GROWS = 1.2  # from swing to swing
 _NO_MORE = 1.04  # times the most a_y: more steering that gives less turns the car no more
@@ -53,7 +50,7 @@ class _Driver:
         self.angle = self._from = self._to = 0.0
         self._a_y = self._side_slip = 0.0  # smoothed
         self._peak = self._best = 0.0  # |a_y| of the swing, and of all before [m/s²]
-        self._in_vain, self._tail_out = 0, False
+        self._in_vain, self._too_far = 0, False
 
     def steer(self, measured: Measured) -> None:
         """Command the angle of the next period."""
@@ -62,11 +59,11 @@ class _Driver:
         self._side_slip += share * (measured.v_y / measured.v_x - self._side_slip)
         self._peak = max(self._peak, abs(self._a_y))
         out = min(max(_OUT * max(self._peak, self._best), _LEAST_OUT), _MOST_OUT)
-        self._tail_out |= abs(self._side_slip) > out
+        self._too_far |= abs(self._side_slip) > out or abs(self._a_y) > self._most
         if measured.t >= self._ends:
             self._size_swing()
             self._begin_swing(measured.t)
-        if self._tail_out:
+        if self._too_far:
             goal = self._side_slip  # into the slide
         else:
             way = (measured.t - self._begins) / (self._ends - self._begins)
@@ -77,7 +74,7 @@ class _Driver:
     def _size_swing(self) -> None:
         """Size the next swing by what the last one has shown."""
         expected = self._grows * self._peak  # of the swing that is done: a_y comes after the angle
-        if self._tail_out:
+        if self._too_far:
             self._size /= _GROWS
             self._grows = min(self._grows, _CREEPS)
         else:
@@ -88,7 +85,7 @@ class _Driver:
                     self._grows = 1.0
             self._size *= min(self._grows, self._most / max(expected, 1e-6))
         self._best = max(self._best, self._peak)
-        self._peak, self._tail_out = 0.0, False
+        self._peak, self._too_far = 0.0, False
 
     def _begin_swing(self, t: float) -> None:
         self._begins, self._from, self._side = t, self.angle, -self._side
