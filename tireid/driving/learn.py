@@ -27,7 +27,7 @@ _FIRST = 1.0  # m/s², of the first swing of a car that does not slip
 _GROWS = 1.2  # from swing to swing
 _NO_MORE = 1.04  # times the most a_y: more steering that gives less turns the car no more
 _IN_VAIN = 2  # such swings: one is the luck of its timing
-_CREEPS = 1.05  # from swing to swing after the tail stepped out and the size a step back
+_CREEPS = 1.05  # from swing to swing after the tail stepped out, up to the size where it did
 _LEAST = 0.3  # of the size: smallest angle once it is held
 _SMOOTH = 0.05  # s, time constant of what the sensors show
 # Side slip at which the tail steps out, over the most a_y [rad s²/m], and its least and most [rad]:
@@ -50,7 +50,7 @@ class _Driver:
         self.angle = self._from = self._to = 0.0
         self._a_y = self._side_slip = 0.0  # smoothed
         self._peak = self._best = 0.0  # |a_y| of the swing, and of all before [m/s²]
-        self._in_vain, self._too_far = 0, False
+        self._in_vain, self._too_far, self._largest = 0, False, math.inf
 
     def steer(self, measured: Measured) -> None:
         """Command the angle of the next period."""
@@ -75,6 +75,7 @@ class _Driver:
         """Size the next swing by what the last one has shown."""
         expected = self._grows * self._peak  # of the swing that is done: a_y comes after the angle
         if self._too_far:
+            self._largest = self._size if self._grows == _GROWS else self._largest
             self._size /= _GROWS
             self._grows = min(self._grows, _CREEPS)
         else:
@@ -84,6 +85,7 @@ class _Driver:
                 if self._in_vain == _IN_VAIN or expected >= self._most:
                     self._grows = 1.0
             self._size *= min(self._grows, self._most / max(expected, 1e-6))
+            self._size = min(self._size, self._largest)
         self._best = max(self._best, self._peak)
         self._peak, self._too_far = 0.0, False
 
