@@ -38,9 +38,10 @@ CONFIRM = (
 )
 _EPILOG = (
     "Without --weights, frozen tires are identified first: the same car drives on "
-    f"an open field for {DURATION:g} s, steered at random and ever harder until it "
-    "slides, and the tires at the end are used. linear is the tire of the vehicle file, oracle the "
-    "true tire of the plant, learning begins with the frozen tires and updates them while driving. "
+    f"an open field for {DURATION:g} s, steered at random and ever harder until its "
+    "sensors show that it slides, and the tires at the end are used. linear is the tire of the "
+    "vehicle file, oracle the true tire of the plant, learning begins with "
+    "the frozen tires and updates them while driving. "
     "Exit code 0 where the first of the cars reached the end of the path, else 1."
 )
 
@@ -290,7 +291,6 @@ def frozen_tires(
         setup.car(open_field=True),
         conditions.sensors,
         np.random.default_rng([conditions.seed, 1]),
-        grip=9.0,
         seed=conditions.seed,
         lateral=conditions.lateral(),
     )

@@ -258,7 +258,9 @@ def test_a_yaw_inertia_that_nobody_measured_does_not_become_a_steering_ratio():
     assert abs(model["steering_gain"]) < 0.06 and not model.drives.notes
     assert model["ln_inertia"] == pytest.approx(math.log(car.yaw_inertia / guess), abs=0.08)
     measured = Priors.of(left_out).without(["ln_inertia"])
-    assert fit([log], left_out, measured).model["steering_gain"] > 0.08
+    taken = fit([log], left_out, measured).model["steering_gain"]
+    assert taken == pytest.approx(math.log(guess / car.yaw_inertia), abs=0.03)
+    assert taken > 2.0 * abs(model["steering_gain"])
 
 
 def test_blocks_are_no_longer_than_asked_and_days_stand_alone():
