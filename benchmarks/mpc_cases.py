@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from identifier.tire_model import TireModel
+from models.vehicle import GRAVITY, sedan
+from mpc.loop.sensing import cornering_limit
 from tireid.cli import build_parser
 from tireid.commands.drive import conditions_of, frozen_tires
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, run_drive
@@ -39,6 +41,17 @@ class Score(NamedTuple):
     peak: float
     completed: bool
     failures: int
+
+
+def share_of_limit(percent: float, mu: float) -> str:
+    """Return `--speed` for a share of the sedan's largest lateral acceleration in steady turning.
+
+    Parameters
+    ----------
+    percent : of it.
+    mu : friction.
+    """
+    return f"{0.01 * percent * cornering_limit(sedan(), None, mu) / GRAVITY:.4g}g"
 
 
 def options_of(case: Case) -> argparse.Namespace:
@@ -72,7 +85,7 @@ def identified(mu: float, seed: int, paper: bool, caution: bool) -> TireModel:
     caution : with it the band of the forces is calibrated.
     """
     more = ("--caution", "1") if caution else ()
-    options = options_of(Case("slalom", "50%", mu, "paper" if paper else "axle", seed, more))
+    options = options_of(Case("slalom", "0.4g", mu, "paper" if paper else "axle", seed, more))
     _, model = frozen_tires(options, [FROZEN], conditions_of(options))
     assert model is not None
     return model

@@ -16,12 +16,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.mpc_cases import Case, Score, all_driven, median_cm
+from benchmarks.mpc_cases import Case, Score, all_driven, median_cm, share_of_limit
 from benchmarks.targets import Table, Targets, Values, parse
 from mpc.path import slalom
 
-COURSES = {"slalom": ("51.7%", 190.0, 6.0), "iso-3888-1": ("52.8%", 45.0, 2.0)}
-"""Share of the dry grip; place of the drop [m], and how much farther it is with each seed [m]."""
+COURSES = {"slalom": (51.7, 190.0, 6.0), "iso-3888-1": (52.8, 45.0, 2.0)}
+"""Per cent of the dry limit; place of the drop [m], and how much farther with each seed [m]."""
 WET = 0.5
 CAUTION = ("--caution", "1")
 WAYS = {
@@ -73,9 +73,9 @@ def main() -> int:
         paths = {"slalom": str(file), "iso-3888-1": "iso-3888-1"}
         cases = []
         for seed, course, (tires, more) in product(seeds, COURSES, WAYS.values()):
-            speed, place, farther = COURSES[course]
+            percent, place, farther = COURSES[course]
             words = (*more, "--mu-drop", f"{place + farther * seed:g}:{WET}")
-            cases.append(Case(paths[course], speed, 1.0, tires, seed, words))
+            cases.append(Case(paths[course], share_of_limit(percent, 1.0), 1.0, tires, seed, words))
         for case, score in all_driven(cases):
             course = "slalom" if case.path == str(file) else case.path
             found[course, names[case.tires, case.more[:-2]]].append(score)

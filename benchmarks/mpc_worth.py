@@ -2,7 +2,8 @@
 
     python -m benchmarks.mpc_worth [--quick] [--record]
 
-ISO 3888-2 and the handling course at 90 % and 97 % of the limit, on friction 1.0 and 0.5: on the
+ISO 3888-2 and the handling course at 90 % and 97 % of the limit, on friction 1.0 and 0.5. The limit
+is the car's largest lateral acceleration in steady turning; `--speed` says the share of it. On the
 linear tire of the data sheet; on the paper's network (`--paper`) and the default, identified and
 frozen; on the true tire. Seeds are those of `--seed`. A drive that leaves the path by 2 m or spins
 ends there and counts as it was until then.
@@ -13,7 +14,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from itertools import product
 
-from benchmarks.mpc_cases import Case, Score, all_driven, median_cm
+from benchmarks.mpc_cases import Case, Score, all_driven, median_cm, share_of_limit
 from benchmarks.targets import Table, Targets, Values, parse
 
 PATHS: Sequence[str] = ("iso-3888-2", "course")
@@ -77,13 +78,15 @@ def main() -> int:
     seeds, paths, shares, frictions = SEEDS, PATHS, SHARES, FRICTIONS
     if options.quick:
         seeds, paths, shares, frictions = 1, PATHS[:1], SHARES[1:], FRICTIONS[:1]
+    words = {(share_of_limit(share, mu), mu): share for share, mu in product(shares, frictions)}
     cases = [
-        Case(path, f"{share}%", mu, tires, seed)
-        for seed, mu, path, share, tires in product(range(seeds), frictions, paths, shares, TIRES)
+        Case(path, speed, mu, tires, seed)
+        for seed, path, tires in product(range(seeds), paths, TIRES)
+        for speed, mu in words
     ]
     found: dict[str, dict[str, list[Score]]] = defaultdict(lambda: defaultdict(list))
     for case, score in all_driven(cases):
-        key = f"{case.path}/{case.speed.removesuffix('%')}/{case.mu}"
+        key = f"{case.path}/{words[case.speed, case.mu]}/{case.mu}"
         found[key][case.tires].append(score)
     for path, share, mu in product(paths, shares, frictions):
         key = f"{path}/{share}/{mu}"

@@ -1,7 +1,8 @@
-"""Learn the tires of a sedan on a slalom, freeze them, and steer along a lane change with them.
+"""Learn the tires of a sedan on a slalom, freeze them, and drive a lane change with them.
 
-The tracker is told of the learnt tires, then of the linear ones of the vehicle file; the car, the
-noise of its sensors and the delay are the same. Draws drive_on_learnt_tires.png.
+The learnt tires say how fast. The tracker is told of them, then of the linear ones of the vehicle
+file; the car, its speed, the noise of its sensors and the delay are the same. Draws
+drive_on_learnt_tires.png.
 """
 
 from pathlib import Path
@@ -10,39 +11,41 @@ import numpy as np
 
 from identifier.axle import AxleIdentifier
 from identifier.run import identify
+from identifier.speed_limits import speed_limits
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
 from mpc.loop.drive import drive
 from mpc.loop.record import Drive
-from mpc.loop.sensing import cornering_limit, inertial_unit
-from mpc.path import iso_3888_2, steady_speed
+from mpc.loop.sensing import inertial_unit
+from mpc.path import SpeedProfile, iso_3888_2, speed_profile
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
 from tireid.figures.drive import drive_errors_figure
 from tireid.figures.style import save_figure
 
 EXPECTED_BELOW = 0.5
-SHARE = 0.9  # of the lateral acceleration that the tires can give
+SHARE = 0.9  # of what the learnt tires allow
+V_MAX = 20.0  # m/s
 DELAY = 2  # periods of 10 ms
 
 
-def steer(tires: PredictionTire) -> Drive:
+def steer(tires: PredictionTire, speed: SpeedProfile) -> Drive:
     """Return the drive of a tracker that is told of some tires.
 
     Parameters
     ----------
     tires : what it believes.
+    speed : along the path.
     """
-    car, path = DoubleTrackCar(sedan()), iso_3888_2()
-    limit = cornering_limit(car.vehicle, car.tire)
+    car = DoubleTrackCar(sedan())
     lag = DELAY * car.period + car.vehicle.require_chassis().steering_lag
     return drive(
-        path,
+        speed.path,
         car,
         Tracker(tires, period=car.period, delay=lag),
-        speed=steady_speed(path, a_y_max=limit, share=SHARE),
+        speed=speed,
         sensors=inertial_unit(),
         delay=DELAY,
         rng=np.random.default_rng(0),
@@ -55,9 +58,12 @@ def main() -> float:
     slalom = Slalom(amplitude=0.07, frequency=0.5, onset=1.0, rate_limit=0.5, duration=20.0)
     recording = Plant(car).simulate(slalom, speed=20.0).recording()
     history = identify(recording, car, AxleIdentifier.for_vehicle(car))
-    learnt = prediction_tire(history.freeze(t=20.0))
+    learnt = history.freeze(t=20.0)
+    speed = speed_profile(iso_3888_2(), speed_limits(learnt), share=SHARE, v_max=V_MAX)
+    print(speed)
 
-    drives = {"frozen": steer(learnt), "linear": steer(prediction_tire(car))}
+    tires = {"frozen": prediction_tire(learnt), "linear": prediction_tire(car)}
+    drives = {name: steer(one, speed) for name, one in tires.items()}
     rms = {}
     for name, driven in drives.items():
         rms[name] = float(np.sqrt(np.mean(driven.e_y**2)))

@@ -2,7 +2,7 @@
 
 Steady turning loads both axles in proportion, so that the weaker one limits the car (Milliken,
 Race Car Vehicle Dynamics, 1995, ch. 9). While tires push f weights forward,
-A(f)/g = min_i φ_i max(1 + κ_i v_x² ∓ (h L/l_o) f, 0.2) sqrt(1 - (c_i f)²), l_o the other arm,
+A(f)/g = min_i φ_i λ_i sqrt(1 - (c_i f)²), λ_i = 1 + κ_i v_x² ∓ (h L/l_o) f, l_o the other arm,
 φ_i the largest force of the axle over its slip, c_i of braking or driving. No push is larger than
 1/c_i, and f² + (A/g)² <= (A(0)/g)²: tires grip lengthwise as sideways.
 φ_i is the lower end of the band within some times the slip that was identified, h and c_i are the
@@ -31,7 +31,7 @@ _PUSHES = 200  # longitudinal forces of one side
 _SLIPS = 200  # of a curve
 SHARES = np.linspace(0.0, 1.0, 41)  # of a_y, at which it is kept what is left lengthwise
 
-NUMBERS = ("load_transfer", "braking_f", "braking_r", "driving_f", "driving_r")
+ELLIPSE = ("braking_f", "braking_r", "driving_f", "driving_r")
 
 
 class Sides(NamedTuple):
@@ -124,7 +124,7 @@ def speed_limits(tire: TireModel, *, confidence: float = 0.95, beyond: float = 2
     assert known is not None
     level = 2.0 * confidence - 1.0
     grip = np.array([_lowest_grip(band, i, beyond * float(known[i]), level) for i in range(2)])
-    priors, index = Priors.of(car), [INDEX[name] for name in NUMBERS]
+    priors, index = Priors.of(car), [INDEX[name] for name in ("load_transfer", *ELLIPSE)]
     mean, covariance = drives.lengthwise or (priors.mean, priors.covariance)
     sd = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     p = mean.copy()
@@ -170,9 +170,13 @@ def _left(
 ) -> tuple[Array, NDArray[np.int64]]:
     use = p[[INDEX[f"{'driving' if sign > 0.0 else 'braking'}_{axle}"] for axle in "fr"]]
     most = min(a_y, 1.0 / max(float(use.max()), 1e-9))
+    plain = p.copy()
+    plain[[INDEX[name] for name in ELLIPSE]] = 0.0
     f = np.linspace(0.0, most, _PUSHES + 1)
-    a_x = sign * GRAVITY * f - car.drag * v_x**2
-    pushed = grip * np.array(pushed_function()(p, car_numbers(car), a_x[None], v_x)).T
+    a_x = sign * GRAVITY * f[:2] - car.drag * v_x**2
+    first, second = np.array(pushed_function()(plain, car_numbers(car), a_x[None], v_x)).T
+    loads = first + (second - first) * np.arange(f.size)[:, None]
+    pushed = grip * loads * np.sqrt(np.maximum(1.0 - (f[:, None] * use) ** 2, 0.0))
     left = np.minimum(pushed.min(axis=1), np.sqrt(np.maximum(a_y**2 - f**2, 0.0)))
     left[0] = a_y
     left = np.minimum.accumulate(left) - 1e-12 * np.arange(f.size)  # falls: read it backwards

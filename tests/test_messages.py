@@ -26,8 +26,16 @@ from models.tires import DugoffTire, FialaTire, LinearTire, MagicFormula
 from models.vehicle import VehicleError, sedan
 from mpc.handover.judge import Judge
 from mpc.loop.lateral import LateralVelocity
-from mpc.loop.sensing import CarSensors, SpeedProfile
-from mpc.path import Path, PathError, constant_radius, grip_speed, iso_3888_1, iso_3888_2, slalom
+from mpc.loop.sensing import CarSensors
+from mpc.path import (
+    Path,
+    PathError,
+    SpeedProfile,
+    constant_radius,
+    iso_3888_1,
+    iso_3888_2,
+    slalom,
+)
 from mpc.path.courses import Straight
 from mpc.path.gates import Gate, line_through_gates
 from mpc.path.line import line_from_heading
@@ -64,6 +72,10 @@ def points(X, Y, **options):
 
 def tracker(**change):
     return Tracker(prediction_tire(CAR), Problem(dt=0.05), **change)
+
+
+def drive(speeds=15.0, **how):
+    return ti.drive(ti.paths.iso_3888_2(), CAR, speeds=speeds, **how)
 
 
 def columns(**change):
@@ -153,7 +165,6 @@ REFUSED = {
         (lambda: line_from_heading(np.zeros(7), np.zeros(7), 1.0), r"4 n \+ 1 samples"),
         (lambda: LINE.project(0.0, np.inf, 1.0), "cannot project"),
         (lambda: replace(LINE, closed=True), "must end as it starts"),
-        (lambda: grip_speed(LINE, a_y_max=8.0, v_max=0.0, a_accel=3.0, a_brake=6.0), "v_max"),
         (lambda: Path.from_csv("absent.csv"), "absent.csv: there is no such"),
         (lambda: points([0.0, 1.0], [0.0]), r"\(2,\) and \(1,\)"),
         (lambda: points([0.0, 10.0, np.nan], [0.0] * 3), "number 3 is"),
@@ -210,11 +221,14 @@ REFUSED = {
         (lambda: Guards(min_speed=np.nan), "min_speed must be"),
         (lambda: Guards(hold_time=-0.1), "hold_time must not be"),
         (lambda: Guards(fall_back_e_y=0.0), "fall_back_e_y must be"),
-        (lambda: ti.drive(ti.paths.iso_3888_2(), CAR, delay=0.015), "delay must be 0 to 100 ms"),
-        (lambda: ti.drive(ti.paths.iso_3888_2(), CAR, share=0.0), "share must be positive"),
-        (lambda: ti.drive(ti.paths.iso_3888_2(), CAR, friction=9.0), "friction must lie between"),
-        (lambda: ti.drive(ti.paths.iso_3888_2(), CAR, laps=2.0), "laps are of a closed path"),
-        (lambda: ti.drive(ti.paths.iso_3888_2(), CAR, learning=True), "none is given"),
+        (lambda: drive(delay=0.015), "delay must be 0 to 100 ms"),
+        (lambda: drive(speeds=0.0), "speeds must be positive"),
+        (lambda: drive(friction=9.0), "friction must lie between"),
+        (lambda: drive(laps=2.0), "laps are of a closed path"),
+        (lambda: drive(learning=True), "none is given"),
+        (lambda: drive(speeds=None), "speeds such as 15.0 m/s, or a tire that tells them"),
+        (lambda: drive(confirm=True), "confirm goes with --speed tires, or with a share"),
+        (lambda: drive(speeds=SpeedProfile(LINE, 9.0)), "speeds are of the path .*, not of ISO"),
     ],
 }
 

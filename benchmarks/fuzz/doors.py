@@ -96,6 +96,12 @@ DOORS = (
     _door("identify axle", 6, f"{IDENTIFY} --method axle --weights axle.json", "axle.json"),
     _door("identify network", 4, f"{IDENTIFY} --paper --weights network.json", "network.json"),
     _door("drive axle", 4, f"{DRIVE} --weights axle.json", "axle.json"),
+    _door(
+        "drive by tires",
+        2,
+        f"{DRIVE.replace('12m/s', 'tires')} --confirm --weights axle.json",
+        "axle.json",
+    ),
     _door("drive network", 3, f"{DRIVE} --weights network.json", "network.json"),
     _door("predict curve", 2, f"{PREDICT} curve.json log.csv", "curve.json"),
     _door("drive learning", 1, f"{DRIVE} --tires learning --weights axle.json", "axle.json"),

@@ -14,17 +14,18 @@ import numpy as np
 from codegen.arrays import Array, one_thread, root_mean_square
 from identifier.estimate.day import days_apart, long_segments, steering_zeros
 from identifier.estimate.drive import FASTEST, Drive, hardest
-from identifier.estimate.information import CHANGES, Information
+from identifier.estimate.information import CHANGES, Information, coordinates
 from identifier.estimate.latent import Learnt, accelerometer_off, latent_priors, learn_latent
 from identifier.estimate.model import FittedModel
 from identifier.estimate.nodes import Nodes
 from identifier.estimate.posterior import Posterior, Reach, Segment
-from identifier.estimate.priors import Priors
-from identifier.estimate.roads import Roads, with_roads
+from identifier.estimate.priors import ANOTHER_ROAD, LEAST_DOUBT, Priors
+from identifier.estimate.roads import Roads, road_of, with_roads
 from identifier.estimate.solve import (
     ENOUGH,
     MOST_COUNT,
     STRIDE,
+    around_beliefs,
     error_size,
     estimate,
     settled,
@@ -32,6 +33,7 @@ from identifier.estimate.solve import (
     softness,
 )
 from identifier.motion.parameters import INDEX, NAMES
+from identifier.tire_model import GRIP
 from models.recordings import Recording, joined
 from models.vehicle import GRAVITY, Vehicle
 
@@ -53,6 +55,7 @@ _MUCH_LESS = 0.7  # each are tried, and times what they must miss then
 _ANY_ZERO = 100.0  # of their priors' deviations: one log says nothing of another's zeros
 _FORCELESS = 0.1  # static loads, rms, below which a log does not say
 _ZEROS = [INDEX[name] for name in CHANGES]
+_ROAD = INDEX["ln_road"]
 Days: TypeAlias = Literal["found", "one", "each"]
 _LASTS = 0.15  # [s] after which noise of a sedan's sensors is over, errors of its model are not
 
@@ -74,6 +77,7 @@ def fit(
     vehicle: Vehicle,
     priors: Priors | None = None,
     *,
+    start: FittedModel | None = None,
     block: float = _BLOCK,
     coarse: bool = False,
     days: Days = "found",
@@ -82,6 +86,7 @@ def fit(
     """Estimate the tires of a car from logs.
     recordings : logs of the car; a longer log is taken in blocks, and what these tell adds up.
     priors : beliefs; None takes those of the car.
+    start : tires of this car from other logs: what these tell adds up with what the new ones do.
     block : longest time that is estimated at once [s].
     coarse : whether samples are averaged to twice the interval, as they are from ten minutes on.
     days : whether zeros of sensors are of all logs ("one"), of each ("each"), or of each where
@@ -98,7 +103,8 @@ def fit(
     before = Priors.of(vehicle) if priors is None else priors
     parts: list[tuple[float, Information]] = []
     found: Posterior | None = None
-    reach = Reach()
+    reach = Reach() if start is None else Reach(*start.reach[:5])
+    told = Information.nothing() if start is None else _told(start, before)
     known, count, sd = Information.nothing(), 0.0, Priors.of(vehicle).sd
     total, done = sum(one.duration for one in recordings), 0.0
     coarse = coarse or total >= _LONG
@@ -115,16 +121,26 @@ def fit(
     for drives in _blocks(measured, vehicle, block, coarse=coarse, alone=days == "each"):
         if not any(one.counts.any() for one in drives):
             continue
-        begin = None if found is None else found.p.copy()
-        if begin is not None and days == "each":
-            begin[_ZEROS] = before.mean[_ZEROS]
+        last = found or start
+        begin = None if last is None else last.p.copy()
+        if begin is not None and (days == "each" or found is None):
+            begin[[*_ZEROS, _ROAD]] = before.mean[[*_ZEROS, _ROAD]]
         enough = ENOUGH if begin is None else _ENOUGH_MORE
         share = MOST_COUNT / max(count, MOST_COUNT)
-        beliefs = before.after(known.counted(share)) if parts else before
+        beliefs = before.after(told + known.counted(share)) if last else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         if not found.ended:
             _log.warning("%s: the descent ended at its limit, not where nothing was left to gain",
                         recordings[0].name)  # fmt: skip
+        if start is not None and not parts and not start.covariance[_ROAD, _ROAD]:
+            ratio = road_of(drives, vehicle, beliefs, found) or 1.0
+            knows = all(one.identified for one in start.estimates() if one.title == GRIP)
+            if ratio < 1.0 or (ratio > 1.0 and knows):  # a curve that goes on looks like more
+                _log.warning("%s: its road has %.2f of the friction of the tires to begin with",
+                             recordings[0].name, ratio)  # fmt: skip
+                there = start.at_friction(ratio).band.on_another_road(ANOTHER_ROAD)
+                return fit(recordings, vehicle, priors, start=there, block=block, coarse=coarse,
+                           days=days)  # fmt: skip
         found, roads = with_roads(drives, vehicle, beliefs, found)
         here = _reach(drives, roads, found, vehicle)
         reach = reach.with_(here)
@@ -138,10 +154,11 @@ def fit(
     share = MOST_COUNT / max(count, MOST_COUNT)
     parts = [(t, part.counted(share)) for t, part in parts]
     if found is not None and len(parts) > 1:
-        p, covariance = settled(before.after(known.counted(share)), found.p)
+        p, covariance = settled(before.after(told + known.counted(share)), found.p)
         found = replace(found, p=p, covariance=covariance)
     if blinds := [one for one in recordings if one.logged_v_y is None]:
-        beliefs, blind = before if found is None else _after(before, found), joined(blinds)
+        last = found or (None if start is None else _next_day(start, sd))
+        beliefs, blind = before if last is None else _after(before, last), joined(blinds)
         blind = replace(blind, delta_f=blind.delta_f - steering_zeros(blind, vehicle))
         off = accelerometer_off(blind, vehicle, latent_priors(vehicle, beliefs))
         sway, hard = float(beliefs.mean[INDEX["ln_sway"]]), hardest(blind, _BLIND)
@@ -164,16 +181,44 @@ def fit(
         apart = are_apart(model)
         share = 0.0 if apart else _missed(measured, model)
         if apart or soft or share > _NOTHING_FITS:  # then tires tell no zeros apart
-            each = fit(recordings, vehicle, priors, block=block, coarse=coarse, days="each")
+            each = fit(recordings, vehicle, priors, start=start, block=block, coarse=coarse,
+                       days="each")  # fmt: skip
             if apart or _missed(measured, each.model) < _MUCH_LESS * share:
                 return each
             if soft and are_apart(each.model):
                 return each
     if soft and not before.moves[_PLAY]:
-        loose = fit(recordings, vehicle, before.with_play(), block=block, coarse=coarse, days=days)
+        loose = fit(recordings, vehicle, before.with_play(), start=start, block=block,
+                    coarse=coarse, days=days)  # fmt: skip
         if loose.posterior.p[_PLAY] > _SURELY * loose.posterior.sd(NAMES[_PLAY]):
             return loose
     return _Fit(model, found, parts)
+
+
+def _told(start: FittedModel, before: Priors) -> Information:
+    """Return what the logs behind tires told: what these are surer of than beliefs.
+
+    Their sensors had zeros of their own, and another road that is doubted a friction of its own.
+    """
+    index, sd = np.flatnonzero(before.moves & (np.diag(start.covariance) > 0.0)), before.sd
+    where, H = np.ix_(index, index), np.zeros_like(start.covariance)
+    slope, curvature = around_beliefs(before, start.p)
+    sure = np.linalg.inv((start.covariance + LEAST_DOUBT * np.diag(sd**2))[where])
+    values, vectors = np.linalg.eigh(sure - curvature[where])
+    H[where] = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    told = Information.about(start.p, -slope, H, sd, start.reach.slip, 0.0)
+    told, doubt = told.of_one_day(sd[_ZEROS]), start.covariance[_ROAD, _ROAD]
+    if doubt > 0.0:
+        told = told.loosened(coordinates(start.p)[1][:, [_ROAD]], np.sqrt([doubt]))
+    return told
+
+
+def _next_day(start: FittedModel, sd: Array) -> FittedModel:
+    """Return tires whose sensors are off by other zeros, on the road where they are."""
+    covariance = start.covariance.copy()
+    covariance[_ZEROS, _ZEROS] += sd[_ZEROS] ** 2 * (covariance[_ZEROS, _ZEROS] > 0.0)
+    covariance[_ROAD, _ROAD] = 0.0
+    return replace(start, covariance=covariance)
 
 
 def _missed(recordings: Sequence[Recording], model: FittedModel) -> float:
@@ -201,8 +246,8 @@ def _alone(recording: Recording, vehicle: Vehicle) -> list[Recording]:
     return [recording.taken(one) for one in long] if len(long) > 1 else [recording]
 
 
-def _after(beliefs: Priors, found: Posterior) -> Priors:
-    """Return what is believed after a block; what it does not tell stays as it was."""
+def _after(beliefs: Priors, found: Posterior | FittedModel) -> Priors:
+    """Return what is believed after a block or of tires; what it does not tell stays as it was."""
     information, moves = beliefs.information.copy(), beliefs.moves.copy()
     index = np.flatnonzero(np.diag(found.covariance) > 0.0)
     information[index], information[:, index] = 0.0, 0.0

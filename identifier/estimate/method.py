@@ -1,5 +1,6 @@
 """The estimate as a method: tires from the whole of a log, and their frozen step."""
 
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import get_args
@@ -14,9 +15,12 @@ from identifier.method import CannotFreezeError, Method, WholeLog
 from identifier.motion.model import REPLAYED
 from identifier.setup import AXLE_FORCE, Port, Setup
 from identifier.tire_model import TireModel
+from identifier.verdict.verdict import LARGEST_MODEL_ERROR
 from models.recordings import Recording
 from models.rules import require_positive
 from models.vehicle import Vehicle
+
+_log = logging.getLogger("tireid.estimate")
 
 PORTS = (
     AXLE_FORCE,
@@ -67,7 +71,7 @@ class FitMethod(Method):
     ) -> FittedModel:
         """Return the tires of a log.
 
-        start : a fit that is believed before; None believes the table.
+        start : a fit of other logs, which add up with this one; None believes the table alone.
         """
         if start is not None and not isinstance(start, FittedModel):
             raise ValueError(
@@ -77,8 +81,10 @@ class FitMethod(Method):
         priors = Priors.of(vehicle)
         if start is not None:
             priors = priors.with_play() if start["steering_play"] > 0.0 else priors
-            priors = priors.known(start.p, start.covariance)
-        return fit([recording], vehicle, priors, days=self.days, progress=progress).model
+            start = _beginning(start, recording, vehicle)
+        return fit(
+            [recording], vehicle, priors, start=start, days=self.days, progress=progress
+        ).model
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> TireModel:
         del vehicle, state
@@ -95,3 +101,13 @@ class FitMethod(Method):
                 "of the weights.json of a fit; the method axle learns"
             )
         return (start if start.vehicle == vehicle else start.mounted_on(vehicle)).setup(self.dt)
+
+
+def _beginning(start: FittedModel, recording: Recording, vehicle: Vehicle) -> FittedModel | None:
+    """Return the tires that a log adds to; None of such that a verdict refuses."""
+    missed = start.model_error
+    if start.drives.at_bounds or (missed is not None and missed.max() > LARGEST_MODEL_ERROR):
+        _log.warning("%s: the tires to begin with are not valid: they teach nothing",
+                     recording.name)  # fmt: skip
+        return None
+    return start.mounted_on(vehicle)

@@ -18,7 +18,7 @@ from identifier.estimate.information import PLACE, Information
 from identifier.motion.parameters import INDEX, NAMES, SLIPS
 from models.vehicle import FULL_SIZE, Vehicle
 
-_LEAST_DOUBT = 1e-6  # of a prior, in variances of the usual one
+LEAST_DOUBT = 1e-6  # of a prior, in variances of the usual one
 _LESS_LOAD = 0.6  # of the geometric load transfer: tires gain less force than load
 _LESS_USE = 0.65  # of the geometric use of the ellipse, measured on cars and the plant
 _SURE_HEIGHT = 0.03  # sd of the load transfer of a car that tells its height
@@ -233,7 +233,7 @@ class Priors:
         """
         where = np.ix_(self.moves, self.moves)
         information = np.zeros_like(self.information)
-        sure = covariance + _LEAST_DOUBT * np.diag(self.sd**2)
+        sure = covariance + LEAST_DOUBT * np.diag(self.sd**2)
         information[where] = np.linalg.inv(sure[where])
         return replace(self, mean=p, information=information, typed=())
 

@@ -83,6 +83,8 @@ class Learner:
             self._left = rules.quick_blend if self._quick else rules.blend
         if self._steers:
             self._move(tracker)
+        elif decision is not None and decision.verdict is Verdict.LEARNT:
+            return None
         return f"{decision.verdict.value}: {decision.reason}" if decision and changed else None
 
     def _requested(self, tracker: Tracker) -> float | None:

@@ -34,8 +34,7 @@ class Earned:
     """
 
     def __init__(self, profile: SpeedProfile, period: float, friction: Callable[[], float]) -> None:
-        if profile.planned is None:
-            raise ValueError("a told speed cannot be earned: confirm goes with identified tires")
+        assert profile.planned is not None
         (self._planner, self._most), self._friction = profile.planned, friction
         self._weight = period / _TIME
         self._a_y, self._held, self._ratio = 0.0, 0.0, 1.0
@@ -51,7 +50,7 @@ class Earned:
         limits = self._planner.limits
         if np.isfinite(measured.a_y):
             self._a_y += self._weight * (measured.a_y - self._a_y)
-        ratio = self._friction()
+        ratio = min(self._friction(), 1.0)  # more grip than learnt is no reason to hurry
         if ratio < _ALARM and ratio < self._ratio:  # what was held was held on another road
             self._held = 0.0
         self._ratio = ratio

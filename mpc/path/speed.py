@@ -6,6 +6,7 @@ place, once forwards and once backwards.
 """
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
@@ -25,6 +26,7 @@ ENGINE = 5.0  # m/s², of a car of which nothing is said
 TURN, DRIVE, BRAKE, POWER, TOP = REASONS = ("turn", "drive", "brake", "engine", "v_max")
 _REASON = {name: i for i, name in enumerate(REASONS)}
 _TOLERANCE = 1e-3  # of a speed at the start
+_MET = 1e-4  # of v², where a lap goes over into the next one
 _FASTEST = 200.0  # m/s, which no car of an identified tire reaches
 _ROUNDS = 100
 _TURNING = 0.97  # of the largest v², from which on it is the turn that limits
@@ -43,11 +45,15 @@ class Preview(NamedTuple):
 class SpeedProfile:
     """A wanted speed along a path; a closed path is driven lap after lap.
 
-    Attributes: path; v, wanted speed at its samples, (n,) [m/s]; limited_by, what limits it there:
-    turn, drive, brake (the tires), engine or v_max; axle, front or rear, which one slides first
-    there; (n,) of words each, both empty where the speed was told; planned, by what and within
-    which share of the limits, or None.
+    Attributes: path; planned, by what and within which share of the limits, or None.
+
+    Parameters
+    ----------
+    path : to drive.
     v : wanted speed [m/s], a number or one for each sample of the path, (n,).
+    limited_by : what limits it there, (n,): turn, drive, brake (the tires), engine or v_max;
+        empty where the speed was told.
+    axle : front or rear, which one slides first there, (n,); empty where the speed was told.
     """
 
     def __init__(
@@ -103,6 +109,8 @@ class SpeedProfile:
     def at(self, s: ArrayLike) -> Array:
         """Return the wanted speed [m/s] in the shape of s.
 
+        Parameters
+        ----------
         s : arc length [m].
         """
         return self.path.along(self.v, s)
@@ -110,6 +118,8 @@ class SpeedProfile:
     def reference(self, s: float, gain: float) -> float:
         """Return what to ask of a proportional driver, so that it does not lag behind [m/s].
 
+        Parameters
+        ----------
         s : arc length [m].
         gain : acceleration that the driver asks for, per error of the speed [1/s].
         """
@@ -120,7 +130,11 @@ class SpeedProfile:
     def ahead(self, s: float, v_x: float, t: Array, gain: float) -> Preview:
         """Return the road that the car will be on.
 
-        s : arc length now [m].   v_x : speed now [m/s].   t : times from now [s], (k,).
+        Parameters
+        ----------
+        s : arc length now [m].
+        v_x : speed now [m/s].
+        t : times from now [s], (k,).
         gain : of the driver [1/s].
         """
         error, fades = v_x - float(self.at(s)), np.exp(-gain * t)
@@ -137,7 +151,12 @@ class SpeedProfile:
         return float(np.interp(s, self.path.s, self._t)) + min(s, 0.0) / float(self.v[0])
 
     def place(self, t: Array) -> Array:
-        """Return where a car at the wanted speed is, laps included: the inverse of `time_at`."""
+        """Return where a car at the wanted speed is, laps included: the inverse of `time_at`.
+
+        Parameters
+        ----------
+        t : times [s], (k,).
+        """
         if self.path.closed:
             laps = np.floor(t / self.lap_time)
             within = np.interp(t - laps * self.lap_time, self._t, self.path.s)
@@ -151,16 +170,24 @@ class _Lead(SpeedProfile):
     """A profile that begins on the way at another speed and goes over into it.
 
     s : arc length, rising [m], (k,).   v : speeds there [m/s], (k,); the last one is the profile's.
+    why, axle : what limits there, and which axle, as in the profile, (k,).
     """
 
-    def __init__(self, profile: SpeedProfile, s: Array, v: Array) -> None:
+    def __init__(
+        self, profile: SpeedProfile, s: Array, v: Array, why: ArrayLike, axle: ArrayLike
+    ) -> None:
         self._profile, self._lead_s, self._lead_v = profile, s, v
         path, begins = profile.path, float(s[0])
+        leads = (path.s >= begins) & (path.s < s[-1])
+        at = np.searchsorted(s, path.s[leads], side="right") - 1
+        named = [profile.limited_by.copy(), profile.axle.copy()]
+        for mine, theirs in zip(named, (why, axle), strict=True):
+            mine[leads] = np.asarray(theirs)[at]
         super().__init__(
             path,
             np.where(path.s < begins, profile.v, self.at(path.s)),
-            limited_by=profile.limited_by,
-            axle=profile.axle,
+            limited_by=named[0],
+            axle=named[1],
             planned=profile.planned,
         )
         pace = 0.5 * (1.0 / v[1:] + 1.0 / v[:-1])
@@ -257,13 +284,14 @@ class Planner:
         self.path, self.limits = path, limits
         self._engine = _engine(ENGINE if engine is None else engine)
         self._brakes = math.inf if brakes is None else brakes
-        self._most = math.inf if v_max is None else v_max**2  # of v² [m²/s²]
+        self._bounded = v_max is not None
+        self._most = (_FASTEST if v_max is None else v_max) ** 2  # of v² [m²/s²]
 
     def profile(self, share: float) -> SpeedProfile:
         """Return the fastest profile within a share of the limits."""
         path, limits = self.path, self.limits.scaled(share)
         kappa = np.abs(path.kappa[:-1] if path.closed else path.kappa)
-        square = np.full(kappa.size, min(self._most, _FASTEST**2))
+        square = np.full(kappa.size, self._most)
         for _ in range(_ROUNDS):  # downforce allows more where it is faster
             last, a_y = square, np.interp(np.sqrt(square), limits.v, limits.a_y)
             square = np.minimum(square, a_y / np.maximum(kappa, 1e-12))
@@ -278,14 +306,18 @@ class Planner:
         slides = np.interp(np.sqrt(lap), limits.v, np.arange(limits.v.size)).round().astype(int)
         axle = limits.push.axle[slides, -1]
         table = _Table(limits)
-        for i in range(1, len(lap)):
-            here = lap[i - 1]
-            left, row = table.left(here, bend[i - 1], 0)
-            gives = self._engine(math.sqrt(here))
-            reached = here + 2.0 * path.step * (min(left, gives) - limits.drag * here)
-            if reached < lap[i]:
-                lap[i], why[i] = max(reached, 1.0), _REASON[DRIVE if left < gives else POWER]
-                axle[i] = limits.push.axle[row]
+        for _ in range(_ROUNDS):  # until a lap ends as fast as it began, against the air
+            for i in range(1, len(lap)):
+                here = lap[i - 1]
+                left, row = table.left(here, bend[i - 1], 0)
+                gives = self._engine(math.sqrt(here))
+                reached = here + 2.0 * path.step * (min(left, gives) - limits.drag * here)
+                if reached < lap[i]:
+                    lap[i], why[i] = reached, _REASON[DRIVE if left < gives else POWER]
+                    axle[i] = limits.push.axle[row]
+            if not path.closed or lap[-1] >= lap[0] * (1.0 - _MET):
+                break
+            lap[0], why[0], axle[0] = lap[-1], why[-1], axle[-1]
         for i in range(len(lap) - 2, -1, -1):
             here = lap[i + 1]
             left, row = table.left(here, bend[i + 1], 1)
@@ -294,7 +326,7 @@ class Planner:
                 lap[i], why[i], axle[i] = reached, _REASON[BRAKE], limits.brake.axle[row]
         turning = (np.array(lap) > _TURNING * tops) & (why != _REASON[TOP]) & (tops < self._most)
         why[turning] = _REASON[TURN]
-        if math.sqrt(max(lap)) >= _FASTEST * 0.999:
+        if not self._bounded and math.sqrt(max(lap)) >= _FASTEST * 0.999:
             raise PathError(f"{path.name}: nothing limits the speed: give v_max")
         if path.closed:
             order = order[:-1]
@@ -316,32 +348,36 @@ class Planner:
         """
         path, limits = self.path, self.limits.scaled(share)
         table, step = _Table(limits), path.step
-        places, speeds, here = [s], [v], v * v
+        places, speeds, why, axles, here = [s], [v], [""], [""], v * v
         slower = v < float(profile.at(s))
-        for _ in range(path.s.size):
+        sides, side = (limits.push, limits.brake), 0 if slower else 1
+        for _ in range(_ROUNDS * path.s.size if path.closed else path.s.size):
             bend = abs(float(path.curvature(places[-1])))
-            if slower:
-                left = min(table.left(here, bend, 0)[0], self._engine(math.sqrt(here)))
-                here += 2.0 * step * (left - limits.drag * here)
-            else:
-                left = min(max(table.left(here, bend, 1)[0], kept), self._brakes)
-                here -= 2.0 * step * (left + limits.drag * here)
+            left, row = table.left(here, bend, side)
             places.append(places[-1] + step)
-            goal = float(profile.at(places[-1]))
-            here = max(here, 1.0)
-            met = here >= goal * goal if slower else here <= goal * goal
-            speeds.append(goal if met else math.sqrt(here))
-            if met:
+            goal = float(profile.at(places[-1])) ** 2
+            if slower:
+                gives = self._engine(math.sqrt(here))
+                why.append(DRIVE if left < gives else POWER)
+                here = min(here + 2.0 * step * (min(left, gives) - limits.drag * here), goal)
+            else:
+                why.append(BRAKE)
+                left = min(max(left, kept), self._brakes)
+                here = max(here - 2.0 * step * (left + limits.drag * here), goal)
+            axles.append(("front", "rear")[sides[side].axle[row]])
+            speeds.append(math.sqrt(here))
+            if abs(here - goal) <= _MET * goal:
+                speeds[-1] = math.sqrt(goal)
                 break
-        return _Lead(profile, np.array(places), np.array(speeds))
+        why[0], axles[0] = why[1], axles[1]
+        return _Lead(profile, np.array(places), np.array(speeds), why, axles)
 
 
 class _Table:
     """Reads what turning leaves, one place after another."""
 
     def __init__(self, limits: "SpeedLimits") -> None:
-        self._speeds = limits.v.size - 1
-        self._step = float(limits.v[-1]) / max(self._speeds, 1)
+        self._v, self._speeds = limits.v.tolist(), limits.v.size - 1
         self._a_y = limits.a_y.tolist()
         self._sides = [limits.push.most.tolist(), limits.brake.most.tolist()]
         self._shares = limits.push.most.shape[1] - 1
@@ -353,9 +389,9 @@ class _Table:
         """
         i, x = 0, 0.0
         if self._speeds:
-            at = math.sqrt(square) / self._step
-            i = min(int(at), self._speeds - 1)
-            x = min(at - i, 1.0)
+            v = math.sqrt(square)
+            i = min(bisect_right(self._v, v), self._speeds) - 1
+            x = min((v - self._v[i]) / (self._v[i + 1] - self._v[i]), 1.0)
         a_y, most = self._a_y, self._sides[side]
         limit = a_y[i] + x * (a_y[i + 1] - a_y[i]) if x else a_y[i]
         q = square * bend / limit * self._shares
@@ -373,7 +409,7 @@ def _engine(engine: Engine) -> Callable[[float], float]:
     """Return what an engine gives at a speed [m/s²]."""
     if isinstance(engine, tuple):
         v, a = (np.atleast_1d(np.asarray(one, dtype=np.float64)) for one in engine)
-        if v.ndim != 1 or v.shape != a.shape or not (np.diff(v) > 0.0).all():
+        if v.ndim != 1 or not v.size or v.shape != a.shape or not (np.diff(v) > 0.0).all():
             raise ValueError("engine must be rising speeds and one acceleration for each")
         if not (np.isfinite(a).all() and (a >= 0.0).all() and a[0] > 0.0):
             raise ValueError(f"engine must give 0 m/s² or more, and more at first: {a.min():g}")

@@ -37,9 +37,10 @@ def bend(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def result(bend, tmp_path_factory):
-    """Frozen tires that learnt for 15 s, and linear ones, both at 90 % of the grip."""
+    """Frozen tires that learnt for 15 s, and linear ones, both up to 0.77 g."""
     out = tmp_path_factory.mktemp("result") / "out"
     words = ["drive", "--path", bend, "--tires", "frozen", "linear", "--out", out]
+    words += ["--speed", "0.77g"]
     learns_shortly(words, 15.0)
     return out
 
@@ -115,7 +116,7 @@ def test_everything_is_written(result):
 def test_stored_weights_steer_alike_and_the_hash_tells_what_went_in(
     result, bend, tmp_path, undrawn
 ):
-    words = ["drive", "--path", bend, "--film", "none"]
+    words = ["drive", "--path", bend, "--film", "none", "--speed", "0.77g"]
     words += ["--weights", result / "weights.json"]
     for name, more in (("same", []), ("other", ["--seed", "1"])):
         assert typed(*words, *more, "--out", tmp_path / name) == 0
@@ -129,7 +130,7 @@ def test_stored_weights_steer_alike_and_the_hash_tells_what_went_in(
 @pytest.mark.heavy
 def test_learning_and_oracle_are_told_of_a_friction_that_drops(result, bend, out, capsys, undrawn):
     words = ["drive", "--path", bend, "--tires", "learning", "oracle", "--film", "none"]
-    words += ["--weights", result / "weights.json", "--speed", "60%"]
+    words += ["--weights", result / "weights.json", "--speed", "0.51g"]
     capsys.readouterr()
     assert typed(*words, "--mu-drop", "30:0.5", "--out", out) == 0
     printed = capsys.readouterr().out
@@ -149,10 +150,26 @@ def test_the_report_is_whole_and_says_the_numbers_of_the_summary(result):
     assert "data:image/webp;base64," in page
 
 
+@pytest.mark.heavy
+def test_without_a_speed_the_tires_tell_it_and_confirm_lets_it_be_earned(
+    result, bend, tmp_path, capsys, undrawn
+):
+    words = ["drive", "--path", bend, "--film", "none", "--weights", result / "weights.json"]
+    for name, more in (("sure", []), ("earned", ["--confirm"])):
+        assert typed(*words, *more, "--out", tmp_path / name) == 0
+    assert "82 % of what the identified tires allow, earned on the way" in capsys.readouterr().out
+    sure, earned = (table_of(tmp_path / name / "drive.csv") for name in ("sure", "earned"))
+    allowed = ti.speed_limits(load_model(result / "weights.json"))
+    assert 0.7 * allowed.a_y[0] < np.abs(sure["a_y_m_s2"]).max() < allowed.a_y[0]
+    assert earned["v_x_m_s"][0] < 0.8 * sure["v_x_m_s"][0]
+    told = summary_of(tmp_path / "earned")["inputs"]["speed"]
+    assert told == {"share": 0.82, "a_y_m_s2": None, "m_s": None, "confirm": True}
+
+
 def test_a_car_that_leaves_its_path_is_told_with_exit_code_1(bend, out, capsys, undrawn):
     words = ["drive", "--path", bend, "--tires", "linear", "--film", "none"]
     capsys.readouterr()
-    assert typed(*words, "--speed", "140%", "--out", out) == 1
+    assert typed(*words, "--speed", "1.2g", "--out", out) == 1
     assert "no: left the path by more than 2 m" in capsys.readouterr().out
     assert summary_of(out)["completed"] is False
 
@@ -183,6 +200,8 @@ def test_the_drive_to_learn_on_slides_but_neither_spins_nor_tips():
         (["--delay", "15"], "--delay must be 0 to 100 ms in steps of 10 ms, it is 15"),
         (["--laps", "nan"], "laps must be positive"),
         (["--seed", "-1"], "--seed must not be negative"),
+        (["--speed", "0.9"], "--speed 0.9 has no unit: write 0.9%, 0.9g or 0.9m/s"),
+        (["--speed", "0.5g", "--confirm"], "--confirm goes with --speed tires, or with a share"),
         (["--weights", "nowhere.json"], "nowhere.json"),
         (["--weights", "a.json", "--paper"], "give only one of --weights, --paper"),
         (["--vehicle", "nowhere.toml"], "nowhere.toml"),
@@ -221,6 +240,7 @@ def test_tires_of_another_car_lead_somewhere(bend, tmp_path, out, capsys, undraw
     assert "tireid init" in said and "docs/driving.md" in said
     replace(tire, vehicle=replace(car, name="mine")).save(tmp_path / "mine.json")
     words = ["drive", "--path", bend, "--weights", tmp_path / "mine.json", "--film", "none"]
+    words += ["--speed", "0.7g"]
     assert typed(*[*words, "--out", out]) == 0
 
 

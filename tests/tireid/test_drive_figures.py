@@ -68,6 +68,7 @@ def made_up(path, off):
         axle_force=force[:, None] * share,
         s=s,
         e_y=e_y,
+        e_y_seen=e_y,
         e_psi=none,
         kappa=kappa,
         v_ref=np.full(t.size, SPEED),

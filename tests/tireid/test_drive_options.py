@@ -14,21 +14,20 @@ from tireid.driving.setup import SpeedWish
 
 
 @pytest.mark.parametrize(
-    ("text", "share", "speed"),
+    ("text", "wish"),
     [
-        ("90%", 0.9, None),
-        ("0.97", 0.97, None),
-        ("1", 1.0, None),
-        ("17 m/s", None, 17.0),
-        ("72km/h", None, 20.0),
+        ("tires", {"share": 0.82}),
+        (" 70 %", {"share": 0.7}),
+        ("0.4g", {"a_y": 0.4 * 9.81}),
+        ("4m/s2", {"a_y": 4.0}),
+        ("4 m/s²", {"a_y": 4.0}),
+        ("17 m/s", {"speed": 17.0}),
+        ("72km/h", {"speed": 20.0}),
     ],
 )
-def test_a_speed_is_a_share_of_the_grip_or_has_a_unit(text, share, speed):
-    wish = _parse_speed(text)
-    assert wish == SpeedWish(
-        None if share is None else pytest.approx(share),
-        None if speed is None else pytest.approx(speed),
-    )
+def test_a_speed_is_what_the_tires_allow_or_has_a_unit(text, wish):
+    ((name, value),) = wish.items()
+    assert _parse_speed(text) == SpeedWish(**{name: pytest.approx(value, rel=1e-4)})
 
 
 def test_a_drop_is_a_place_and_a_friction():
@@ -52,13 +51,16 @@ SPEED, DROP, FAULT = (
 @pytest.mark.parametrize(
     ("option", "text", "said"),
     [
-        (SPEED, "17", "has no unit: write 17%, 17m/s or 17km/h"),
+        (SPEED, "17", "has no unit: write 17%, 17g or 17m/s"),
+        (SPEED, "0.9", "has no unit: write 0.9%, 0.9g or 0.9m/s"),
+        (SPEED, "g", "(tires, 70%, 0.4g, 17m/s), not 'g'"),
+        (SPEED, "5g", "in m/s² must lie between 0.2 and 30, it is 49"),
         (SPEED, "fast", "not 'fast'"),
         (SPEED, "-5m/s", "not '-5m/s'"),
         (SPEED, "nan%", "not 'nan%'"),
         (SPEED, "1e", "not '1e'"),
-        (SPEED, "300%", "5 to 150 % of the grip, it is 300 %"),
-        (SPEED, "1km/h", "3 to 100 m/s, it is 0.278 m/s"),
+        (SPEED, "300%", "in % must lie between 5 and 150, it is 300"),
+        (SPEED, "1km/h", "in m/s must lie between 3 and 100, it is 0.27"),
         (DROP, "60", "wants S:MU"),
         (DROP, "60:", "wants S:MU"),
         (DROP, "a:0.5", "wants S:MU"),

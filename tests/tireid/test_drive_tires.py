@@ -8,6 +8,7 @@ import pytest
 
 from identifier.paper.network import Network, NetworkModel, Weights
 from models.vehicle import sedan
+from mpc.loop.sensing import cornering_limit
 from mpc.tires import prediction_tire
 from mpc.tires.tire import curves_at
 from tests.tireid.test_drive_setup import LANE, setup
@@ -18,7 +19,7 @@ from tireid.figures.drive import AT_THE_END
 
 CAR = sedan()
 ALPHA = np.linspace(-0.35, 0.35, 281)
-SETUP = setup(LANE, SpeedWish(None, 16.0), ((60.0, 0.4),), mu=0.9)
+SETUP = setup(LANE, SpeedWish(speed=16.0), ((60.0, 0.4),), mu=0.9)
 
 
 def test_the_linear_tire_is_a_line_of_its_stiffness():
@@ -33,7 +34,7 @@ def test_the_true_tire_is_shown_on_the_first_and_on_the_last_friction():
     assert list(curves) == [LINEAR, ORACLE, ORACLE + AT_THE_END]
     most, last = (curves[name].force.max(axis=0) for name in (ORACLE, ORACLE + AT_THE_END))
     np.testing.assert_allclose(last / most, 0.4 / 0.9, rtol=0.1)
-    assert most.sum() == pytest.approx(CAR.mass * SETUP.grip, rel=0.1)
+    assert most.sum() == pytest.approx(CAR.mass * cornering_limit(CAR, mu=0.9), rel=0.1)
 
 
 def test_what_a_tracker_was_told_later_is_shown_as_the_end():

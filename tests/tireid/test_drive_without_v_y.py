@@ -16,16 +16,17 @@ TOLD = ("v_y_estimated_m_s", "v_y_estimated_sd_m_s", "side_slip_observable", "a_
 
 @pytest.fixture(scope="module")
 def result(bend, tmp_path_factory):  # noqa: F811
-    """Tires that go on learning and linear ones, at 90 % of the grip, without v_y."""
+    """Tires that go on learning and linear ones, up to 0.77 g, without v_y."""
     out = tmp_path_factory.mktemp("imu") / "out"
     words = ["drive", "--sensors", "imu", "--path", bend, "--tires", "learning", "linear"]
+    words += ["--speed", "0.77g"]
     learns_shortly([*words, "--film", "none", "--out", out], 20.0)
     return out
 
 
 @pytest.mark.heavy
 def test_the_car_drives_as_well_as_with_v_y(result, bend, tmp_path, undrawn):  # noqa: F811
-    words = ["drive", "--path", bend, "--weights", result / "weights.json"]
+    words = ["drive", "--path", bend, "--weights", result / "weights.json", "--speed", "0.77g"]
     assert typed(*words, "--film", "none", "--out", tmp_path / "full") == 0
     full, drives = summary_of(tmp_path / "full"), summary_of(result)["drives"]
     assert drives["learning"]["completed"]
@@ -73,7 +74,7 @@ def test_what_has_all_sensors_says_nothing_of_it(bend, result, tmp_path, undrawn
 
 def test_the_line_that_is_printed_says_how_right_it_was(result, bend, out, capsys, undrawn):  # noqa: F811
     words = ["drive", "--sensors", "imu", "--path", bend, "--film", "none"]
-    words += ["--weights", result / "weights.json", "--no-noise", "--speed", "70%"]
+    words += ["--weights", result / "weights.json", "--no-noise", "--speed", "0.6g"]
     capsys.readouterr()
     assert typed(*words, "--out", out) == 0
     printed = capsys.readouterr().out
@@ -97,7 +98,7 @@ def test_a_fault_is_of_a_sensor_that_is_there():
 def test_the_public_function_takes_the_same_road(result):
     car, path = sedan(), ti.paths.iso_3888_2()
     tire = load_model(result / "weights.json")
-    run = ti.drive(path, car, tire, sensors="imu", learning=True, share=0.6)
+    run = ti.drive(path, car, tire, sensors="imu", learning=True, speeds=14.0)
     assert run.scores.completed
     assert set(run.drive.estimates) >= {"v_y", "v_y_sd", "observable"}
     assert np.std(run.drive.estimates["v_y"] - run.drive.v_y) < 0.05

@@ -60,7 +60,7 @@ def declare(new: Any) -> None:
         "--speed WHAT": (
             TIRES,
             f"{TIRES}: {100.0 * SHARE:.0f} %% of what the identified tires allow, braking for "
-            "bends, or another share of that (70%%); or told: a lateral acceleration in the "
+            "bends; 70%%: another share of that limit; or told: a lateral acceleration in the "
             "tightest bend (0.4g, 4m/s2), constant on an open path, or a speed (17m/s, 60km/h) "
             "(%(default)s)",
         ),
@@ -178,7 +178,7 @@ def _parse_speed(text: str) -> SpeedWish:
         require_within(ValueError, 3.0, 100.0, **{"--speed in m/s": value})
         return SpeedWish(speed=value)
     if unit == "%":
-        require_within(ValueError, 0.05, 1.5, **{"share of --speed": value})
+        require_within(ValueError, 5.0, 150.0, **{"--speed in %": 100.0 * value})
         return SpeedWish(share=value)
     require_within(ValueError, 0.2, 30.0, **{"--speed in m/s²": value})
     return SpeedWish(a_y=value)
@@ -234,8 +234,6 @@ def conditions_of(options: argparse.Namespace) -> driving.Conditions:
     if name not in BUILT_IN and not FilePath(name).suffix:
         raise ValueError(f"--path: there is no path {name!r}; {', '.join(BUILT_IN)}, or FILE.csv")
     vehicle, wish = shared.read_vehicle(options), _parse_speed(options.speed)
-    if options.confirm and wish.share is None:
-        raise ValueError("--confirm goes with --speed tires, or with a share of what they allow")
     radius = _TIGHTEST * vehicle.wheelbase
     path = (
         BUILT_IN[name]()

@@ -139,6 +139,11 @@ class Conditions:
             raise ValueError(f"sensors must be one of {', '.join(SENSORS)}, not {self.kind!r}")
         require_within(ValueError, *FRICTIONS, friction=self.setup.mu)
         require_within(ValueError, 0.0, 1.0, caution=self.caution)
+        wish = self.setup.wish
+        if self.confirm and wish.share is None and not (wish.profile and wish.profile.planned):
+            raise ValueError(
+                "--confirm goes with --speed tires, or with a share of what they allow"
+            )
         self.setup.vehicle.require_chassis()
 
     def on(self, learnt: TireModel | None) -> "Conditions":
@@ -231,6 +236,7 @@ def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> Prediction
 def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> ClosedLoop:
     """Drive the path once with the tracker on a tire."""
     setup, problem = conditions.setup, Problem()
+    profile = setup.profile()
     model = given_tire(label, setup, learnt)
     lag = setup.vehicle.require_chassis().steering_lag
     try:
@@ -246,7 +252,6 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
     informed = label == ORACLE and setup.drops
     learner: LearningTires | None = _Informer(setup) if informed else None
     beside, witness = learner, None
-    profile = setup.profile()
     speed: SpeedProfile | Earned = profile
     watcher = None
     if label == LEARNING or (conditions.confirm and label == FROZEN):
@@ -348,7 +353,7 @@ def drive(
         wish = BY_TIRES
     for needed, why in (
         (learning, "learning goes on from a tire"),
-        (wish is BY_TIRES, "speeds are planned of identified tires"),
+        (wish is BY_TIRES, "speeds such as 15.0 m/s, or a tire that tells them, are needed"),
     ):
         if needed and tire is None:
             raise ValueError(f"{why}: none is given")

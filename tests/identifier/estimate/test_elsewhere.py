@@ -226,7 +226,7 @@ def test_one_compiled_tracker_takes_any_fit(fitted):
 
 def test_who_goes_on_learning_steers_on_what_is_learnt_in_its_units(fitted):
     path = iso_3888_2()
-    wish = SpeedWish(0.9, None)
+    wish = SpeedWish(speed=16.0)
     setup = Setup(path=path, vehicle=CAR, mu=1.0, drops=(), wish=wish)
     told = given_tire(LEARNING, setup, fitted)
     learner = make_learner(fitted, CAR)

@@ -18,6 +18,7 @@ from identifier.estimate.method import FitMethod
 from identifier.estimate.priors import ALIKE, OF_AXLES, OF_CAR, Priors
 from identifier.estimate.solve import Problem, descend, estimate, settled
 from identifier.motion.parameters import INDEX, NAMES
+from identifier.run import learn
 from identifier.verdict import judge_identification
 from models.maneuvers import RandomSteer
 from models.plant import Plant
@@ -212,6 +213,29 @@ def test_the_stiffness_of_a_gentle_drive_does_not_end_before_the_corner():
     model = fit([driven(6, amplitude=0.015)], sedan()).model
     C = np.exp([model["ln_stiffness_f"], model["ln_stiffness_r"]])
     assert (model.slope_at(np.zeros((1, 2)))[0] < 1.05 * C).all()
+
+
+def test_what_a_hard_drive_taught_stays_known_when_gentle_logs_are_added(learnt):
+    """Also where their sensors have other zeros; unless their road, or the tires, are others."""
+    car, slips = sedan(), np.outer([0.5, 1.0], learnt.model.known_slip)
+    method = FitMethod.for_vehicle(car)
+    tire = learnt.model
+    for day, seed in ((0.004, 6), (-0.004, 7)):
+        log = driven(seed, amplitude=0.015)
+        log = replace(log, delta_f=log.delta_f + day, v_y=log.v_y - 15.0 * day)
+        tire = learn(log, car, method, tire)
+        assert (tire.known_slip >= 0.999 * learnt.model.known_slip).all()
+    first, last = (one.band.of_phi(slips)[0] for one in (learnt.model, tire))
+    assert (last < 1.3 * first).all()
+    away = tire.curve_at(slips)[0] - learnt.model.curve_at(slips)[0]
+    assert np.abs(away).max() < 0.03, "static loads"
+
+    rain = driven(5, scale=0.5).between(DROP + 0.5, math.inf)
+    wet, alone = learn(rain, car, method, learnt.model), learn(rain, car, method)
+    assert (wet.known_slip < 0.9 * learnt.model.known_slip).all()
+    np.testing.assert_allclose(wet.curve_at(slips)[0], alone.curve_at(slips)[0], rtol=0.12)
+    refused = learnt.model.band.calibrated_by(None, np.array([0.2, 0.02]))
+    np.testing.assert_array_equal(learn(log, car, method, refused).p, fit([log], car).model.p)
 
 
 @pytest.mark.parametrize("ratio", [0.75, 1.4])

@@ -4,6 +4,7 @@ import math
 import re
 from dataclasses import replace
 from datetime import date
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,13 +16,14 @@ from identifier.estimate.model import FittedModel
 from identifier.estimate.posterior import Reach
 from identifier.estimate.priors import Priors
 from identifier.estimate.solve import car_numbers
-from identifier.export.ggv import ggv_text, limits
+from identifier.export.ggv import diamond, ggv_text
 from identifier.export.slipx import slipx_files
 from identifier.export.steady import steady_text, understeer_gradient
 from identifier.export.tir import tire_properties
 from identifier.methods import make_method
 from identifier.motion.model import pushed_function
 from identifier.motion.parameters import INDEX
+from identifier.speed_limits import speed_limits
 from models.plant.dynamics import relaxation_lengths
 from models.tires import MagicFormula
 from models.vehicle import GRAVITY, Vehicle, sedan
@@ -123,6 +125,13 @@ def level(**numbers):
     return replace(model, reach=model.reach._replace(slip=np.array([0.5, 0.5])))
 
 
+def limits(model):
+    """What planners are told."""
+    found = speed_limits(model)
+    driving, braking = diamond(found.push), diamond(found.brake)
+    return SimpleNamespace(v_x=found.v, a_y=found.a_y, braking=braking, driving=driving)
+
+
 NO_ELLIPSE = dict.fromkeys(("braking_f", "braking_r", "driving_f", "driving_r"), 0.0)
 
 
@@ -165,7 +174,7 @@ def test_the_diamond_of_planners_lies_within_the_forces_of_the_model(h, braking_
     model = fitted(PRESSED, sd=1e-6, load_transfer=h, **use, **grip)
     found = limits(model)
     low = 1.0 - Z * model.band.load_doubt
-    forces = [model.force(np.linspace(0.0, known, 300))[:, i].max()
+    forces = [model.force(np.linspace(0.0, 2.0 * known, 300))[:, i].max()
               for i, known in enumerate(model.known_slip)]  # fmt: skip
     peak = low * forces / PRESSED.axle_loads
     coasting = -PRESSED.drag * found.v_x**2

@@ -1,5 +1,7 @@
 """In the closed loop: the friction halves, and the car that learns stays on the path."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from mpc.handover.learner import Learner, blended
 from mpc.handover.road import at_friction
 from mpc.handover.supervisor import Supervisor
 from mpc.loop.drive import drive
-from mpc.loop.sensing import inertial_unit
+from mpc.loop.sensing import Measured, inertial_unit
 from mpc.path import iso_3888_1
 from mpc.realtime import Measurement, Tracker
 from mpc.tires import prediction_tire
@@ -65,6 +67,24 @@ def test_the_drop_is_noted_in_time(drives):
     dropped_at = learning.t[np.argmax(learning.X > PLACE)]
     lost = [t for t, note in learning.notes if note.startswith("friction lost")]
     assert 0.0 < lost[0] - dropped_at < 0.7
+
+
+def test_who_only_watches_finds_the_friction_and_leaves_the_tire(drives, car, learnt):
+    """On the sensors of the car that learnt: half the friction behind the drop."""
+    identifier = OnlineIdentifier(AxleIdentifier.for_vehicle(car), car, 0.01, learnt)
+    watcher = Learner(Supervisor(identifier, prediction_tire(learnt)), steers=False)
+    tracker = SimpleNamespace(delay=0.06, period=0.01, steering=0.0)  # whose tire nobody sets
+    driven, found, said = drives[1], [], []
+    for k in range(len(driven)):
+        seen = Measured(**{name: float(values[k]) for name, values in driven.measured.items()})
+        said.append(watcher.observe(seen, tracker))
+        tracker.steering = float(driven.command[k])
+        found.append(watcher.supervisor.friction)
+    before = np.array(found)[driven.X < PLACE]
+    assert (before > 0.85).all() and before[0] == 1.0
+    assert 0.4 < min(found) < 0.65
+    notes = {note.split(":")[0] for note in said if note}
+    assert "friction lost" in notes and "learnt tire" not in notes
 
 
 def test_no_handover_makes_the_plan_jump_more_than_noise_does(drives):

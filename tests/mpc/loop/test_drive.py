@@ -11,8 +11,8 @@ from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
 from mpc.loop.drive import COMPLETED, GUIDES, drive
 from mpc.loop.record import scores
-from mpc.loop.sensing import CarSensors, Measured, SpeedProfile, inertial_unit
-from mpc.path.path import Path
+from mpc.loop.sensing import CarSensors, Measured, inertial_unit
+from mpc.path import Path, SpeedProfile
 from mpc.realtime import Command
 
 STRAIGHT = Path.from_waypoints([0, 20, 40, 60], [0, 0, 0, 0], name="straight")

@@ -5,11 +5,10 @@ import pytest
 
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop.sensing import SpeedProfile
-from mpc.path.path import Path
+from mpc.path import Path, SpeedProfile
 from tests.mpc.loop.test_drive import ring as ring
 
-GAIN = 2.0
+GAIN = 4.0  # of who drives a double-track car
 
 
 @pytest.fixture(scope="module")
@@ -61,4 +60,4 @@ def test_the_reference_keeps_a_proportional_driver_from_lagging(straight):
             worst = max(worst, abs(state.v_x - float(profile.at(state.X))))
         errors[gain] = worst
     assert errors[GAIN] < 0.15
-    assert errors[np.inf] > 0.4
+    assert errors[np.inf] > 0.25
