@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from tireid.driving.runs import drive as drive
     from tireid.emitting import emit as emit
     from tireid.exporting import export as export
-    from tireid.figures.forces import inputs_figure as _plot
+    from tireid.figures.lap import plot as _plot
     from tireid.learning import identify as identify
     from tireid.learning import replay as replay
     from tireid.run import Run as Run
@@ -80,5 +80,5 @@ _NAMES = {  # by the module that they lie in
 }
 _HOMES = {name: f"{module}:{name}" for module, names in _NAMES.items() for name in names.split()}
 _HOMES |= {"errors": "tireid.errors", "paths": "mpc.path"}
-_HOMES |= {"plot": "tireid.figures.forces:inputs_figure", "__version__": "tireid.version:VERSION"}
+_HOMES |= {"plot": "tireid.figures.lap:plot", "__version__": "tireid.version:VERSION"}
 __getattr__, __dir__ = face(__name__, _HOMES)

@@ -8,12 +8,15 @@ place, once forwards and once backwards.
 import math
 from bisect import bisect_right
 from collections.abc import Callable
+from os import PathLike
+from pathlib import Path as FilePath
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from codegen.arrays import Array
+from codegen.writing import write_file
 from models.rules import require_positive, require_within
 from mpc.path.line import PathError
 from mpc.path.path import Path
@@ -29,6 +32,7 @@ _TOLERANCE = 1e-3  # of a speed at the start
 _MET = 1e-4  # of v², where a lap goes over into the next one
 _FASTEST = 200.0  # m/s, which no car of an identified tire reaches
 _ROUNDS = 100
+_TUM = ("s_m", "x_m", "y_m", "psi_rad", "kappa_radpm", "vx_mps", "ax_mps2")
 _TURNING = 0.97  # of the largest v², from which on it is the turn that limits
 
 Engine: TypeAlias = float | tuple[ArrayLike, ArrayLike]
@@ -95,6 +99,46 @@ class SpeedProfile:
     def a_x(self) -> Array:
         """Acceleration along the path at the wanted speed [m/s²], (n,)."""
         return self._acceleration.copy()
+
+    @property
+    def used(self) -> Array:
+        """Share of the limits that planned speeds use, 1 where the tires give all, (n,)."""
+        if self.planned is None:
+            raise ValueError("these speeds were told: plan them by speed_profile to have limits")
+        limits, a_y = self.planned[0].limits, np.abs(self.a_y)
+        f, reach = self.a_x + limits.drag * self.v**2, []
+        for most, push, brake in zip(
+            limits.a_y, limits.push.most, limits.brake.most, strict=True
+        ):  # around the edge: from braking over turning to driving
+            turn = most * np.linspace(0.0, 1.0, push.size)
+            y, x = np.append(-brake, push[::-1]), np.append(turn, turn[::-1])
+            reach.append(np.interp(np.arctan2(f, a_y), np.arctan2(y, x), np.hypot(y, x)))
+        edge = [np.interp(v, limits.v, r) for v, r in zip(self.v, np.array(reach).T, strict=True)]
+        return np.asarray(np.hypot(f, a_y) / edge)
+
+    def to_csv(self, file: str | PathLike[str], *, tum: bool = False) -> None:
+        """Write the speeds and what they ask of the tires, a row for each sample.
+
+        Parameters
+        ----------
+        file : to write.
+        tum : write a race line as planners of TUM do; 0 of its psi_rad is along Y.
+        """
+        path = self.path
+        columns = {
+            "s_m": path.s, "X_m": path.X, "Y_m": path.Y, "psi_rad": path.psi,
+            "kappa_1_m": path.kappa, "v_m_s": self.v, "a_x_m_s2": self.a_x,
+            "a_y_m_s2": self.a_y, "t_s": self.t,
+        }  # fmt: skip
+        if tum:
+            columns["psi_rad"] = np.remainder(path.psi + 0.5 * np.pi, 2.0 * np.pi) - np.pi
+            columns = dict(zip(_TUM, columns.values(), strict=False))
+        elif self.planned is not None:
+            columns |= {"used": self.used, "limited_by": self.limited_by, "axle": self.axle}
+        rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+        text = ("; " if tum else ",").join
+        lines = [text(x if isinstance(x, str) else f"{x:.9g}" for x in row) for row in rows]
+        write_file(FilePath(file), "\n".join(["# " * tum + text(columns), *lines, ""]))
 
     @property
     def lap_time(self) -> float:
@@ -327,7 +371,7 @@ class Planner:
         turning = (np.array(lap) > _TURNING * tops) & (why != _REASON[TOP]) & (tops < self._most)
         why[turning] = _REASON[TURN]
         if not self._bounded and math.sqrt(max(lap)) >= _FASTEST * 0.999:
-            raise PathError(f"{path.name}: nothing limits the speed: give v_max")
+            raise PathError(f"{path.name}: nothing limits the speed: give v_max (--v-max)")
         if path.closed:
             order = order[:-1]
         v, reasons, axles = np.empty(square.size), np.empty_like(why[: square.size]), axle.copy()

@@ -33,6 +33,7 @@ COMMANDS: Mapping[str, str] = MappingProxyType(
         "export": "C for a microcontroller, FMU and ONNX for simulators",
         "emit": "a stored tire as other tools read it: .tir, g-g-v, slipx, understeer gradient",
         "drive": "steer a car along a path at the limit of grip, on the identified tires",
+        "lap": "how fast identified tires let their car go along a path: speed, lap time, limits",
         "paper": "Tables I and II of the paper (Hong and Choi) beside ours, over many seeds",
     }
 )

@@ -3,7 +3,7 @@
 import argparse
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path as FilePath
 from typing import Any
@@ -52,11 +52,8 @@ def declare(new: Any) -> None:
         "signal as CSV, figures and a film.",
         epilog=_EPILOG,
     )
+    add_path(parser, "iso-3888-2")
     given = {
-        "--path NAME|FILE.csv": (
-            "iso-3888-2",
-            f"{', '.join(BUILT_IN)}, or way-points with the columns X_m, Y_m (%(default)s)",
-        ),
         "--speed WHAT": (
             TIRES,
             f"{TIRES}: {100.0 * SHARE:.0f} %% of what the identified tires allow, braking for "
@@ -151,7 +148,24 @@ def run(options: argparse.Namespace) -> int:
 
 
 TIRES = "tires"
-_SPEEDS = {"%": 0.01, "g": GRAVITY, "m/s2": 1.0, "m/s²": 1.0, "m/s": 1.0, "km/h": 1.0 / 3.6}
+SPEEDS: Mapping[str, float] = {"m/s": 1.0, "km/h": 1.0 / 3.6}
+ACCELERATIONS: Mapping[str, float] = {"g": GRAVITY, "m/s2": 1.0, "m/s²": 1.0}
+BARE: Mapping[str, float] = {"": 1.0}  # without a unit
+SHARES: Mapping[str, float] = {"%": 0.01}
+
+
+def quantity(text: str, *units: Mapping[str, float]) -> tuple[float, str]:
+    """Return a positive number in SI and its unit; NaN of what is none with one of the units.
+
+    units : by name, their factors to SI.
+    """
+    factors = {name: factor for table in units for name, factor in table.items()}
+    names = "|".join(map(re.escape, factors))
+    found = re.fullmatch(rf"\s*([-+.\deE]+?)\s*({names})\s*", text, re.ASCII)
+    with suppress(ValueError):
+        if found and 0.0 < float(found[1]) < math.inf:
+            return float(found[1]) * factors[found[2]], found[2]
+    return math.nan, ""
 
 
 def _parse_speed(text: str) -> SpeedWish:
@@ -161,23 +175,18 @@ def _parse_speed(text: str) -> SpeedWish:
     """
     if text.strip() == TIRES:
         return BY_TIRES
-    units = "|".join(map(re.escape, _SPEEDS))
-    found = re.fullmatch(rf"\s*([-+.\deE]+?)\s*({units})?\s*", text, re.ASCII)
-    value, unit = math.nan, None
-    with suppress(ValueError):
-        value, unit = (float(found[1]), found[2]) if found else (value, unit)
-    if not 0.0 < value < math.inf:
+    value, unit = quantity(text, SPEEDS, ACCELERATIONS, SHARES, BARE)
+    if math.isnan(value):
         raise ValueError(
             "--speed wants tires, a share of what they allow, an acceleration or a speed "
             f"({TIRES}, 70%, 0.4g, 17m/s), not {text!r}"
         )
-    if unit is None:
+    if not unit:
         raise ValueError(f"--speed {text} has no unit: write {text}%, {text}g or {text}m/s")
-    value *= _SPEEDS[unit]
-    if unit in ("m/s", "km/h"):
+    if unit in SPEEDS:
         require_within(ValueError, 3.0, 100.0, **{"--speed in m/s": value})
         return SpeedWish(speed=value)
-    if unit == "%":
+    if unit in SHARES:
         require_within(ValueError, 5.0, 150.0, **{"--speed in %": 100.0 * value})
         return SpeedWish(share=value)
     require_within(ValueError, 0.2, 30.0, **{"--speed in m/s²": value})
@@ -229,17 +238,24 @@ def parse_fault(text: str, kind: str = driving.FULL) -> SensorFault:
 ALL = "all"
 
 
-def conditions_of(options: argparse.Namespace) -> driving.Conditions:
+def add_path(parser: Any, default: str) -> None:
+    text = f"{', '.join(BUILT_IN)}, or way-points with the columns X_m, Y_m (%(default)s)"
+    shared.add_options(parser, str, {"--path NAME|FILE.csv": (default, text)})
+
+
+def path_of(options: argparse.Namespace, vehicle: Vehicle) -> Path:
+    """Return the path of --path, which the car can drive."""
     name = options.path
-    if name not in BUILT_IN and not FilePath(name).suffix:
+    if name in BUILT_IN:
+        return BUILT_IN[name]()
+    if not FilePath(name).suffix:
         raise ValueError(f"--path: there is no path {name!r}; {', '.join(BUILT_IN)}, or FILE.csv")
+    return Path.from_csv(FilePath(name), minimum_radius=_TIGHTEST * vehicle.wheelbase)
+
+
+def conditions_of(options: argparse.Namespace) -> driving.Conditions:
     vehicle, wish = shared.read_vehicle(options), _parse_speed(options.speed)
-    radius = _TIGHTEST * vehicle.wheelbase
-    path = (
-        BUILT_IN[name]()
-        if name in BUILT_IN
-        else Path.from_csv(FilePath(name), minimum_radius=radius)
-    )
+    path = path_of(options, vehicle)
     shared.require_one(options, "weights", "method", "paper", "design")
     drops = tuple(sorted(_parse_drop(text) for text in options.mu_drop))
     for s, _ in drops:
@@ -267,7 +283,7 @@ def frozen_tires(
     if not {driving.FROZEN, driving.LEARNING} & set(labels) and setup.wish.share is None:
         return "no tires were identified", None
     if stored is not None:
-        _require_its_car(options, stored.vehicle, setup)
+        require_its_car(options, stored.vehicle, setup.vehicle)
         return f"frozen ones from {options.weights}", stored
     law, method = shared.chosen_method(options, setup.vehicle)
     recording = learning_drive(
@@ -289,12 +305,11 @@ def frozen_tires(
     ), learnt
 
 
-def _require_its_car(options: argparse.Namespace, learnt: Vehicle, setup: Setup) -> None:
+def require_its_car(options: argparse.Namespace, learnt: Vehicle, driven: Vehicle) -> None:
     """Refuse tires that were learnt on another car than is driven, whatever either is called."""
-    if learnt.bicycle == setup.vehicle.bicycle:
+    if learnt.bicycle == driven.bicycle:
         return
     mine = f"{options.weights} was identified on the car {learnt.name!r}, driven is "
-    driven = setup.vehicle
     apart = "; ".join(
         f"{key} {getattr(learnt, key):.6g} there, {getattr(driven, key):.6g} here"
         for key in VEHICLE_KEYS
@@ -302,6 +317,5 @@ def _require_its_car(options: argparse.Namespace, learnt: Vehicle, setup: Setup)
     )
     raise ValueError(
         f"{mine}{driven.name!r} ({apart}): give that car by --vehicle FILE, with its table "
-        "[chassis] (tireid init writes one, see docs/driving.md), or leave --weights out to "
-        "identify the driven car"
+        "[chassis] (tireid init writes one, see docs/driving.md), or identify the driven car"
     )

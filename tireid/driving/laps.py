@@ -46,10 +46,10 @@ class Lap(NamedTuple):
     learnt: Run | None
 
 
-def first_limits(tire: TireModel) -> SpeedLimits:
+def first_limits(tire: TireModel, confidence: float = 0.95) -> SpeedLimits:
     """Return the limits of a first lap: hardly beyond what the tires are known to give."""
-    known = float(speed_limits(tire, beyond=1.0).a_y[0])
-    return speed_limits(tire).at_most(_BEYOND_KNOWN * known)
+    known = float(speed_limits(tire, confidence=confidence, beyond=1.0).a_y[0])
+    return speed_limits(tire, confidence=confidence).at_most(_BEYOND_KNOWN * known)
 
 
 def drive_laps(
@@ -60,7 +60,10 @@ def drive_laps(
     *,
     share: float = SHARE,
     engine: Engine | None = None,
+    brakes: float = BRAKES,
     v_max: float | None = None,
+    road: float = 1.0,
+    confidence: float = 0.95,
     confirm: bool = False,
     friction: float = 1.0,
     tires: tuple[Tire, Tire] | None = None,
@@ -70,12 +73,14 @@ def drive_laps(
 
     A lap that speaks against its tires teaches nothing.
 
-    engine, v_max : as of `speed_profile`.
+    engine, brakes, v_max : as of `speed_profile`.
+    road : friction that the first lap is planned for, over that of the identified tires.
+    confidence : as of `speed_limits`.
     """
-    limits = first_limits(tire)
+    limits = first_limits(tire, confidence).scaled(road)
     for number in range(laps):
         profile = speed_profile(
-            path, limits, share=share, engine=engine, brakes=BRAKES, v_max=v_max
+            path, limits, share=share, engine=engine, brakes=brakes, v_max=v_max
         )
         driven = drive(
             path, vehicle, tire, speeds=profile, confirm=confirm, friction=friction,
@@ -90,7 +95,8 @@ def drive_laps(
         share = min(_MOST, _GROWS * share) if lap.seen <= _NEAR else _SHRINKS * share
         if learnt.verdict.valid:
             tire = learnt.tire
-            limits = speed_limits(tire).at_most(_LIMITS_GROW * float(limits.a_y[0]))
+            newer = speed_limits(tire, confidence=confidence)
+            limits = newer.at_most(_LIMITS_GROW * float(limits.a_y[0]))
 
 
 def _seen(driven: Drive) -> float:
