@@ -49,7 +49,7 @@ class DoubleTrackCar:
     Attributes: vehicle, as a controller knows it; tire, which only an oracle is given; friction;
     period; speed_gain, acceleration that the driver asks for, per error of the speed [1/s].
     vehicle : the car; it needs a chassis.
-    tire : of all four wheels; None reads the file named by the chassis.
+    tire, rear_tire : of the front and the rear wheels, as of `Plant`.
     friction : of the road; None is what the tire was measured on.
     period : for which the inputs are held [s].
     dt : step of the integration [s], a divisor of the period.
@@ -60,11 +60,12 @@ class DoubleTrackCar:
         vehicle: Vehicle,
         tire: Tire | None = None,
         *,
+        rear_tire: Tire | None = None,
         friction: Friction | None = None,
         period: float = 0.01,
         dt: float = 1e-3,
     ) -> None:
-        plant = Plant(vehicle, tire, driver=_HOLDING)
+        plant = Plant(vehicle, tire, rear_tire=rear_tire, driver=_HOLDING)
         self._plant = StepwisePlant(plant, friction=friction, period=period, dt=dt)
         self.vehicle = vehicle
         self.tire = plant.tire

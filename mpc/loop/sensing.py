@@ -180,20 +180,22 @@ Measures: TypeAlias = CarSensors | FaultySensors  # what a loop measures a car w
 # per cent below the sum of what the tires could give to the side alone.
 
 
-def cornering_limit(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> float:
+def cornering_limit(
+    vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0, rear_tire: Tire | None = None
+) -> float:
     """Return the largest steady lateral acceleration [m/s^2].
 
-    tire : of all four wheels; None reads the file named by the chassis.
+    tire, rear_tire : of the front and the rear wheels, as of `Plant`.
     mu : friction of the road over that of the tire's measurement [-].
     """
-    return _steady_limit(vehicle, cast(Hashable, tire), mu)
+    return _steady_limit(vehicle, cast(Hashable, tire), mu, cast(Hashable, rear_tire))
 
 
 @cache
-def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float) -> float:
+def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float, rear_tire: Hashable) -> float:
     """Drive the ramp once for each car and road: setting up a drive asks a dozen times."""
     rate = _LARGEST_ANGLE * mu / _RAMP_TIME
     ramp = StepSteer(amplitude=_LARGEST_ANGLE * mu, rate_limit=rate, onset=0.1, duration=_RAMP_TIME)
-    plant = Plant(vehicle, cast(Tire | None, tire))
+    plant = Plant(vehicle, cast(Tire | None, tire), rear_tire=cast(Tire | None, rear_tire))
     run = plant.simulate(ramp, speed=_RAMP_SPEED, friction=Friction(scale=mu))
     return float(np.abs(run.a_y).max())

@@ -11,6 +11,7 @@ import numpy as np
 
 from identifier.speed_limits import SpeedLimits, speed_limits
 from identifier.tire_model import TireModel
+from models.tires import Tire
 from models.vehicle import Vehicle
 from mpc.cars import BRAKES
 from mpc.loop.record import Drive
@@ -65,6 +66,7 @@ def drive_laps(
     confidence: float = 0.95,
     confirm: bool = False,
     friction: float = 1.0,
+    tires: tuple[Tire, Tire] | None = None,
     seed: int = 0,
 ) -> Iterator[Lap]:
     """Yield lap after lap, until one is not completed; the arguments are those of `drive`.
@@ -82,7 +84,7 @@ def drive_laps(
         )
         driven = drive(
             path, vehicle, tire, speeds=profile, confirm=confirm, friction=friction,
-            seed=seed + number,
+            tires=tires, seed=seed + number,
         )  # fmt: skip
         if not driven.scores.completed:
             yield Lap(tire, limits, share, profile, driven, _seen(driven.drive), None)

@@ -17,6 +17,7 @@ from identifier.speed_limits import speed_limits
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
 from models.rules import require_positive, require_within
+from models.tires import Tire
 from models.vehicle import Vehicle
 from mpc.handover.learner import Learner
 from mpc.handover.supervisor import Supervisor
@@ -298,6 +299,7 @@ def drive(
     speeds: SpeedProfile | float | None = None,
     confirm: bool = False,
     friction: float = 1.0,
+    tires: tuple[Tire, Tire] | None = None,
     delay: float = 0.02,
     learning: bool = False,
     noise: bool = True,
@@ -318,6 +320,7 @@ def drive(
     confirm : whether the speed has to be earned: it begins at .45 of the limits, and goes on as the
         car holds what it drives and nothing says that the friction is another.
     friction : of the road over that of the tire's measurement [-].
+    tires : that the car truly has, front and rear; None reads the file named by its chassis.
     delay : from a measurement until its command acts, a multiple of 0.01 s [s].
     learning : go on learning from the tire while driving, and hand over what is fit.
     noise : whether sensors are noisy.
@@ -354,7 +357,7 @@ def drive(
     ):
         if needed and tire is None:
             raise ValueError(f"{why}: none is given")
-    setup = Setup(path=path, vehicle=vehicle, mu=friction, drops=(), wish=wish)
+    setup = Setup(path=path, vehicle=vehicle, mu=friction, drops=(), wish=wish, tires=tires)
     conditions = Conditions(
         setup=setup,
         delay=delay_periods(delay),

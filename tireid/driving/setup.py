@@ -12,6 +12,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.speed_limits import SpeedLimits
 from models.friction import Friction, FrictionChange
+from models.tires import Tire
 from models.vehicle import GRAVITY, Vehicle
 from mpc.cars import BRAKES, DoubleTrackCar
 from mpc.path import Path, SpeedProfile, speed_profile, steady_speed
@@ -61,6 +62,7 @@ class Setup(NamedTuple):
     mu : friction of the road over that of the tire's measurement, before the first drop [-].
     drops : arc length [m] and friction from there on.
     limits : of the identified tires, which a wish for a share of them needs.
+    tires : of the front and the rear wheels; None reads the file named by the chassis.
     """
 
     path: Path
@@ -69,11 +71,13 @@ class Setup(NamedTuple):
     drops: tuple[tuple[float, float], ...]
     wish: SpeedWish
     limits: SpeedLimits | None = None
+    tires: tuple[Tire, Tire] | None = None
 
     def car(self, *, open_field: bool = False) -> DoubleTrackCar:
         """Return a car on the road, or on a field that has the friction of the start everywhere."""
         friction = Friction(scale=self.mu) if open_field else self.friction()
-        return DoubleTrackCar(self.vehicle, friction=friction, period=PERIOD)
+        front, rear = self.tires or (None, None)
+        return DoubleTrackCar(self.vehicle, front, rear_tire=rear, friction=friction, period=PERIOD)
 
     def oracle(self, mu: float | None = None) -> PredictionTire:
         """Return the true tire on a road.
