@@ -135,8 +135,8 @@ def axle_scan(structure: Any, k: int) -> Scan:
 # What errors are expected of a good tire.
 STRETCH = 0.12  # [s] over which forces are averaged
 SETTLE = 0.1  # [s] before the first judged stretch, for the lag of the tire
-# Chosen on fast laps of 79 random cars, three shapes of tires, and confirmed on 106 other laps. Curves
-# miss most at small slip, whatever the force; near the grip they miss little.
+# Chosen on fast laps of 79 random cars on tires of three shapes, confirmed on 109 laps of others.
+# Curves miss most at small slip, whatever the force; near the grip they miss little.
 ERROR = 0.04  # standard deviation [static axle loads]: 0.4 m/s²
 RELATIVE_ERROR = 0.03  # the same, as a share of the force [-]
 TAKEN_ERROR = 0.4  # the same, as a share of the force that pushing lengthwise takes [-]
