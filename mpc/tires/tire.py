@@ -172,10 +172,17 @@ def curves_at(tire: PredictionTire, slip: Array, v_x: float = _SPEED) -> Array:
     """Return the axle forces at slips, of a car that slides sideways without yawing, (2, k) [N].
     slip : of both axles [rad], (k,).   v_x : speed [m/s].
     """
-    x = ca.SX.sym("slip")
-    at = Point(-v_x * ca.tan(x), 0.0, 0.0, v_x, Car(*tire.car), ca.SX(tire.weights))
-    force = ca.densify(ca.vertcat(*tire.structure.force((x, x), at)))
-    return np.array(ca.Function("curves", [x], [force])(slip[None]))
+    return np.array(_curves(tire.structure)(slip[None], v_x, tire.car, tire.weights))
+
+
+@cache
+def _curves(structure: TireStructure) -> ca.Function:
+    """Return the axle forces (2, k) [N] of slips (1, k), sliding sideways without yawing."""
+    x, v_x, numbers = ca.SX.sym("slip"), ca.SX.sym("v_x"), ca.SX.sym("car", 4)
+    w = ca.SX.sym("w", structure.n_weights)
+    at = Point(-v_x * ca.tan(x), 0.0, 0.0, v_x, Car(*ca.vertsplit(numbers)), w)
+    force = ca.densify(ca.vertcat(*structure.force((x, x), at)))
+    return ca.Function("curves", [x, v_x, numbers, w], [force])
 
 
 def curve_slopes(tire: PredictionTire) -> Array:

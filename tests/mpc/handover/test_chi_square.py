@@ -1,10 +1,13 @@
 """The error of a tire's forces, told from impulses, is the error of its forces."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mpc.handover.judge import Judge, Window, axle_forces
-from mpc.tires import prediction_tire
+from mpc.tires import PredictionTire, prediction_tire
+from mpc.tires.axles import LadderAxles, curve_weights
 from tests.mpc.handover.conftest import samples_of
 
 
@@ -47,20 +50,22 @@ def test_forces_along_a_drive_are_those_by_hand(tire, dry):
     np.testing.assert_allclose(told[1], forces_by_hand(other, samples), atol=1.0)
 
 
-def bicycle_drive(car):
-    """Samples of a bicycle whose axle forces (n, 2) [N] are known exactly."""
+def bicycle_drive(car, acceleration=0.0, shares=(0.0, 0.0)):
+    """Samples of a bicycle whose axle forces (n, 2) [N] are known exactly; shares push it."""
     v_x, v_y, r = 20.0, 0.0, 0.0
     load, h, fine = np.array(car.axle_loads), 0.001, 10
     rows, forces = [], []
     for k in range(3000):
         delta = 0.05 * np.sin(3.0 * k * h)
         alpha = np.array([delta - (v_y + car.l_f * r) / v_x, -(v_y - car.l_r * r) / v_x])
-        F = 0.8 * load * np.tanh(20.0 * alpha)
+        push = car.mass * (acceleration - v_y * r) * np.array(shares)
+        F = 0.8 * load * np.tanh(20.0 * alpha) * np.sqrt(1.0 - (0.8 * push / (0.8 * load)) ** 2)
         if k % fine == 0:
             rows.append((v_x, v_y, r, delta))
             forces.append(F)
         v_y += h * (F.sum() / car.mass - v_x * r)
         r += h * (car.l_f * F[0] - car.l_r * F[1]) / car.yaw_inertia
+        v_x += h * acceleration
     return np.array(rows), np.array(forces)
 
 
@@ -78,6 +83,21 @@ def test_errors_are_those_of_the_forces(car, tire):
     mean = np.array([parabola @ steps[i : i + 12] for i in range(10, len(steps) - 11)])
     np.testing.assert_allclose(found.rms, np.sqrt(np.mean(mean**2, axis=0)), atol=5e-4)
     assert np.abs(mean[:, 1]).max() > 0.05
+
+
+@pytest.mark.parametrize(("acceleration", "shares"), [(5.0, (1.0, 0.0)), (-6.0, (0.62, 0.38))])
+def test_an_axle_that_pushes_is_expected_to_have_less_to_the_side(car, acceleration, shares):
+    """The ellipse by hand, of a car that is driven in front and brakes on both axles."""
+    samples, _ = bicycle_drive(car, acceleration, shares)
+    weights = curve_weights(np.tile([20.0, 0.8], (2, 1)), loads=car.axle_loads)
+    tire = PredictionTire(LadderAxles(units=1, lagged=False), weights, car)
+    plain = car.without_chassis()
+    front = replace(plain, drive_front_share=0.0, brake_front_share=0.0)  # told wrongly
+    found = Judge(0.01).chi_square(tire, samples)
+    wrong = Judge(0.01).chi_square(tire._replace(vehicle=front), samples)
+    assert found.rms.max() < 0.01
+    assert wrong.rms[0] > 0.02
+    assert found.mean < 0.1 * wrong.mean
 
 
 def test_a_learnt_tire_fits_and_another_does_not(car, tire, dry):

@@ -53,7 +53,7 @@ def test_from_nothing_the_learnt_tire_takes_over_and_is_better(car, dry):
 def test_a_friction_that_comes_back_is_regained_up_to_what_was_learnt(car, learnt):
     """Begun on the low friction that was found, on a road that is dry again."""
     steer = RandomSteer(
-        amplitude=0.05, frequency=0.5, seed=5, onset=0.2, rate_limit=1.0, duration=8.0
+        amplitude=0.06, frequency=0.5, seed=5, onset=0.2, rate_limit=1.0, duration=8.0
     )
     changes = (FrictionChange(scale=0.5, at_time=0.5), FrictionChange(scale=1.0, at_time=4.0))
     _, recording = drive(steer, friction=Friction(changes=changes))
