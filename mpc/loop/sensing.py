@@ -185,8 +185,9 @@ def cornering_limit(
 ) -> float:
     """Return the largest steady lateral acceleration [m/s^2].
 
-    tire, rear_tire : of the front and the rear wheels, as of `Plant`.
+    tire : of the wheels; None reads the file named by the chassis.
     mu : friction of the road over that of the tire's measurement [-].
+    rear_tire : of the two rear wheels, where they have another.
     """
     return _steady_limit(vehicle, cast(Hashable, tire), mu, cast(Hashable, rear_tire))
 
