@@ -24,6 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.cornering import cornering_limit
 from benchmarks.random_cars import FIRST_SEED, LIKE, random_car
 from benchmarks.targets import Table, Targets, Values, parse, show
 from identifier.speed_limits import SpeedLimits
@@ -34,7 +35,7 @@ from models.vehicle import GRAVITY, Vehicle
 from mpc.cars import BRAKES, DoubleTrackCar
 from mpc.handover.learner import Learner
 from mpc.handover.rules import Verdict
-from mpc.loop.sensing import cornering_limit, inertial_unit
+from mpc.loop.sensing import inertial_unit
 from mpc.path import Path, SpeedProfile, handling_course, speed_profile
 from mpc.path.courses import Straight, Turn, line_along
 from mpc.path.speed import SHARE

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks.cornering import cornering_limit
 from identifier.tire_model import TireModel
 from models.vehicle import GRAVITY, sedan
-from mpc.loop.sensing import cornering_limit
 from tireid.cli import build_parser
 from tireid.commands.drive import conditions_of, frozen_tires
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, run_drive

@@ -1,27 +1,19 @@
 """What a driving car measures of itself, sample by sample, and sees of the path before it."""
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from typing import NamedTuple, TypeAlias, cast
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
 from models.faults import FaultError, SensorFault
-from models.friction import Friction
-from models.maneuvers import StepSteer
-from models.plant import Plant
 from models.sensors import Sensor, SensorError
-from models.tires import Tire
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import GRAVITY
 from mpc.cars import CarState
 
 _BIAS_A_Y = 0.05  # m/s²: standard deviation from one unit to the next
 _BIAS_R = 0.001  # rad/s: standard deviation from one unit to the next
-_RAMP_TIME = 20.0  # s
-_RAMP_SPEED = 20.0  # m/s
-_LARGEST_ANGLE = 0.3  # rad at friction 1: beyond the peak of any tire for the road
 
 _EXACT = Sensor()
 
@@ -173,30 +165,3 @@ class FaultySensors:
 
 
 Measures: TypeAlias = CarSensors | FaultySensors  # what a loop measures a car with
-
-# How hard a car can corner, found by driving it: steered more and more at constant speed.
-#
-# The driven axle also holds the speed against the drag of cornering, so that this limit lies a few
-# per cent below the sum of what the tires could give to the side alone.
-
-
-def cornering_limit(
-    vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0, rear_tire: Tire | None = None
-) -> float:
-    """Return the largest steady lateral acceleration [m/s^2].
-
-    tire : of the wheels; None reads the file named by the chassis.
-    mu : friction of the road over that of the tire's measurement [-].
-    rear_tire : of the two rear wheels, where they have another.
-    """
-    return _steady_limit(vehicle, cast(Hashable, tire), mu, cast(Hashable, rear_tire))
-
-
-@cache
-def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float, rear_tire: Hashable) -> float:
-    """Drive the ramp once for each car and road: setting up a drive asks a dozen times."""
-    rate = _LARGEST_ANGLE * mu / _RAMP_TIME
-    ramp = StepSteer(amplitude=_LARGEST_ANGLE * mu, rate_limit=rate, onset=0.1, duration=_RAMP_TIME)
-    plant = Plant(vehicle, cast(Tire | None, tire), rear_tire=cast(Tire | None, rear_tire))
-    run = plant.simulate(ramp, speed=_RAMP_SPEED, friction=Friction(scale=mu))
-    return float(np.abs(run.a_y).max())

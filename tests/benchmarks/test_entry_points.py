@@ -16,7 +16,6 @@ Name = tuple[str, str]  # module, name in it
 # Formulas that a benchmark checks against another road; no number of a user comes from them.
 CHECKED = {
     ("models.recordings.reader", "runs"),  # of the library, for a user's own loop over them
-    ("mpc.loop.sensing", "cornering_limit"),  # true limit of a simulated car: no speed may see it
 }
 
 

@@ -7,12 +7,13 @@ import pytest
 from PIL import Image
 
 import tireid as ti
+from benchmarks.cornering import cornering_limit
 from identifier.tire_model import load_model
 from models.files import digest
 from models.friction import Friction
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop.sensing import CarSensors, cornering_limit
+from mpc.loop.sensing import CarSensors
 from mpc.tires import oracle_tire, prediction_tire
 from mpc.tires.tire import curves_at
 from tests.pages import outline

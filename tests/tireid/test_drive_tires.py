@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from benchmarks.cornering import cornering_limit
 from identifier.paper.network import Network, NetworkModel, Weights
 from models.vehicle import sedan
-from mpc.loop.sensing import cornering_limit
 from mpc.tires import prediction_tire
 from mpc.tires.tire import curves_at
 from tests.tireid.test_drive_setup import LANE, setup

@@ -5,11 +5,12 @@ import math
 import numpy as np
 import pytest
 
+from benchmarks.cornering import cornering_limit
 from models.faults import SensorFault
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
 from mpc.loop.drive import drive
-from mpc.loop.sensing import FaultySensors, cornering_limit, inertial_unit
+from mpc.loop.sensing import FaultySensors, inertial_unit
 from mpc.path import iso_3888_1, steady_speed
 from mpc.realtime import Tracker
 from mpc.tires.ladder import oracle_tire

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.cornering import cornering_limit
 from models.tires import FialaTire, MagicFormula
 from models.vehicle import GRAVITY, sedan
-from mpc.loop.sensing import cornering_limit
 from mpc.tires.ladder import cornering_force
 
 SLIPS = np.linspace(0.005, 0.4, 200)
