@@ -38,7 +38,7 @@ from mpc.handover.rules import Verdict
 from mpc.loop.sensing import inertial_unit
 from mpc.path import Path, SpeedProfile, handling_course, speed_profile
 from mpc.path.courses import Straight, Turn, line_along
-from mpc.path.speed import SHARE
+from mpc.path.speed import BRAKED, SHARE
 from tireid.driving.laps import drive_laps, first_limits
 from tireid.driving.learn import learning_drive
 from tireid.driving.runs import ClosedLoop, drive
@@ -214,6 +214,7 @@ def laps_of(number: int, margins: int, laps: int) -> Laps:
     """
     car = lap_car(number)
     tire, limit = car.learnt(), car.limit
+    true = SpeedLimits.told(limit, brake=limit / BRAKED)  # who knows it brakes with all of it
     found = list(
         drive_laps(
             car.course, car.vehicle, tire, laps, friction=car.friction, tires=car.tires,
@@ -223,7 +224,7 @@ def laps_of(number: int, margins: int, laps: int) -> Laps:
     return Laps(
         car=number,
         limit=limit,
-        true_time=planned(car.course, SpeedLimits.told(limit), TRUE_SHARE).lap_time,
+        true_time=planned(car.course, true, TRUE_SHARE).lap_time,
         tire=tire,
         peaks=tuple(one.driven.scores.peak_e_y_m for one in found),
         safe=len(found) == laps and all(is_safe(one.driven) for one in found),

@@ -10,6 +10,7 @@ from mpc.path import (
     speed_profile,
     steady_speed,
 )
+from mpc.path.speed import BRAKED
 
 TOLD = SpeedLimits.told(8.0, 3.0, 6.0)
 GIVEN = {"share": 1.0, "v_max": 25.0}
@@ -68,8 +69,8 @@ def test_nowhere_could_the_car_be_faster(path):
     v = speed_profile(path, TOLD, **GIVEN).v[: -1 if path.closed else None]
     square, kappa = v**2, np.abs(path.kappa[: v.size])
     rise, fall = (
-        np.roll(square + 2 * path.step * left(TOLD, side, v, square * kappa), shift)
-        for side, shift in (("push", 1), ("brake", -1))
+        np.roll(square + 2 * path.step * use * left(TOLD, side, v, square * kappa), shift)
+        for side, use, shift in (("push", 1.0, 1), ("brake", BRAKED, -1))
     )
     if not path.closed:
         rise[0] = fall[-1] = np.inf
