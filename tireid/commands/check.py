@@ -140,7 +140,6 @@ def _overrides(options: argparse.Namespace) -> dict[str, float]:
 
 
 def _require_sense(options: argparse.Namespace) -> None:
-    shared.method_is_given(options)
     for field, value in _overrides(options).items():
         noise = field.startswith("noise")
         if not (0.0 < value < math.inf or (noise and value == 0.0)):

@@ -81,7 +81,7 @@ def declare(new: Any) -> None:
     shared.add_vehicle(parser)
     shared.add_options(parser, bool, {"--confirm": CONFIRM})
     numbers = {
-        "--mu": (1.0, "friction of the road (%(default)s)"),
+        "--mu MU": (1.0, "friction of the road (%(default)s)"),
         "--delay MS": (
             20.0,
             "from a measurement until its command acts, a multiple of 10 ms (%(default)g)",
@@ -140,8 +140,7 @@ def run(options: argparse.Namespace) -> int:
             learnt.save(folder / "weights.json")
         drives = Drives.driven(conditions, labels, learnt, source)
         figures = drives.write(folder, options.film)
-        film = None if options.film == NO_FILM else folder / f"drive.{options.film}"
-        write_drive_report(folder, drives, figures, film, options.words)
+        write_drive_report(folder, drives, figures, options.film, options.words)
         case, _, scores = drives.text().partition("\n")
     tell(f"{case}\ntires: {source}\n{scores}")
     say(f"wrote {options.out}/")

@@ -1,6 +1,7 @@
 """Thousands of logs in one command: learn each, merge them, watch for changed tires."""
 
 import argparse
+import os
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import replace
@@ -11,16 +12,15 @@ import numpy as np
 
 from identifier.tire_model import STIFFNESS
 from models.extras import needs
+from models.schema import require_few
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
 from tireid.commands import DONE, FAILS
 from tireid.commands.options import (
     add_force,
-    add_jobs,
     add_log_map,
     add_options,
     given_map,
-    jobs_of,
 )
 from tireid.fleet.learn import (
     LearnLog,
@@ -89,7 +89,7 @@ def _add_learn(tasks: Any) -> None:
     parser.add_argument(
         "--out", required=True, metavar="STORE", help="folder or address of the store"
     )
-    words: dict[str, Any] = {
+    words = {
         "--tags PATTERN": (
             "",
             "what paths end with, as in '{vehicle}/{tires}/{date}-*.csv'; vehicle, tires and date "
@@ -104,7 +104,7 @@ def _add_learn(tasks: Any) -> None:
     }
     add_options(parser, bool, flags)
     add_log_map(parser)
-    add_jobs(parser)
+    add_options(parser, int, {"--jobs N": (os.cpu_count() or 1, "processes (%(default)s)")})
     parser.set_defaults(run=_learn)
 
 
@@ -119,7 +119,10 @@ def _add_question(parser: argparse.ArgumentParser, by: str, out: str) -> None:
 
 def _learn(options: argparse.Namespace) -> int:
     """Learn logs into a store; return 1 where a log could not be used."""
-    clock, jobs, log_map = Stopwatch(), jobs_of(options), given_map(options)
+    clock, jobs, log_map = Stopwatch(), options.jobs, given_map(options)
+    if jobs < 1:
+        raise ValueError(f"--jobs must be at least 1, it is {jobs}")
+    require_few(ValueError, "--jobs", jobs, "processes", "processes")
     tasks, left = find_logs(options.logs, options.vehicle, options.tags)
     for log, why in list(left.items())[:_LISTED]:
         say(f"{log}: left out, {why}")

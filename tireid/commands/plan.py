@@ -42,7 +42,7 @@ def declare(new: Any) -> None:
     parser.add_argument("--speed", metavar="V", nargs="+", type=float, help=text)
     text = "length and width of the field [m] (without limits)"
     parser.add_argument("--area", metavar=("L", "W"), nargs=2, type=float, help=text)
-    numbers: dict[str, Any] = {
+    numbers = {
         "--time S": (TIME, "length of a maneuver (%(default)g)"),
         "--mu MU": "friction of the road, a guess (0.85, or that of --weights)",
         "--grip PERCENT": (100.0 * SHARE, "share of the grip that is used at most (%(default)g)"),

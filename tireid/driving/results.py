@@ -205,29 +205,26 @@ _COLUMNS_ESTIMATED = {
     "inertial_v_y": "v_y_inertial_m_s",
     "inertial_v_y_sd": "v_y_inertial_sd_m_s",
 }
-_UNITS = {  # of signals of a drive, by their name
-    **dict.fromkeys(("s", "X", "Y", "e_y"), "m"),
-    **dict.fromkeys(("psi", "delta", "command", "e_psi"), "rad"),
-    **dict.fromkeys(("v_x", "v_y", "v_ref"), "m_s"),
-    **dict.fromkeys(("a_x", "a_y"), "m_s2"),
-    **{"t": "s", "r": "rad_s", "kappa": "1_m"},
-}
-_SIGNALS = (
-    *("t", "s", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "command"),
-    *("e_y", "e_psi", "kappa", "v_ref"),
-)
+_UNITS = {  # of signals of a drive, by their name, in the order of columns
+    "t": "s", "s": "m", "X": "m", "Y": "m", "psi": "rad", "v_x": "m_s", "v_y": "m_s", "r": "rad_s",
+    "a_x": "m_s2", "a_y": "m_s2", "delta": "rad", "command": "rad", "e_y": "m", "e_psi": "rad",
+    "kappa": "1_m", "v_ref": "m_s",
+}  # fmt: skip
 
 
 def _drive_columns(drive: Drive) -> dict[str, Array]:
     """Return every signal of a drive by the name of its column, with its unit."""
-    measured = [(name, values) for name, values in drive.measured.items() if name != "t"]
     return {
-        **{f"{name}_{_UNITS[name]}": getattr(drive, name) for name in _SIGNALS},
+        **{f"{name}_{_UNITS[name]}": getattr(drive, name) for name in _UNITS},
         **axle_columns("alpha_{}_rad", axle_slip(drive)),
         **axle_columns("Fy{}_N", drive.axle_force),
         "status": drive.status.astype(np.float64),
         "solve_time_s": drive.solve_time,
-        **{f"{name}_measured_{_UNITS[name]}": values for name, values in measured},
+        **{
+            f"{name}_measured_{_UNITS[name]}": values
+            for name, values in drive.measured.items()
+            if name != "t"
+        },
         **{_COLUMNS_ESTIMATED[name]: values for name, values in drive.estimates.items()},
     }
 
@@ -256,7 +253,7 @@ def _known_curves(
 
 
 def write_drive_report(
-    folder: Path, drives: Drives, figures: Mapping[str, bytes], film: Path | None, command: str
+    folder: Path, drives: Drives, figures: Mapping[str, bytes], film: str, command: str
 ) -> None:
     """Write the report of drives along one path."""
     runs = drives.runs
@@ -267,12 +264,9 @@ def write_drive_report(
         numbers=_drive_headlines(runs),
         warnings=_drive_warnings(runs),
         sections=[
-            Section("How the car drove", _drive_blocks(runs, figures, film)),
+            Section("How the car drove", _drive_blocks(folder, runs, figures, film)),
             Section("The tracker's tires", known_blocks(runs, figures)),
-            Section(
-                "Timing",
-                drawings(figures, {"solve_times": "How long a step took."}),
-            ),
+            Section("Timing", drawings(figures, {"solve_times": "How long a step took."})),
             origin(
                 command,
                 first.drive.vehicle,
@@ -321,12 +315,12 @@ def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
 
 
 def _drive_blocks(
-    runs: Sequence[ClosedLoop], figures: Mapping[str, bytes], film: Path | None
+    folder: Path, runs: Sequence[ClosedLoop], figures: Mapping[str, bytes], film: str
 ) -> list[Block]:
     blocks: list[Block] = [Table("Scores of the drives.", SCORES, score_rows(runs))]
-    if film is not None:
+    if film != NO_FILM:
         caption = f"The drive on {runs[0].label} tires; outlines are the other cars."
-        blocks.append(Picture(film, caption, READ["film"]))
+        blocks.append(Picture(folder / f"drive.{film}", caption, READ["film"]))
     captions = {
         "path": "The path from above.",
         "errors": "Deviation, heading, acceleration and speed along the path.",

@@ -52,10 +52,12 @@ SERIES = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, GREY)
 
 TRUTH: Mapping[str, Any] = {"color": BLACK, "linewidth": 1.5, "label": "truth"}
 ONLINE: Mapping[str, Any] = {"color": BLUE, "linewidth": 0.9, "label": "online"}
-_DASHED = {"color": ORANGE, "linestyle": (0, (3.5, 1.2))}
-FROZEN: Mapping[str, Any] = {**_DASHED, "linewidth": 1.1, "label": "frozen weights"}
-_DOTTED = {"color": GREY, "linestyle": (0, (1, 1.2))}
-LINEAR: Mapping[str, Any] = {**_DOTTED, "linewidth": 1.2, "label": "linear tire"}
+FROZEN: Mapping[str, Any] = {
+    "color": ORANGE, "linestyle": (0, (3.5, 1.2)), "linewidth": 1.1, "label": "frozen weights",
+}  # fmt: skip
+LINEAR: Mapping[str, Any] = {
+    "color": GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.2, "label": "linear tire",
+}  # fmt: skip
 
 _look = rc_params_from_file(Path(__file__).with_name("look.mplstyle"), use_default_template=False)
 LOOK: dict[str, Any] = dict(_look.items())
@@ -191,16 +193,12 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     return buffer.getvalue()
 
 
-def save_figure(figure: Figure, path: Path) -> bytes:
-    """Write a figure as PNG, and return it."""
-    image = figure_png(figure)
-    write_file(path, image)
-    return image
-
-
 def save_figures(folder: Path, figures: Mapping[str, Figure]) -> dict[str, bytes]:
     """Write figures as PNG under their names; return these, which a report shows, too."""
-    return {name: save_figure(one, folder / f"{name}.png") for name, one in figures.items()}
+    images = {name: figure_png(one) for name, one in figures.items()}
+    for name, image in images.items():
+        write_file(folder / f"{name}.png", image)
+    return images
 
 
 TIME = "time [s]"
