@@ -16,7 +16,7 @@ from models.recordings.reader import repair_text
 from models.vehicle import Vehicle
 from tireid import report as page
 from tireid.output import text_table
-from tireid.reports.common import REPORT, drawings, origin
+from tireid.reports.common import drawings, origin
 
 _HEADER = ("found", "size", "confidence", "repair")
 NAMES = {  # of findings by their code, where the code is not the word
@@ -85,12 +85,11 @@ def _size_text(finding: Finding) -> str:
 
 
 def diagnosis_text(diagnosis: Diagnosis, *, unobservable: bool = True) -> str:
-    count = len(diagnosis.findings)
-    if count:
-        head = f"doctor: {count} finding{'s' * (count > 1)}"
-        table = text_table([list(_HEADER), *_finding_rows(diagnosis)], "<<<<")
-        return "\n".join([head, table, *diagnosis.lines(unobservable=unobservable)])
-    return "\n".join(["doctor: nothing found", *diagnosis.lines(unobservable=unobservable)])
+    count, said = len(diagnosis.findings), diagnosis.lines(unobservable=unobservable)
+    if count == 0:
+        return "\n".join(["doctor: nothing found", *said])
+    table = text_table([_HEADER, *_finding_rows(diagnosis)])
+    return "\n".join([f"doctor: {count} finding{'s' * (count > 1)}", table, *said])
 
 
 def _tone_of(diagnosis: Diagnosis) -> page.Tone:
@@ -113,7 +112,7 @@ def diagnosis_section(diagnosis: Diagnosis, heading: str = "Doctor") -> page.Sec
         )
     ]
     if rows:
-        blocks.append(page.Table("What was found.", list(_HEADER), rows))
+        blocks.append(page.Table("What was found.", _HEADER, rows))
         blocks += [page.printed(one.text) for one in diagnosis.findings]
     else:
         blocks.append("Nothing was found.")
@@ -201,7 +200,7 @@ def write_doctor_report(
         warnings=diagnosis_warnings(diagnosis),
         sections=[*sections, origin(command, vehicle, [recording])],
     )
-    page.write_report(folder / REPORT, report)
+    page.write_report(folder, report)
 
 
 def write_repair(path: Path, given: LogMap, diagnosis: Diagnosis) -> None:

@@ -16,7 +16,7 @@ from tireid.output import text_table
 from tireid.progress import complain
 from tireid.report import Block, Cell, Headline, Marked, Section, Table, Tone, printed
 
-HEADER = ("", "front", "is", "rear", "is")
+_HEADER = ("", "front", "is", "rear", "is")
 
 
 def _numbers_by_title(verdict: Verdict) -> dict[str, dict[Axle, Number]]:
@@ -56,7 +56,7 @@ def verdict_text(verdict: Verdict, *, numbers: bool = True) -> str:
         ]
         for title, by_axle in _numbers_by_title(verdict).items()
     ]
-    table = [text_table([list(HEADER), *rows])] if numbers else []
+    table = [text_table([_HEADER, *rows])] if numbers else []
     return "\n".join([*table, *verdict.lines])
 
 
@@ -207,18 +207,10 @@ def verdict_section(verdict: Verdict) -> Section:
         ),
         *(printed(line) for line in lines if line),
         Table(
-            "Estimates. Grey was not identified; struck through is not valid.",
-            ("", *AXLES),
-            rows,
+            "Estimates. Grey was not identified; struck through is not valid.", ("", *AXLES), rows
         ),
     ]
     return Section("Verdict", blocks)
-
-
-def warn_of_stored(path: Path | str) -> None:
-    """Say on standard error where a stored model was found not valid when it was learnt."""
-    for said in stored_warning(path):
-        complain(f"warning: {said.text}")
 
 
 def stored_warning(path: Path | str) -> list[Marked]:

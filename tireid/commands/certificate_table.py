@@ -11,15 +11,13 @@ from identifier.setup import force_unit_name
 from models.vehicle import Vehicle
 from tireid.output import text_table
 
-HEADER = ("property", "value", "limit", "margin", "")
-
 
 def certificate_text(certificate: Certificate, force_unit: float) -> str:
     """Return the certificate as lines of text, ending with advice and the verdict.
 
     force_unit : the unit U of the design [N].
     """
-    rows = [list(HEADER)]
+    rows = [["property", "value", "limit", "margin", ""]]
     for entry in certificate.properties:
         numbers = map(number, (entry.value, entry.limit, entry.margin))
         status = entry.status if entry.limit is not None else "stated"

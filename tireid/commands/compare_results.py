@@ -33,7 +33,7 @@ from tireid.figures.style import save_figures
 from tireid.output import text_table, write_json
 from tireid.progress import say
 from tireid.report import Block, Headline, Report, Section, Table, write_report
-from tireid.reports.common import REPORT, drawings, origin
+from tireid.reports.common import drawings, origin
 from tireid.verdicts import verdicts_headline, verdicts_warnings
 
 
@@ -238,7 +238,7 @@ def write_compare_report(
             origin(command, course.vehicle, course.recordings, seed=str(comparison.seed)),
         ],
     )
-    write_report(folder / REPORT, report)
+    write_report(folder, report)
 
 
 def _compare_headlines(comparison: Comparison) -> list[Headline]:

@@ -36,8 +36,8 @@ from tireid.exporting import Exported, export, self_test
 from tireid.figures.film import FORMATS
 from tireid.figures.paper import SCHEME
 from tireid.output import output_folder
-from tireid.progress import Progress, Stopwatch, tell
-from tireid.reports.common import READ, REPORT, drawings, origin
+from tireid.progress import Progress, tell
+from tireid.reports.common import READ, drawings, origin
 from tireid.reports.identify import (
     curve_drawing,
     identify_headlines,
@@ -360,7 +360,6 @@ def declare(new: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    watch = Stopwatch()
     with output_folder(options.out, force=options.force) as folder:
         work = Progress("demo", _PARTS, long=True)
         story = run_story(partial(work.begin(_LEARNING).step, 2 * len(STORY)))
@@ -381,7 +380,7 @@ def run(options: argparse.Namespace) -> None:
         driven = drive_story(story, folder)
         work.begin(_REPORTING)
         report = _demo_report(story, shipped, study, driven, figures, folder, options.words)
-        page.write_report(folder / REPORT, report)
+        page.write_report(folder, report)
         columns = [
             *(table_text(maneuver, study) for maneuver in study.errors),
             f"{certificate_table.certificate_text(story.certificate, story.design.force_unit)}\n",
@@ -390,4 +389,4 @@ def run(options: argparse.Namespace) -> None:
             drive_text(driven),
         ]
     tell("\n".join(columns))
-    tell(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")
+    tell(f"read {options.out / 'report.html'}  ({work.seconds:.0f} s)")

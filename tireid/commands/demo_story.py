@@ -106,7 +106,7 @@ def run_story(progress: Callable[[], None] = lambda: None) -> Story:
         return Results.learnt(law, runs, [FREEZE], recordings[1:])
 
     axle, paper = learnt(LIVE, make_method(LIVE, car)), learnt(REFERENCE, design)
-    return Story(car=car, design=design, axle=axle, paper=paper)
+    return Story(car, design, axle, paper)
 
 
 def drive_to_learn() -> Recording:

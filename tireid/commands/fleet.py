@@ -34,7 +34,7 @@ from tireid.fleet.merge import BY, COLUMNS, merge, usable
 from tireid.fleet.store import INDEX, LogRow, Store
 from tireid.fleet.watch import ALARM, BASELINE, watch
 from tireid.output import output_folder, text_table, write_json
-from tireid.progress import Progress, Stopwatch, say, tell
+from tireid.progress import Progress, say, tell
 
 _LISTED = 5  # logs with errors that are named
 
@@ -119,7 +119,7 @@ def _add_question(parser: argparse.ArgumentParser, by: str, out: str) -> None:
 
 def _learn(options: argparse.Namespace) -> int:
     """Learn logs into a store; return 1 where a log could not be used."""
-    clock, jobs, log_map = Stopwatch(), options.jobs, given_map(options)
+    jobs, log_map = options.jobs, given_map(options)
     if jobs < 1:
         raise ValueError(f"--jobs must be at least 1, it is {jobs}")
     require_few(ValueError, "--jobs", jobs, "processes", "processes")
@@ -158,7 +158,7 @@ def _learn(options: argparse.Namespace) -> int:
         f"{len(tasks) - learnt} before; {refused} not valid, {len(errors)} could not be used"
         + (f", see the column error of {options.out}" if errors else "")
     )
-    say(f"wrote {options.out} in {clock.seconds:.0f} s")
+    say(f"wrote {options.out} in {progress.seconds:.0f} s")
     return FAILS if errors else DONE
 
 

@@ -39,7 +39,7 @@ from tireid.figures.style import save_figures
 from tireid.output import output_folder, write_json
 from tireid.progress import say, tell
 from tireid.report import Headline, Report, Section, Table, write_report
-from tireid.reports.common import REPORT, drawings, origin
+from tireid.reports.common import drawings, origin
 
 _NOT_COMPLETED = 1
 _BRAKING = INDEX["braking_f"]
@@ -249,4 +249,4 @@ def _write(
     ]
     number = Headline(f"{profile.lap_time:.2f} s", "lap time, planned")
     report = Report(f"A lap of {path.name}", sections, f"{head}.", [number], warnings=notes)
-    write_report(folder / REPORT, report)
+    write_report(folder, report)

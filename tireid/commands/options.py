@@ -32,7 +32,7 @@ from models.vehicle import Vehicle, sedan
 from tireid.commands import DONE, NOT_VALID
 from tireid.learning import with_v_y
 from tireid.progress import complain, say
-from tireid.verdicts import warn_of_stored
+from tireid.verdicts import stored_warning
 
 
 def add_options(parser: Any, kind: type, table: Mapping[str, Any]) -> None:
@@ -110,7 +110,8 @@ def stored_model(path: Path | None) -> TireModel | None:
     if path is None:
         return None
     model = load_model(path)
-    warn_of_stored(path)
+    for said in stored_warning(path):
+        complain(f"warning: {said.text}")
     return model
 
 

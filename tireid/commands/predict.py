@@ -27,7 +27,7 @@ from tireid.figures.tires import slip_figure
 from tireid.identified import error_cells
 from tireid.learning import replay
 from tireid.progress import say, tell
-from tireid.reports.common import REPORT, drawings, origin
+from tireid.reports.common import drawings, origin
 from tireid.reports.identify import (
     band_sentence,
     curve_drawing,
@@ -267,7 +267,7 @@ def write_predict_report(
             ),
         ],
     )
-    page.write_report(folder / REPORT, report)
+    page.write_report(folder, report)
 
 
 def _predict_headlines(prediction: Prediction) -> list[page.Headline]:

@@ -43,7 +43,7 @@ from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
 from tireid.output import axle_columns, finite, text_table, write_csv, write_json
 from tireid.progress import say
 from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report
-from tireid.reports.common import READ, REPORT, drawings, origin
+from tireid.reports.common import READ, drawings, origin
 
 NO_FILM = "none"
 
@@ -276,7 +276,7 @@ def write_drive_report(
             ),
         ],
     )
-    write_report(folder / REPORT, report)
+    write_report(folder, report)
 
 
 def _drive_headlines(runs: Sequence[ClosedLoop]) -> list[Headline]:

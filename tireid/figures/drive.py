@@ -263,10 +263,7 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
     chassis = vehicle.chassis
     tracks = (_TRACK * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
     half = 0.5 * (max(tracks) + _BODY_BESIDE_TRACK * long)
-    front, rear = (
-        vehicle.l_f + _FRONT_OVERHANG * long,
-        -vehicle.l_r - _REAR_OVERHANG * long,
-    )
+    front, rear = vehicle.l_f + _FRONT_OVERHANG * long, -vehicle.l_r - _REAR_OVERHANG * long
     angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
     round_ = np.column_stack([np.cos(angle), np.sin(angle)])
     body = np.sign(round_) * np.abs(round_) ** _ROUNDING * (0.5 * (front - rear), half)
@@ -299,9 +296,8 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
     path = next(iter(drives.values())).path
     low, high = _extent(path, drives)
     width, height = high - low
-    rows = 1
-    if width > _NARROW * height:
-        rows = min(_MOST_ROWS, max(1, round(width / _ROW_LENGTH)))
+    long = width > _NARROW * height
+    rows = min(_MOST_ROWS, max(1, round(width / _ROW_LENGTH))) if long else 1
     step = width / rows
     inch = min(_INNER_WIDTH / step, _HIGHEST / height)  # of a meter
     figure = style.new_figure(rows * (height * inch + 0.3) + 0.6)
@@ -310,7 +306,7 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
         ends = float(low[0] + row * step), float(low[0] + (row + 1) * step)
         axes.set(xlim=ends, ylim=(low[1], high[1]), aspect="equal", ylabel="Y [m]")
         _draw(axes, path, drives)
-        axes.set_yticks(axes.get_yticks()[1:-1:1])
+        axes.set_yticks(axes.get_yticks()[1:-1])
         axes.set_ylim(low[1], high[1])
     panels[-1].set_xlabel("X [m]")
     style.legend_above(figure, last=tuple(drives))

@@ -18,7 +18,6 @@ from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine, LayoutEngine
-from matplotlib.legend import Legend
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 from PIL import Image
@@ -286,34 +285,20 @@ def legend_above(figure: Figure, *, columns: int | None = None, last: Sequence[s
         engine = figure.get_layout_engine()
         if isinstance(engine, _Margins):
             engine.entries = -(-len(entries) // columns)
-        _bolder(
-            figure.legend(
-                list(entries.values()),
-                list(entries),
-                ncols=columns,
-                loc="outside upper center",
-                borderaxespad=0.2,
-            )
-        )
+        place = {"loc": "outside upper center", "borderaxespad": 0.2}
+        _bold_legend(figure, entries, ncols=columns, **place)
 
 
 def legend_beside(axes: Axes) -> None:
     """Put the legend of one panel to its right, where it covers no data."""
     entries = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    _bolder(
-        axes.legend(
-            list(entries.values()),
-            list(entries),
-            loc="upper left",
-            bbox_to_anchor=(1.01, 1.0),
-            borderaxespad=0.0,
-        )
-    )
+    place = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
+    _bold_legend(axes, entries, **place)
 
 
-def _bolder(legend: Legend) -> None:
-    """Make thin lines and faint dots of a legend large enough to tell their colors."""
-    for line in legend.get_lines():
+def _bold_legend(owner: Any, entries: Mapping[str, Any], **place: Any) -> None:
+    """Put a legend, its thin lines and faint dots large enough to tell their colors."""
+    for line in owner.legend([*entries.values()], [*entries], **place).get_lines():
         line.set_linewidth(max(line.get_linewidth(), 1.2))
         if line.get_marker() == ".":
             line.set_markersize(7.0)

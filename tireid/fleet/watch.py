@@ -19,6 +19,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtrc
 
 from codegen.arrays import Array
 from identifier.estimate.information import PLACE, SIZE, Information, coordinates
@@ -144,6 +145,6 @@ def _scatter(cars: Sequence[_Compared]) -> Array:
 
 def _judged(car: str, day: str, seconds: float, z: Array, S: Array, alarm: float) -> Day:
     x2 = float(z @ np.linalg.solve(S, z))
-    p = math.erfc(math.sqrt(x2 / 2.0)) + math.sqrt(2.0 * x2 / math.pi) * math.exp(-x2 / 2.0)
+    p = float(chdtrc(3, x2))
     sd = np.sqrt(np.diag(S))
     return Day(car, day, seconds, tuple(z.tolist()), tuple(sd.tolist()), x2, p, p < alarm)

@@ -17,8 +17,6 @@ from models.vehicle import Vehicle
 from tireid import __version__
 from tireid.report import Picture, Section, Table
 
-REPORT = "report.html"
-
 with Path(__file__).with_name("read.toml").open("rb") as file:
     READ: dict[str, str] = tomllib.load(file)  # how to read each figure, in one line
 

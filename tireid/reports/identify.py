@@ -25,7 +25,7 @@ from tireid import report as page
 from tireid import verdicts
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
 from tireid.identified import Results
-from tireid.reports.common import READ, REPORT, drawings, origin
+from tireid.reports.common import READ, drawings, origin
 
 _EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
 
@@ -80,7 +80,7 @@ def write_identify_report(
             ),
         ],
     )
-    page.write_report(folder / REPORT, report)
+    page.write_report(folder, report)
 
 
 def _how_learnt(learnt: History) -> str:
