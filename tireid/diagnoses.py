@@ -143,17 +143,20 @@ def with_doctor(verdict: Verdict, diagnosis: Diagnosis, repair: Repair) -> Verdi
     A unit, a sign, a ratio or a factor of v_x that is surely wrong refuses the answer; another sure
     size is noted. Nothing that `repair` took out of the log speaks against it.
     """
-    left = [one for one in diagnosis.findings if one.sure or one.code in NOT_MEASURED]
-    left = [] if repair else left
-    said = [
-        Objection(
-            "doctor",
-            None,
-            f"doctor: {one.text}",
-            one.code in _GROSS or (one.code, one.channel) == _OF_ALL_FORCES,
-        )
-        for one in left
-    ]
+    said = (
+        []
+        if repair
+        else [
+            Objection(
+                "doctor",
+                None,
+                f"doctor: {one.text}",
+                one.code in _GROSS or (one.code, one.channel) == _OF_ALL_FORCES,
+            )
+            for one in diagnosis.findings
+            if one.sure or one.code in NOT_MEASURED
+        ]
+    )
     ordered = sorted([*verdict.findings, *said], key=lambda one: not one.refuses)
     return replace(verdict, findings=tuple(ordered)) if said else verdict
 

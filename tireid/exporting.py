@@ -153,8 +153,7 @@ def export(
             from identifier.export.fmu import export_fmu
 
             for version in (2, 3):
-                path = scratch / f"{name}_fmi{version}.fmu"
-                export_fmu(package.specialized, path, version)
+                export_fmu(package.specialized, scratch / f"{name}_fmi{version}.fmu", version)
                 progress.step(2)
     return Exported(folder=target, package=package, costs=tuple(costs), notes=tuple(notes))
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from codegen.arrays import Array, blocks, thinning
+from codegen.arrays import blocks, thinning
 from codegen.escape import visible
 from identifier.compare.course import side_slip
 from identifier.frozen import vehicle_numbers
@@ -35,6 +35,7 @@ from tireid.figures.style import save_figures
 from tireid.figures.tires import learnt_axles_figure, slip_figure
 from tireid.learning import with_v_y
 from tireid.output import (
+    Columns,
     axle_columns,
     force_columns,
     text_table,
@@ -212,7 +213,7 @@ class Results(NamedTuple):
         say("drawing figures")
         return save_figures(folder, self._figures())
 
-    def _force_columns(self, run: History, part: slice) -> dict[str, Array]:
+    def _force_columns(self, run: History, part: slice) -> Columns:
         """Return the columns of forces.csv: slip angles, true, online and frozen forces."""
         recording, car, outputs = run.recording, run.vehicle, run.outputs
         forces = {"true": recording.axle_force, "online": run.axle_force if run.online else None}
@@ -275,7 +276,7 @@ def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str
     return front, rear
 
 
-def _weight_columns(learnt: History) -> Iterator[dict[str, Array]]:
+def _weight_columns(learnt: History) -> Iterator[Columns]:
     """Yield the columns of weights.csv: of a long run a row for each of at most `LONG` samples."""
     each = thinning(len(learnt.recording))
     for block in learnt.blocks():
@@ -288,7 +289,7 @@ def _weight_columns(learnt: History) -> Iterator[dict[str, Array]]:
         yield weights
 
 
-def _curve_columns(model: TireModel, runs: Sequence[History]) -> dict[str, Array]:
+def _curve_columns(model: TireModel, runs: Sequence[History]) -> Columns:
     """Return curve.csv: the steady force of each axle over slip, and whether it is known there."""
     car, known = model.vehicle, model.known_slip
     reach = [0.0 if known is None else float(known.max())]

@@ -7,7 +7,7 @@ inline, without scripts or links to other files, so that it can be mailed, archi
 import math
 import re
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -38,6 +38,7 @@ class Marked(NamedTuple):
 
 
 Cell = str | float | Marked | None
+Images = Mapping[str, bytes]  # figures, by the name of their file
 
 # What texts say in ASCII, as it is printed in a book.
 _LETTERS = {

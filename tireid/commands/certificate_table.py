@@ -24,7 +24,11 @@ def certificate_text(certificate: Certificate, force_unit: float) -> str:
         rows.append([f"{entry.title} [{unit_text(entry.unit, force_unit)}]", *numbers, status])
     lines = [text_table(rows, "<>>><")]
     lines += [f"{e.status}: {e.title}: {e.advice}" for e in advised(certificate)]
-    lines += [f"note: {note}" for note in notes(certificate)]
+    titles: dict[str, list[str]] = {}  # of values that are only stated, by what is said of them
+    for entry in certificate.properties:
+        for remark in entry.advice.split("; ") if entry.limit is None and entry.advice else ():
+            titles.setdefault(remark, []).append(entry.title)
+    lines += [f"note: {remark} ({' | '.join(about)})" for remark, about in titles.items()]
     return "\n".join([*lines, f"verdict: {certificate.verdict}"])
 
 
@@ -55,16 +59,6 @@ def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: 
 
 def advised(certificate: Certificate) -> list[Property]:
     return [e for e in certificate.properties if e.advice and e.status != "pass"]
-
-
-def notes(certificate: Certificate) -> list[str]:
-    """Return what is to be said of values that are only stated, each remark once."""
-    titles: dict[str, list[str]] = {}
-    for entry in certificate.properties:
-        if entry.limit is None and entry.advice:
-            for remark in entry.advice.split("; "):
-                titles.setdefault(remark, []).append(entry.title)
-    return [f"{remark} ({' | '.join(about)})" for remark, about in titles.items()]
 
 
 def verdict_line(certificate: Certificate) -> str:

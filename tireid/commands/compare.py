@@ -15,7 +15,6 @@ from tireid.commands import DONE
 from tireid.commands import compare_results as results
 from tireid.commands import options as shared
 from tireid.commands.demo_story import plant_recordings
-from tireid.output import output_folder
 from tireid.progress import Progress, say, tell
 from tireid.verdicts import verdicts_text
 
@@ -58,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
     vehicle = shared.read_vehicle(options)
     parts = {"methods": 9.0, "step times, tables and figures": 1.0}
-    with output_folder(options.out, force=options.force) as folder:
+    with shared.folder_of(options) as folder:
         work = Progress("compare", parts, long=True)
         recordings = [shared.read_log(log, vehicle, options) for log in options.logs]
         if not recordings:

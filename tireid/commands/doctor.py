@@ -12,7 +12,7 @@ from tireid.commands import options as shared
 from tireid.diagnoses import add_repair, diagnosis_text, write_doctor_report, write_repair
 from tireid.figures.forces import draw_diagnosis
 from tireid.figures.style import save_figures
-from tireid.output import output_folder, require_free, write_json
+from tireid.output import require_free, write_json
 from tireid.progress import say, tell
 
 
@@ -45,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     repaired, car = repair.apply(recording, vehicle) if repair else (recording, vehicle)
     after = diagnose(repaired, car) if repair else None
     if options.out is not None:
-        with output_folder(options.out, force=options.force) as folder:
+        with shared.folder_of(options) as folder:
             figure = draw_diagnosis(recording, vehicle, repaired, car)
             images = save_figures(folder, {"slip": figure})
             left = None if after is None else after.to_dict()

@@ -47,7 +47,6 @@ def run(options: argparse.Namespace) -> None:
         overwrite=options.force,
     )
     if emitted.understeer is not None:
-        rows = [line.split(",") for line in emitted.understeer.csv.splitlines()]
-        tell(text_table(rows, ">>>>"))
+        tell(text_table([line.split(",") for line in emitted.understeer.csv.splitlines()], ">>>>"))
     for path in emitted.files:
         say(f"wrote {path}")

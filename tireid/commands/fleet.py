@@ -20,6 +20,7 @@ from tireid.commands.options import (
     add_force,
     add_log_map,
     add_options,
+    folder_of,
     given_map,
 )
 from tireid.fleet.learn import (
@@ -33,7 +34,7 @@ from tireid.fleet.learn import (
 from tireid.fleet.merge import BY, COLUMNS, merge, usable
 from tireid.fleet.store import INDEX, LogRow, Store
 from tireid.fleet.watch import ALARM, BASELINE, watch
-from tireid.output import output_folder, text_table, write_json
+from tireid.output import text_table, write_json
 from tireid.progress import Progress, say, tell
 
 _LISTED = 5  # logs with errors that are named
@@ -186,7 +187,7 @@ def _by(options: argparse.Namespace) -> list[str]:
 def _merge(options: argparse.Namespace) -> int:
     groups = merge(_used(options), _by(options))
     models, rows = [], [["group", "logs", "learning", "stiffness front, rear", "known to"]]
-    with output_folder(options.out, force=options.force) as folder:
+    with folder_of(options) as folder:
         for k, one in enumerate(groups):
             file, known = f"model-{k:04d}.json", np.degrees(one.model.known_slip)
             one.model.save(folder / file)
@@ -218,7 +219,7 @@ def _watch(options: argparse.Namespace) -> int:
     """Say whose tires changed; return 1 where the last day of a car is an alarm."""
     limits = {"baseline": options.baseline, "alarm": options.alarm}
     days, short = watch(_used(options)(), _by(options), **limits)
-    with output_folder(options.out, force=options.force) as folder:
+    with folder_of(options) as folder:
         write_json(folder / "days.json", [day._asdict() for day in days])
     last = {day.car: day for day in days}
     lines = [day.line for day in days if day.alarm] or ["no change was noticed"]

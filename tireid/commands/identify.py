@@ -21,7 +21,7 @@ from tireid.commands.certificate_table import verdict_line
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.identified import Results, file_name
 from tireid.learning import identify
-from tireid.output import output_folder, require_free, write_json
+from tireid.output import require_free, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
 from tireid.verdicts import sensors_text, verdict_text, verdicts_text
@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     count = 1.0 + len(others)
     parts = {_LEARNING: 1.0 + count, _JUDGING: count, _DRAWING: 2.0 + 3.0 * count}
-    with output_folder(options.out, force=options.force) as folder:
+    with shared.folder_of(options) as folder:
         progress = Progress("identify", parts)
         runs: list[History] = []
         for k, one in enumerate((recording, *others)):

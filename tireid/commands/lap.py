@@ -36,7 +36,7 @@ from tireid.driving.laps import drive_laps
 from tireid.driving.runs import FRICTIONS
 from tireid.figures.lap import lap_figure, lap_gg_figure
 from tireid.figures.style import save_figures
-from tireid.output import output_folder, write_json
+from tireid.output import write_json
 from tireid.progress import say, tell
 from tireid.report import Headline, Report, Section, Table, write_report
 from tireid.reports.common import drawings, origin
@@ -60,8 +60,7 @@ def declare(new: Any) -> None:
         "--laps a simulated car drives it, learns from each lap, and goes again.",
         epilog="Exit code 1 where a lap of --laps was not completed.",
     )
-    text = "weights.json, as identified"
-    parser.add_argument("weights", type=Path, metavar="WEIGHTS", help=text)
+    parser.add_argument("weights", type=Path, metavar="WEIGHTS", help="weights.json, as identified")
     add_path(parser, "course")
     words = {
         "--share SHARE": (str(SHARE), "of the limits that is used: 70%%, 0.7 (%(default)s)"),
@@ -122,7 +121,7 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"--laps N drives a closed path N times: leave it out for {path.name}")
     elif vehicle.chassis is None:
         raise ValueError("--laps drives a car with a chassis: add --vehicle FILE, with [chassis]")
-    with output_folder(options.out, force=options.force) as folder:
+    with shared.folder_of(options) as folder:
         rows, completed = list[dict[str, float]](), True
         if n is None:
             profile = speed_profile(path, limits, share=share, **planned)
@@ -223,9 +222,11 @@ def _write(
         "top_speed_m_s": v.max(), "peak_a_y_m_s2": np.abs(profile.a_y).max(),
         "peak_braking_m_s2": -profile.a_x.min(), "share": share,
     }  # fmt: skip
-    more = {"limited_by": limited, "laps": laps, "notes": notes, "command": options.words}
-    hashed = {"weights_hash": digest(tire.to_dict()), "version": __version__}
-    write_json(folder / "summary.json", {**facts, **more, **hashed})
+    more = {
+        "limited_by": limited, "laps": laps, "notes": notes, "command": options.words,
+        "weights_hash": digest(tire.to_dict()), "version": __version__,
+    }  # fmt: skip
+    write_json(folder / "summary.json", {**facts, **more})
     figures = save_figures(folder, {"lap": lap_figure(profile), "lap_gg": lap_gg_figure(profile)})
     head = (
         "{}: {:.2f} s, {:.0f} m at {:.1f} to {:.1f} m/s; a_y up to {:.1f}, braking up to {:.1f} "

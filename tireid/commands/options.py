@@ -6,7 +6,8 @@ what is there is replaced, `--seed` chance, `--jobs` processes.
 """
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,7 @@ from models.recordings.reader import map_of, with_columns
 from models.vehicle import Vehicle, sedan
 from tireid.commands import DONE, NOT_VALID
 from tireid.learning import with_v_y
+from tireid.output import output_folder
 from tireid.progress import complain, say
 from tireid.verdicts import stored_warning
 
@@ -94,6 +96,11 @@ def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
     declared = f"folder to write ({folder or 'only where asked'})"
     add_options(parser, Path, {"--out DIR": (folder, declared)})
     add_force(parser)
+
+
+def folder_of(options: argparse.Namespace) -> AbstractContextManager[Path]:
+    """Return the folder of --out, as `output_folder` makes it."""
+    return output_folder(options.out, force=options.force)
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:
@@ -279,7 +286,15 @@ def _map_path(options: argparse.Namespace) -> Path | None:
 
 def given_map(options: argparse.Namespace) -> LogMap:
     """Return how logs are read by --log, and by the other options, which come first."""
-    declared = with_columns(map_of(_map_path(options)), _column_words(options.columns))
+    columns: dict[str, str] = {}
+    for pair in options.columns:
+        name, equals, column = pair.partition("=")
+        if not (name and equals and column):
+            raise ValueError(f"--columns wants NAME=COLUMN, not {pair!r}")
+        if name in columns:
+            raise ValueError(f"--columns gives {name} twice")
+        columns[name] = column
+    declared = with_columns(map_of(_map_path(options)), columns)
     if options.cut_holes:
         declared = replace(declared, holes=CUT)
     if options.mend_clock:
@@ -309,16 +324,3 @@ def read_log(
     for note in recording.notes:
         say(f"{recording.name}: {note}")
     return recording
-
-
-def _column_words(pairs: Sequence[str]) -> dict[str, str]:
-    """Return what is given of columns by the name that they are read as."""
-    columns = {}
-    for pair in pairs:
-        name, equals, column = pair.partition("=")
-        if not (name and equals and column):
-            raise ValueError(f"--columns wants NAME=COLUMN, not {pair!r}")
-        if name in columns:
-            raise ValueError(f"--columns gives {name} twice")
-        columns[name] = column
-    return columns

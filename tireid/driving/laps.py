@@ -13,7 +13,6 @@ from identifier.speed_limits import SpeedLimits, speed_limits
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
 from mpc.cars import BRAKES
-from mpc.loop.record import Drive
 from mpc.path import Path, SpeedProfile, speed_profile
 from mpc.path.speed import SHARE
 from tireid.driving.runs import ClosedLoop, drive
@@ -76,7 +75,9 @@ def drive_laps(
     for number in range(laps):
         profile = speed_profile(path, limits, share=share, **(planned or {"brakes": BRAKES}))
         loop = drive(path, vehicle, tire, speeds=profile, seed=seed + number, **driven)
-        learnt, seen = None, _seen(loop.drive)
+        n = min(round(_SEEN / PERIOD), len(loop.drive))
+        averaged = np.convolve(loop.drive.e_y_seen, np.full(n, 1.0 / n), mode="valid")
+        learnt, seen = None, float(np.abs(averaged).max())
         if loop.scores.completed:
             learnt = identify(loop.drive.recording(), vehicle, start=tire, check=False)
         yield Lap(tire, limits, share, profile, loop, seen, learnt)
@@ -87,9 +88,3 @@ def drive_laps(
             tire = learnt.tire
             newer = speed_limits(tire, confidence=confidence)
             limits = newer.at_most(_LIMITS_GROW * float(limits.a_y[0]))
-
-
-def _seen(driven: Drive) -> float:
-    """Return the largest deviation that the car saw, averaged over its noise [m]."""
-    n = min(round(_SEEN / PERIOD), len(driven))
-    return float(np.abs(np.convolve(driven.e_y_seen, np.full(n, 1.0 / n), mode="valid")).max())

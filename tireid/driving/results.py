@@ -1,6 +1,6 @@
 """The files of `tireid drive`: numbers as JSON, every signal as CSV, figures as PNG, the film."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -42,7 +42,17 @@ from tireid.figures.style import save_figures
 from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
 from tireid.output import axle_columns, finite, text_table, write_csv, write_json
 from tireid.progress import say
-from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report
+from tireid.report import (
+    Block,
+    Headline,
+    Images,
+    Picture,
+    Report,
+    Section,
+    Table,
+    printed,
+    write_report,
+)
 from tireid.reports.common import READ, drawings, origin
 
 NO_FILM = "none"
@@ -185,8 +195,7 @@ def score_rows(runs: Sequence[ClosedLoop]) -> list[list[str]]:
         failures = ", ".join(f"{n} {name}" for name, n in score.failures.items()) or "0"
         times = " / ".join(f"{score.solve_ms[key]:.3f}" for key in ("median", "p99", "max"))
         off = [f"{score.rms_e_y_m:.3f} m", f"{score.peak_e_y_m:.3f} m"]
-        completed = "yes" if score.completed else end
-        rows.append([run.label, *off, completed, failures, f"{times} ms"])
+        rows.append([run.label, *off, "yes" if score.completed else end, failures, f"{times} ms"])
     return rows
 
 
@@ -253,7 +262,7 @@ def _known_curves(
 
 
 def write_drive_report(
-    folder: Path, drives: Drives, figures: Mapping[str, bytes], film: str, command: str
+    folder: Path, drives: Drives, figures: Images, film: str, command: str
 ) -> None:
     """Write the report of drives along one path."""
     runs = drives.runs
@@ -315,7 +324,7 @@ def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
 
 
 def _drive_blocks(
-    folder: Path, runs: Sequence[ClosedLoop], figures: Mapping[str, bytes], film: str
+    folder: Path, runs: Sequence[ClosedLoop], figures: Images, film: str
 ) -> list[Block]:
     blocks: list[Block] = [Table("Scores of the drives.", SCORES, score_rows(runs))]
     if film != NO_FILM:
@@ -329,7 +338,7 @@ def _drive_blocks(
     return [*blocks, *drawings(figures, captions)]
 
 
-def known_blocks(runs: Sequence[ClosedLoop], figures: Mapping[str, bytes]) -> list[Block]:
+def known_blocks(runs: Sequence[ClosedLoop], figures: Images) -> list[Block]:
     """Return what trackers believed of the tires, and what they were given on the way."""
     captions = {
         "tires": "Forces of the first drive, and the tire models of the trackers.",
@@ -338,6 +347,5 @@ def known_blocks(runs: Sequence[ClosedLoop], figures: Mapping[str, bytes]) -> li
     blocks: list[Block] = [*drawings(figures, captions)]
     notes = [[run.label, f"{t:.2f}", printed(text)] for run in runs for t, text in run.drive.notes]
     if notes:
-        header = ["tires", "time [s]", "what"]
-        blocks.append(Table("Decisions along the way.", header, notes))
+        blocks.append(Table("Decisions along the way.", ["tires", "time [s]", "what"], notes))
     return blocks

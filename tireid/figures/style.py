@@ -49,12 +49,13 @@ BLACK, GREY, BLUE, ORANGE = "#000000", "#767676", "#0072B2", "#D55E00"
 GREEN, PURPLE, SKY, AMBER = "#009E73", "#AA4499", "#56B4E9", "#E69F00"
 SERIES = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, GREY)
 
-TRUTH: Mapping[str, Any] = {"color": BLACK, "linewidth": 1.5, "label": "truth"}
-ONLINE: Mapping[str, Any] = {"color": BLUE, "linewidth": 0.9, "label": "online"}
-FROZEN: Mapping[str, Any] = {
+Look = Mapping[str, Any]  # of a curve, as words of matplotlib
+TRUTH: Look = {"color": BLACK, "linewidth": 1.5, "label": "truth"}
+ONLINE: Look = {"color": BLUE, "linewidth": 0.9, "label": "online"}
+FROZEN: Look = {
     "color": ORANGE, "linestyle": (0, (3.5, 1.2)), "linewidth": 1.1, "label": "frozen weights",
 }  # fmt: skip
-LINEAR: Mapping[str, Any] = {
+LINEAR: Look = {
     "color": GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.2, "label": "linear tire",
 }  # fmt: skip
 
@@ -233,7 +234,7 @@ def label_time(axes: Axes, t: Array) -> None:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value - zero:g}"))
 
 
-def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
+def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool = False) -> None:
     """Draw the freeze as a line and, where the replay goes on, shade what it predicts.
 
     The limits of the time axis must be set before.
