@@ -51,17 +51,11 @@ def build_parser(words: Sequence[str]) -> _Parser:
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(title="commands", dest="command", metavar="COMMAND")
     named = next((word for word in words if not word.startswith("-")), None)
-    for name, text in COMMANDS.items():
+    for name in (*COMMANDS, *(() if named in COMMANDS else added())):
         if name == named:
             add_command(name, commands)
         else:
-            commands.add_parser(name, help=text)
-    if named not in COMMANDS:
-        for name in added():
-            if name == named:
-                add_command(name, commands)
-            else:
-                commands.add_parser(name, help=summary(name))
+            commands.add_parser(name, help=COMMANDS.get(name) or summary(name))
     return parser
 
 

@@ -16,7 +16,7 @@ from models.recordings.reader import repair_text
 from models.vehicle import Vehicle
 from tireid import report as page
 from tireid.output import text_table
-from tireid.reports.common import REPORT, drawings, origin
+from tireid.reports.common import drawings, origin
 
 _HEADER = ("found", "size", "confidence", "repair")
 NAMES = {  # of findings by their code, where the code is not the word
@@ -85,12 +85,11 @@ def _size_text(finding: Finding) -> str:
 
 
 def diagnosis_text(diagnosis: Diagnosis, *, unobservable: bool = True) -> str:
-    count = len(diagnosis.findings)
-    if count:
-        head = f"doctor: {count} finding{'s' * (count > 1)}"
-        table = text_table([list(_HEADER), *_finding_rows(diagnosis)], "<<<<")
-        return "\n".join([head, table, *diagnosis.lines(unobservable=unobservable)])
-    return "\n".join(["doctor: nothing found", *diagnosis.lines(unobservable=unobservable)])
+    count, said = len(diagnosis.findings), diagnosis.lines(unobservable=unobservable)
+    if count == 0:
+        return "\n".join(["doctor: nothing found", *said])
+    table = text_table([_HEADER, *_finding_rows(diagnosis)])
+    return "\n".join([f"doctor: {count} finding{'s' * (count > 1)}", table, *said])
 
 
 def _tone_of(diagnosis: Diagnosis) -> page.Tone:
@@ -113,7 +112,7 @@ def diagnosis_section(diagnosis: Diagnosis, heading: str = "Doctor") -> page.Sec
         )
     ]
     if rows:
-        blocks.append(page.Table("What was found.", list(_HEADER), rows))
+        blocks.append(page.Table("What was found.", _HEADER, rows))
         blocks += [page.printed(one.text) for one in diagnosis.findings]
     else:
         blocks.append("Nothing was found.")
@@ -144,17 +143,20 @@ def with_doctor(verdict: Verdict, diagnosis: Diagnosis, repair: Repair) -> Verdi
     A unit, a sign, a ratio or a factor of v_x that is surely wrong refuses the answer; another sure
     size is noted. Nothing that `repair` took out of the log speaks against it.
     """
-    left = [one for one in diagnosis.findings if one.sure or one.code in NOT_MEASURED]
-    left = [] if repair else left
-    said = [
-        Objection(
-            "doctor",
-            None,
-            f"doctor: {one.text}",
-            one.code in _GROSS or (one.code, one.channel) == _OF_ALL_FORCES,
-        )
-        for one in left
-    ]
+    said = (
+        []
+        if repair
+        else [
+            Objection(
+                "doctor",
+                None,
+                f"doctor: {one.text}",
+                one.code in _GROSS or (one.code, one.channel) == _OF_ALL_FORCES,
+            )
+            for one in diagnosis.findings
+            if one.sure or one.code in NOT_MEASURED
+        ]
+    )
     ordered = sorted([*verdict.findings, *said], key=lambda one: not one.refuses)
     return replace(verdict, findings=tuple(ordered)) if said else verdict
 
@@ -201,7 +203,7 @@ def write_doctor_report(
         warnings=diagnosis_warnings(diagnosis),
         sections=[*sections, origin(command, vehicle, [recording])],
     )
-    page.write_report(folder / REPORT, report)
+    page.write_report(folder, report)
 
 
 def write_repair(path: Path, given: LogMap, diagnosis: Diagnosis) -> None:

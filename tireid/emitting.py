@@ -19,6 +19,7 @@ from tireid.output import OutputError, output_folder, require_free
 from tireid.run import Run
 
 WANTED = "--tir FILE, --slipx DIR, --ggv FILE, --steady FILE, --understeer"
+_Where = str | PathLike[str] | None
 
 
 class Emitted(NamedTuple):
@@ -31,10 +32,10 @@ class Emitted(NamedTuple):
 def emit(
     source: Run | TireModel,
     *,
-    tir: str | PathLike[str] | None = None,
-    slipx: str | PathLike[str] | None = None,
-    ggv: str | PathLike[str] | None = None,
-    steady: str | PathLike[str] | None = None,
+    tir: _Where = None,
+    slipx: _Where = None,
+    ggv: _Where = None,
+    steady: _Where = None,
     understeer: bool | str | PathLike[str] = False,
     overwrite: bool = False,
 ) -> Emitted:

@@ -36,8 +36,7 @@ def exchange(one: Path, other: Path) -> bool:
     except (OSError, AttributeError, TypeError):  # on other than Linux
         return False
     names = os.fsencode(one), os.fsencode(other)
-    flag = ctypes.c_uint(_RENAME_EXCHANGE)
-    if rename(_AT_FDCWD, names[0], _AT_FDCWD, names[1], flag) == 0:
+    if rename(_AT_FDCWD, names[0], _AT_FDCWD, names[1], ctypes.c_uint(_RENAME_EXCHANGE)) == 0:
         return True
     number = ctypes.get_errno()
     if number in _CANNOT:

@@ -142,7 +142,8 @@ def export(
             frozen_start(package)  # likewise
         costs = measure(package, progress.begin(_COSTS))
         place = scratch / _IDENTIFIER if mpc else scratch
-        write_files(place, package, figures_text(costs), costs)
+        texts = {**package.files, "README.md": readme(package, figures_text(costs))}
+        _write_package(place, name, texts, costs)
         notes = []
         if mpc:
             progress.begin(_TRACKING)
@@ -152,15 +153,15 @@ def export(
             from identifier.export.fmu import export_fmu
 
             for version in (2, 3):
-                path = scratch / f"{name}_fmi{version}.fmu"
-                export_fmu(package.specialized, path, version)
+                export_fmu(package.specialized, scratch / f"{name}_fmi{version}.fmu", version)
                 progress.step(2)
     return Exported(folder=target, package=package, costs=tuple(costs), notes=tuple(notes))
 
 
-def write_files(folder: Path, package: Package, figures: str, costs: Sequence[Cost] = ()) -> None:
-    manifest = f"{package.specialized.name}.json"
-    texts = {**package.files, "README.md": readme(package, figures)}
+def _write_package(
+    folder: Path, name: str, texts: Mapping[str, str], costs: Sequence[Cost]
+) -> None:
+    manifest = f"{name}.json"
     _write_texts(folder, {**texts, manifest: with_figures(texts[manifest], costs)})
 
 
@@ -184,11 +185,9 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
         raise ValueError(f"--mpc: {error}") from error
     tracker = pair.tracker
     costs, times = measure_mpc(tracker), time_here(tracker)
-    manifest = f"{tracker.name}.json"
     texts = {**tracker.files, "README.md": mpc_readme(tracker, mpc_figures_text(costs, times))}
-    texts[manifest] = with_figures(texts[manifest], costs)
     _write_texts(folder, pair.files)
-    _write_texts(folder / _TRACKER, texts)
+    _write_package(folder / _TRACKER, tracker.name, texts, costs)
     return [
         *(f"{one.processor}, {one.precision}: {tracker.name} takes {one.words}" for one in costs),
         f"this machine: {tracker.name} takes {times.median:.0f} us a step, hash "

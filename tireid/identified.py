@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from codegen.arrays import Array, blocks, thinning
+from codegen.arrays import blocks, thinning
 from codegen.escape import visible
 from identifier.compare.course import side_slip
 from identifier.frozen import vehicle_numbers
@@ -35,6 +35,7 @@ from tireid.figures.style import save_figures
 from tireid.figures.tires import learnt_axles_figure, slip_figure
 from tireid.learning import with_v_y
 from tireid.output import (
+    Columns,
     axle_columns,
     force_columns,
     text_table,
@@ -100,15 +101,7 @@ class Results(NamedTuple):
         for t, (key, model) in zip(times, models.items(), strict=True):
             frozen[key] = {learnt.recording.name: reproduce(learnt, t)}
             frozen[key] |= {run.recording.name: replay(model, run) for run in (*parts, *runs[1:])}
-        return cls(
-            method=method,
-            runs=runs,
-            models=models,
-            frozen=frozen,
-            verdict=verdict,
-            evaluated=evaluated,
-            parts=parts,
-        )
+        return cls(method, runs, models, frozen, verdict, evaluated, parts)
 
     @property
     def model(self) -> TireModel:
@@ -163,7 +156,6 @@ class Results(NamedTuple):
                 for key, replays in self.frozen.items()
             }
 
-        split = of_frozen("reproduction")
         sensors = {name: day.to_dict() for name, day in named_days(self.model, self.drives)}
         return {
             "verdict": self.verdict.to_dict(),
@@ -176,7 +168,7 @@ class Results(NamedTuple):
                 "frozen_against_online": of_frozen("against_online"),
                 "reproducibility": {
                     key: {n: one for n, one in by_name.items() if one}
-                    for key, by_name in split.items()
+                    for key, by_name in of_frozen("reproduction").items()
                 },
             },
             "law": self.method,
@@ -198,10 +190,8 @@ class Results(NamedTuple):
         for key, model in self.models.items():
             last = model is self.model
             end = "" if last else f"_{key}s"
-            valid = self.verdict.valid if last else None
-            model.save(folder / f"weights{end}.json", valid=valid)
-            columns = _curve_columns(model, [run.recording for run in self.runs])
-            write_csv(folder / f"curve{end}.csv", columns)
+            model.save(folder / f"weights{end}.json", valid=self.verdict.valid if last else None)
+            write_csv(folder / f"curve{end}.csv", _curve_columns(model, self.runs))
         learnt, progress = self.runs[0], progress or Progress("curves")
         for k, run in enumerate(self.runs):
             end = "" if run is learnt else f"_{file_name(run.recording)}"
@@ -223,7 +213,7 @@ class Results(NamedTuple):
         say("drawing figures")
         return save_figures(folder, self._figures())
 
-    def _force_columns(self, run: History, part: slice) -> dict[str, Array]:
+    def _force_columns(self, run: History, part: slice) -> Columns:
         """Return the columns of forces.csv: slip angles, true, online and frozen forces."""
         recording, car, outputs = run.recording, run.vehicle, run.outputs
         forces = {"true": recording.axle_force, "online": run.axle_force if run.online else None}
@@ -262,9 +252,9 @@ class Results(NamedTuple):
         if learnt.tracks_over(next(learnt.blocks())):
             figures["learnt"] = learnt_axles_figure(learnt, list(replayed))
         for run in self.runs[1:]:
-            beside = run if run.online else None
-            drawn = prediction_figure(self.replays[run.recording.name], beside)
-            figures[f"replay_{file_name(run.recording)}"] = drawn
+            figures[f"replay_{file_name(run.recording)}"] = prediction_figure(
+                self.replays[run.recording.name], run if run.online else None
+            )
         return figures
 
 
@@ -286,7 +276,7 @@ def error_cells(error: AxleRmse | None, size: AxleRmse | None) -> tuple[str, str
     return front, rear
 
 
-def _weight_columns(learnt: History) -> Iterator[dict[str, Array]]:
+def _weight_columns(learnt: History) -> Iterator[Columns]:
     """Yield the columns of weights.csv: of a long run a row for each of at most `LONG` samples."""
     each = thinning(len(learnt.recording))
     for block in learnt.blocks():
@@ -299,18 +289,17 @@ def _weight_columns(learnt: History) -> Iterator[dict[str, Array]]:
         yield weights
 
 
-def _curve_columns(model: TireModel, recordings: Sequence[Recording]) -> dict[str, Array]:
+def _curve_columns(model: TireModel, runs: Sequence[History]) -> Columns:
     """Return curve.csv: the steady force of each axle over slip, and whether it is known there."""
     car, known = model.vehicle, model.known_slip
     reach = [0.0 if known is None else float(known.max())]
-    for one in recordings:
+    for one in (run.recording for run in runs):
         for part in blocks(len(one)):
             slip = one.alpha(car.l_f, car.l_r, part)[one.v_x[part] >= model.min_speed]
             reach.append(float(np.abs(slip).max(initial=0.0)))
     end = min(_FARTHER * max(reach) or 0.1, 0.5)
     slip = np.linspace(-end, end, _CURVE_POINTS)
-    force = model.force(slip)
-    columns = {"slip_rad": slip, **axle_columns("Fy{}_N", force)}
+    columns = {"slip_rad": slip, **axle_columns("Fy{}_N", model.force(slip))}
     if known is not None:
         # A point of the curve is the known slip itself, up to rounding.
         inside = (np.abs(slip)[:, None] <= known * (1.0 + 1e-9)).astype(np.float64)

@@ -78,8 +78,7 @@ def identify(
         check_against_vehicle(recording, vehicle)
         for finding in diagnose(recording, vehicle).findings:
             if finding.matters:
-                said = {"finding": finding}
-                log.warning("%s: %s", recording.name, finding.text, extra=said)
+                log.warning("%s: %s", recording.name, finding.text, extra={"finding": finding})
     counted_samples(recording, design.min_speed)  # refuses a car that never drives
     history = run_over(recording, vehicle, design, start, progress=progress)
     for note in history.recording.notes[len(recording.notes) :]:  # of a poor v_y

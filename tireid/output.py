@@ -29,6 +29,7 @@ from tireid.exchange import ClaimedError, claim, exchange
 from tireid.progress import say
 
 MARKER = ".tireid"  # in every folder that we write: what we put there
+Columns = dict[str, Array]  # by their name with its unit
 _FORMAT = "tireid output 1"
 _SPARE_NAMES = 1000  # results-2, results-3, ...
 
@@ -97,8 +98,7 @@ def _named_as_final(new: Path, target: Path) -> Iterator[None]:
         path = Path(os.fsdecode(error.filename)) if isinstance(error.filename, str | bytes) else new
         if new not in path.parents:
             raise
-        at = target / path.relative_to(new)
-        raise OSError(error.errno, error.strerror, str(at)) from error
+        raise OSError(error.errno, error.strerror, str(target / path.relative_to(new))) from error
 
 
 def _require_replaceable(target: Path, final: Path, force: bool) -> None:
@@ -292,14 +292,14 @@ def write_csv(path: Path, columns: Mapping[str, Array]) -> None:
     write_long_csv(path, [columns])
 
 
-def axle_columns(pattern: str, values: Array) -> dict[str, Array]:
+def axle_columns(pattern: str, values: Array) -> Columns:
     """Return columns of both axles (n, 2) by a name in which {} is f in front and r at the rear."""
     return {pattern.format(axle): values[:, i] for i, axle in enumerate("fr")}
 
 
-def force_columns(forces: Mapping[str, Array | None]) -> dict[str, Array]:
+def force_columns(forces: Mapping[str, Array | None]) -> Columns:
     """Return the columns of axle forces (n, 2) [N], of those that there are of some."""
-    columns: dict[str, Array] = {}
+    columns: Columns = {}
     for name, force in forces.items():
         if force is not None:
             columns |= axle_columns(f"Fy{{}}_{name}_N", force)

@@ -23,12 +23,6 @@ class _Line(logging.Handler):
         say(record.getMessage())
 
 
-def _escaped(text: str) -> str:
-    from codegen.escape import terminal  # with all of codegen: what says nothing does not need it
-
-    return terminal(text)
-
-
 def say(text: str) -> None:
     """Print one line for the person who waits."""
     from codegen.escape import visible
@@ -76,7 +70,10 @@ def _write(stream: TextIO | None, text: str) -> None:
     if stream is None:  # closed before we began
         return
     try:
-        stream.write(_escaped(text) if text else "")
+        if text:
+            from codegen.escape import terminal  # all of codegen: silence does not need it
+
+            stream.write(terminal(text))
         stream.flush()
     except OSError:
         with suppress(OSError, ValueError):  # ValueError: it has no file behind it
@@ -95,18 +92,6 @@ def listen_to_library() -> None:
     log.propagate = False
     if not any(isinstance(handler, _Line) for handler in log.handlers):
         log.addHandler(_Line())
-
-
-class Stopwatch:
-    """Time since it was made."""
-
-    def __init__(self) -> None:
-        self._start = time.perf_counter()
-
-    @property
-    def seconds(self) -> float:
-        """Elapsed time [s]."""
-        return time.perf_counter() - self._start
 
 
 _QUIET, _EVERY = 2.0, 5.0  # s: before the first line, between lines
@@ -130,6 +115,11 @@ class Progress:
         self._begun = time.perf_counter()
         self._said = self._begun + _QUIET - _EVERY
         self.begin(next(iter(self._parts)))
+
+    @property
+    def seconds(self) -> float:
+        """Time since it was made [s]."""
+        return time.perf_counter() - self._begun
 
     def begin(self, part: str) -> "Progress":
         """Go on with a part; return what takes its share."""

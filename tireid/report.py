@@ -7,7 +7,7 @@ inline, without scripts or links to other files, so that it can be mailed, archi
 import math
 import re
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -38,6 +38,7 @@ class Marked(NamedTuple):
 
 
 Cell = str | float | Marked | None
+Images = Mapping[str, bytes]  # figures, by the name of their file
 
 # What texts say in ASCII, as it is printed in a book.
 _LETTERS = {
@@ -144,12 +145,9 @@ class Report(NamedTuple):
     warnings: Sequence[str | Marked] = ()
 
 
-_FINE = "No warnings."
-
-
 def report_html(report: Report) -> str:
     """Return a report as one HTML page; tables and figures are numbered through."""
-    title, sections = report.title, report.sections
+    title = html(report.title)
     tables, figures = count(1), count(1)
 
     def written(block: Block) -> str:
@@ -161,7 +159,7 @@ def report_html(report: Report) -> str:
 
     lead = [written(block) for block in report.lead]
     entries, parts = [], []
-    for number, section in enumerate(sections, start=1):
+    for number, section in enumerate(report.sections, start=1):
         heading = _inline(section.heading)
         entries.append(f'<li><a href="#section-{number}">{heading}</a></li>')
         named = f'<h2 id="section-{number}">{number}. {heading}</h2>'
@@ -175,20 +173,20 @@ def report_html(report: Report) -> str:
         "<head>",
         '<meta charset="utf-8">',
         '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{html(title)}</title>",
+        f"<title>{title}</title>",
         f"<style>\n{_STYLE}</style>",
         "</head>",
         "<body>",
-        f"<h1>{html(title)}</h1>",
+        f"<h1>{title}</h1>",
+        f'<p class="summary">{_inline(report.summary)}</p>',
     ]
-    head.append(f'<p class="summary">{_inline(report.summary)}</p>')
     head += _numbers(report.numbers) + lead + _warnings(report.warnings)
     contents = ['<nav aria-label="Contents">', "<ol>", *entries, "</ol>", "</nav>"]
     return "\n".join([*head, *contents, *parts, "</body>", "</html>"]) + "\n"
 
 
-def write_report(path: Path, report: Report) -> None:
-    write_atomically(path, report_html(report))
+def write_report(folder: Path, report: Report) -> None:
+    write_atomically(folder / "report.html", report_html(report))
 
 
 def _inline(text: str) -> str:
@@ -222,7 +220,7 @@ def _marked(one: Marked) -> str:
 
 def _warnings(warnings: Sequence[str | Marked]) -> list[str]:
     if not warnings:
-        return [f'<p class="fine">{_FINE}</p>']
+        return ['<p class="fine">No warnings.</p>']
     marked = [one if isinstance(one, Marked) else Marked(one) for one in warnings]
     refused = any(one.tone == "bad" for one in marked)
     lines = [f"<li{_class(one.tone)}>{_inline(one.text)}</li>" for one in marked]

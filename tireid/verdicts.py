@@ -16,15 +16,15 @@ from tireid.output import text_table
 from tireid.progress import complain
 from tireid.report import Block, Cell, Headline, Marked, Section, Table, Tone, printed
 
-HEADER = ("", "front", "is", "rear", "is")
+Verdicts = Mapping[str, Verdict]  # by the name of the drive
+_HEADER = ("", "front", "is", "rear", "is")
 
 
 def _numbers_by_title(verdict: Verdict) -> dict[str, dict[Axle, Number]]:
     """Return the numbers of a verdict by title with the unit that is printed, and by axle."""
     rows: dict[str, dict[Axle, Number]] = {}
     for number in verdict.numbers:
-        title = f"{number.title} [{printed_unit(number.unit)}]"
-        rows.setdefault(title, {})[number.axle] = number
+        rows.setdefault(f"{number.title} [{printed_unit(number.unit)}]", {})[number.axle] = number
     return rows
 
 
@@ -56,11 +56,11 @@ def verdict_text(verdict: Verdict, *, numbers: bool = True) -> str:
         ]
         for title, by_axle in _numbers_by_title(verdict).items()
     ]
-    table = [text_table([list(HEADER), *rows])] if numbers else []
+    table = [text_table([_HEADER, *rows])] if numbers else []
     return "\n".join([*table, *verdict.lines])
 
 
-def verdicts_text(verdicts: Mapping[str, Verdict], what: str) -> str:
+def verdicts_text(verdicts: Verdicts, what: str) -> str:
     """Return verdicts on several drives, by the name of each, as lines of text.
 
     what : was done on each of them.
@@ -100,8 +100,7 @@ def sensors_section(model: TireModel, recordings: Iterable[Recording]) -> list[S
         [name, *(day.words.get(title, "") for title in titles)] for name, day in days
     ]
     caption = "Errors that were found from its motion with the tires held, and taken off."
-    table = Table(caption, ["log", *titles], rows)
-    return [Section("Sensors of each log", [table])]
+    return [Section("Sensors of each log", [Table(caption, ["log", *titles], rows)])]
 
 
 def verdict_headline(verdict: Verdict, others: Sequence[str | Marked] = ()) -> Headline:
@@ -151,9 +150,7 @@ def number_headlines(verdict: Verdict) -> list[Headline]:
     ]
 
 
-def verdicts_headline(
-    verdicts: Mapping[str, Verdict], meaning: str, fine: Tone = ""
-) -> list[Headline]:
+def verdicts_headline(verdicts: Verdicts, meaning: str, fine: Tone = "") -> list[Headline]:
     """Return how many of several verdicts are valid, as a number of a report, if there are any.
 
     fine : what it is worth where all are.
@@ -180,7 +177,7 @@ def verdict_warnings(verdict: Verdict, prefix: str = "") -> list[str | Marked]:
     ]
 
 
-def verdicts_warnings(verdicts: Mapping[str, Verdict], prefix: str) -> list[str | Marked]:
+def verdicts_warnings(verdicts: Verdicts, prefix: str) -> list[str | Marked]:
     """Return the findings of verdicts on several drives, each behind the name of the drive.
 
     prefix : in which {} stands for the name.
@@ -207,18 +204,10 @@ def verdict_section(verdict: Verdict) -> Section:
         ),
         *(printed(line) for line in lines if line),
         Table(
-            "Estimates. Grey was not identified; struck through is not valid.",
-            ("", *AXLES),
-            rows,
+            "Estimates. Grey was not identified; struck through is not valid.", ("", *AXLES), rows
         ),
     ]
     return Section("Verdict", blocks)
-
-
-def warn_of_stored(path: Path | str) -> None:
-    """Say on standard error where a stored model was found not valid when it was learnt."""
-    for said in stored_warning(path):
-        complain(f"warning: {said.text}")
 
 
 def stored_warning(path: Path | str) -> list[Marked]:

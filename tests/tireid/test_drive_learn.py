@@ -42,9 +42,9 @@ def measure(state, rng):
     return Measured(*(values.get(name, 0.0) for name in Measured._fields))
 
 
-def learnt_on(car, **words):
+def learnt_on(car):
     sensors = SimpleNamespace(measure=measure)
-    return learning_drive(car, sensors, np.random.default_rng(1), seed=4, **words)
+    return learning_drive(car, sensors, np.random.default_rng(1), seed=4)
 
 
 @pytest.mark.parametrize("grip", [3.0, 9.0])
@@ -64,26 +64,19 @@ def test_steering_grows_until_more_of_it_turns_the_car_no_more_and_is_held_there
     assert np.abs(np.diff(angles)).max() / PERIOD < 1.0
 
 
-def test_steering_grows_no_further_than_to_the_lateral_acceleration_that_is_enough():
-    car = Recorder()
-    learnt_on(car, most=0.65 * G)
-    turned = np.abs(car.angles).max() * 20.0**2 / CAR.wheelbase
-    assert 0.55 * G < turned < 0.7 * G
-
-
 def test_half_a_second_before_a_spin_is_not_learnt_from():
     recording = learnt_on(Recorder(9.0, spins_at=12.0))
     assert recording.t[-1] == pytest.approx(11.5, abs=0.03)
 
 
 @pytest.mark.parametrize("mu", [0.3, 1.0])
-def test_a_prudent_drive_is_whole_and_far_from_a_spin(mu):
+def test_a_drive_is_whole_and_far_from_a_spin(mu):
     car = DoubleTrackCar(CAR, friction=Friction(scale=mu))
     rng = np.random.default_rng(1)
-    recording = learning_drive(car, inertial_unit(), rng, seed=0, most=0.65 * G)
+    recording = learning_drive(car, inertial_unit(), rng, seed=0)
     assert recording.duration == pytest.approx(40.0, abs=0.02)
     a_y = np.abs(recording.axle_force.sum(axis=1)).max() / CAR.mass
-    assert (0.25 if mu == 0.3 else 0.55) * G < a_y < 0.75 * G
+    assert (0.25 if mu == 0.3 else 0.8) * G < a_y < 0.95 * G
     assert np.abs(recording.v_y / recording.v_x).max() < np.radians(8.0)
 
 

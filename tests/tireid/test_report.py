@@ -130,7 +130,7 @@ def test_what_something_is_worth_is_seen():
 
 def test_report_replaces_the_old_one_whole(tmp_path, monkeypatch):
     path = tmp_path / "report.html"
-    write_report(path, Report(title="First", sections=SECTIONS))
+    write_report(tmp_path, Report(title="First", sections=SECTIONS))
     first = path.read_text(encoding="utf-8")
     assert first == page_of("First", SECTIONS)
 
@@ -139,7 +139,7 @@ def test_report_replaces_the_old_one_whole(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Path, "replace", fail)
     with pytest.raises(OSError, match="disk full"):
-        write_report(path, Report(title="Second", sections=SECTIONS))
+        write_report(tmp_path, Report(title="Second", sections=SECTIONS))
     assert path.read_text(encoding="utf-8") == first
     assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
 

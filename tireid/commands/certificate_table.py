@@ -11,22 +11,24 @@ from identifier.setup import force_unit_name
 from models.vehicle import Vehicle
 from tireid.output import text_table
 
-HEADER = ("property", "value", "limit", "margin", "")
-
 
 def certificate_text(certificate: Certificate, force_unit: float) -> str:
     """Return the certificate as lines of text, ending with advice and the verdict.
 
     force_unit : the unit U of the design [N].
     """
-    rows = [list(HEADER)]
+    rows = [["property", "value", "limit", "margin", ""]]
     for entry in certificate.properties:
         numbers = map(number, (entry.value, entry.limit, entry.margin))
         status = entry.status if entry.limit is not None else "stated"
         rows.append([f"{entry.title} [{unit_text(entry.unit, force_unit)}]", *numbers, status])
     lines = [text_table(rows, "<>>><")]
     lines += [f"{e.status}: {e.title}: {e.advice}" for e in advised(certificate)]
-    lines += [f"note: {note}" for note in notes(certificate)]
+    titles: dict[str, list[str]] = {}  # of values that are only stated, by what is said of them
+    for entry in certificate.properties:
+        for remark in entry.advice.split("; ") if entry.limit is None and entry.advice else ():
+            titles.setdefault(remark, []).append(entry.title)
+    lines += [f"note: {remark} ({' | '.join(about)})" for remark, about in titles.items()]
     return "\n".join([*lines, f"verdict: {certificate.verdict}"])
 
 
@@ -57,16 +59,6 @@ def method_text(name: str, certificate: Certificate, vehicle: Vehicle, driving: 
 
 def advised(certificate: Certificate) -> list[Property]:
     return [e for e in certificate.properties if e.advice and e.status != "pass"]
-
-
-def notes(certificate: Certificate) -> list[str]:
-    """Return what is to be said of values that are only stated, each remark once."""
-    titles: dict[str, list[str]] = {}
-    for entry in certificate.properties:
-        if entry.limit is None and entry.advice:
-            for remark in entry.advice.split("; "):
-                titles.setdefault(remark, []).append(entry.title)
-    return [f"{remark} ({' | '.join(about)})" for remark, about in titles.items()]
 
 
 def verdict_line(certificate: Certificate) -> str:

@@ -29,6 +29,7 @@ from tireid.progress import say, tell
 _CUT_BY_MAP = "rejected without --cut-holes or a map with that key, as of --write"
 _MOST_NUMBERS = 5e7  # that are read for ranges; of a larger log only those of likely channels
 _LONGEST_NAME = 48  # letters of a channel in the table
+_Signals = Mapping[str, Signal]
 _NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 
 
@@ -59,8 +60,7 @@ def run(options: argparse.Namespace) -> int:
     headings, turned, world = choice.of_the_car(log, log.headings(), chosen)
     proposal = propose(log, headings, chosen)
     by_map = choice.as_listed(log, log_map.signals, names)
-    standard = choice.standard_signals(log, [one.name for one in headings])
-    sure = {**standard, **turned, **by_map}
+    sure = {**choice.standard_signals(log, [one.name for one in headings]), **turned, **by_map}
     signals = choice.likely_signals(sure, proposal)
     signals = choice.with_wheels(signals, proposal)
     hand, given = proposal.guesses.get("delta_f"), signals.get("delta_f")
@@ -109,7 +109,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _wheels(
-    log: LogFile, signals: Mapping[str, Signal], log_map: LogMap, run: str | None
+    log: LogFile, signals: _Signals, log_map: LogMap, run: str | None
 ) -> tuple[str, LogMap, bool]:
     """Return what is said of wheels, the map with what is learnt, and whether v_x is known."""
     plain = replace(log_map, signals=signals)
@@ -141,7 +141,7 @@ def _head(log: LogFile, run: str | None) -> list[str]:
 
 
 def _seen(
-    log: LogFile, listed: Sequence[Listed], signals: Mapping[str, Signal], run: str | None
+    log: LogFile, listed: Sequence[Listed], signals: _Signals, run: str | None
 ) -> dict[str, Channel]:
     names = [one.name for one in listed]
     if sum(one.samples for one in listed) > _MOST_NUMBERS:
@@ -153,7 +153,7 @@ def _seen(
 def _channels_text(
     listed: Sequence[Listed],
     seen: Mapping[str, Channel],
-    signals: Mapping[str, Signal],
+    signals: _Signals,
     proposal: Proposal,
     known: frozenset[str],
 ) -> str:
@@ -174,9 +174,7 @@ def _channels_text(
     return text_table(rows, "<<>>>><")
 
 
-def _meaning(
-    listed: Listed, signals: Mapping[str, Signal], proposal: Proposal, known: frozenset[str]
-) -> str:
+def _meaning(listed: Listed, signals: _Signals, proposal: Proposal, known: frozenset[str]) -> str:
     """Return what a channel is taken for, or may be, in which unit where the file gives none."""
     channel = listed.name
     for name, signal in signals.items():
@@ -200,7 +198,7 @@ def _meaning(
     return ""
 
 
-def _holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> str:
+def _holes_text(seen: Mapping[str, Channel], signals: _Signals) -> str:
     said = []
     for name, signal in signals.items():
         for channel in (seen[one] for one in signal.channel if one in seen):
@@ -214,9 +212,7 @@ def _holes_text(seen: Mapping[str, Channel], signals: Mapping[str, Signal]) -> s
     return "\n".join(said)
 
 
-def _missing_text(
-    log: str, missing: Sequence[str], proposal: Proposal, signals: Mapping[str, Signal]
-) -> str:
+def _missing_text(log: str, missing: Sequence[str], proposal: Proposal, signals: _Signals) -> str:
     if not missing:
         there = given_by(signals)
         needed = [name for name in NEEDED if name in there]

@@ -26,7 +26,7 @@ from tireid.commands.certificate_table import certificate_text, method_text, uni
 from tireid.commands.demo_story import drive_to_learn
 from tireid.figures.paper import error_figure, locus_figure
 from tireid.figures.style import paper_design, save_figures
-from tireid.output import output_folder, write_json
+from tireid.output import write_json
 from tireid.progress import say, tell
 
 _BOUNDS = {
@@ -116,7 +116,7 @@ def run(options: argparse.Namespace) -> int:
     }
     with ExitStack() as stack:  # where a part fails, none is there
         if options.out is not None:
-            folder = stack.enter_context(output_folder(options.out, force=options.force))
+            folder = stack.enter_context(shared.folder_of(options))
             write_json(folder / "certificate.json", numbers)
             write_file(folder / "certificate.txt", f"{text}\n")
             if paper is not None:
@@ -140,7 +140,6 @@ def _overrides(options: argparse.Namespace) -> dict[str, float]:
 
 
 def _require_sense(options: argparse.Namespace) -> None:
-    shared.method_is_given(options)
     for field, value in _overrides(options).items():
         noise = field.startswith("noise")
         if not (0.0 < value < math.inf or (noise and value == 0.0)):

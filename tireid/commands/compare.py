@@ -15,8 +15,7 @@ from tireid.commands import DONE
 from tireid.commands import compare_results as results
 from tireid.commands import options as shared
 from tireid.commands.demo_story import plant_recordings
-from tireid.output import output_folder
-from tireid.progress import Progress, Stopwatch, say, tell
+from tireid.progress import Progress, say, tell
 from tireid.verdicts import verdicts_text
 
 _FEW_PAIRS = 4  # of recordings learnt on and replayed, all of which are printed
@@ -56,10 +55,9 @@ def run(options: argparse.Namespace) -> int:
         say(f"without {', '.join(absent)}, which are not installed: {INSTALL}")
     if options.logs and options.vehicle is None:
         raise ValueError("--vehicle FILE is needed with a LOG: the car that drove it")
-    watch = Stopwatch()
     vehicle = shared.read_vehicle(options)
     parts = {"methods": 9.0, "step times, tables and figures": 1.0}
-    with output_folder(options.out, force=options.force) as folder:
+    with shared.folder_of(options) as folder:
         work = Progress("compare", parts, long=True)
         recordings = [shared.read_log(log, vehicle, options) for log in options.logs]
         if not recordings:
@@ -99,5 +97,5 @@ def run(options: argparse.Namespace) -> int:
             tables.append(results.pair_tables(comparison))
     tables += [verdicts_text(verdicts, "default identified on")] if verdicts else []
     tell("\n".join(tables))
-    say(f"wrote {options.out}/ in {watch.seconds:.0f} s")
+    say(f"wrote {options.out}/ in {work.seconds:.0f} s")
     return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)

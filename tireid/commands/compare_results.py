@@ -11,7 +11,7 @@ Errors are {"front", "rear"} in N; null stands for what diverged or is not there
 """
 
 import csv
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import astuple
 from itertools import product
 from pathlib import Path
@@ -25,16 +25,15 @@ from identifier.compare.study import Comparison, ranking
 from identifier.frozen import vehicle_numbers
 from identifier.methods import make_method, methods
 from identifier.reproducibility import AxleRmse, freeze_key
-from identifier.verdict import Verdict
 from tireid import __version__
 from tireid.figures.compare import methods_figure
 from tireid.figures.side_slip import side_slip_figure
 from tireid.figures.style import save_figures
 from tireid.output import text_table, write_json
 from tireid.progress import say
-from tireid.report import Block, Headline, Report, Section, Table, write_report
-from tireid.reports.common import REPORT, drawings, origin
-from tireid.verdicts import verdicts_headline, verdicts_warnings
+from tireid.report import Block, Headline, Images, Report, Section, Table, write_report
+from tireid.reports.common import drawings, origin
+from tireid.verdicts import Verdicts, verdicts_headline, verdicts_warnings
 
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:
@@ -122,9 +121,7 @@ def _text(title: str, lines: list[list[str]]) -> str:
     return "\n".join([title, text_table(lines, indent="  "), ""])
 
 
-def write_comparison(
-    folder: Path, comparison: Comparison, verdicts: Mapping[str, Verdict]
-) -> dict[str, bytes]:
+def write_comparison(folder: Path, comparison: Comparison, verdicts: Verdicts) -> dict[str, bytes]:
     """Write everything that was found out into a folder; return the figures by their file's name.
 
     verdicts : on what the default learns, by recording.
@@ -203,8 +200,8 @@ def _error_rows(comparison: Comparison) -> Iterator[tuple[str | float, ...]]:
 def write_compare_report(
     folder: Path,
     comparison: Comparison,
-    figures: Mapping[str, bytes],
-    verdicts: Mapping[str, Verdict],
+    figures: Images,
+    verdicts: Verdicts,
     command: str,
 ) -> None:
     """Write the report of a comparison.
@@ -238,7 +235,7 @@ def write_compare_report(
             origin(command, course.vehicle, course.recordings, seed=str(comparison.seed)),
         ],
     )
-    write_report(folder / REPORT, report)
+    write_report(folder, report)
 
 
 def _compare_headlines(comparison: Comparison) -> list[Headline]:

@@ -35,9 +35,8 @@ from tireid.driving.setup import Setup, SpeedWish
 from tireid.exporting import Exported, export, self_test
 from tireid.figures.film import FORMATS
 from tireid.figures.paper import SCHEME
-from tireid.output import output_folder
-from tireid.progress import Progress, Stopwatch, tell
-from tireid.reports.common import READ, REPORT, drawings, origin
+from tireid.progress import Progress, tell
+from tireid.reports.common import READ, drawings, origin
 from tireid.reports.identify import (
     curve_drawing,
     identify_headlines,
@@ -77,7 +76,10 @@ class Driven(NamedTuple):
     """Drives along one path, and their figures."""
 
     drives: Drives
-    figures: Mapping[str, bytes]
+    figures: page.Images
+
+
+_Cases = Mapping[str, Driven]
 
 
 def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
@@ -96,12 +98,12 @@ def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
     return found
 
 
-def drive_text(driven: Mapping[str, Driven]) -> str:
+def drive_text(driven: _Cases) -> str:
     blocks = [one.drives.text() for one in driven.values()]
     return "\n\n".join(["Driving on the identified tires:", *blocks]) if blocks else NOT_DRIVEN
 
 
-def drive_section(driven: Mapping[str, Driven], folder: Path) -> page.Section:
+def drive_section(driven: _Cases, folder: Path) -> page.Section:
     heading = "The car drives on the identified tires"
     if not driven:
         return page.Section(heading, [NOT_DRIVEN])
@@ -133,14 +135,13 @@ def drive_section(driven: Mapping[str, Driven], folder: Path) -> page.Section:
 
 
 def _scores(one: Driven, caption: str) -> list[page.Block]:
-    case = f"{headline(one.drives.conditions)}."
     return [
-        page.Table(case, SCORES, score_rows(one.drives.runs)),
+        page.Table(f"{headline(one.drives.conditions)}.", SCORES, score_rows(one.drives.runs)),
         *drawings(one.figures, {"errors": caption}),
     ]
 
 
-def drive_numbers(driven: Mapping[str, Driven]) -> list[page.Headline]:
+def drive_numbers(driven: _Cases) -> list[page.Headline]:
     numbers = []
     for name, one in driven.items():
         first, second = one.drives.runs[:2]
@@ -212,8 +213,8 @@ def _demo_report(
     story: Story,
     shipped: Shipped,
     study: Study,
-    driven: Mapping[str, Driven],
-    figures: Mapping[str, Mapping[str, bytes]],
+    driven: _Cases,
+    figures: Mapping[str, page.Images],
     folder: Path,
     command: str,
 ) -> page.Report:
@@ -242,7 +243,7 @@ def _demo_report(
     )
 
 
-def _learn(figures: Mapping[str, bytes], model: TireModel, verdict: Verdict) -> page.Section:
+def _learn(figures: page.Images, model: TireModel, verdict: Verdict) -> page.Section:
     return page.Section(
         "Identified tires",
         [
@@ -274,7 +275,7 @@ def _learn(figures: Mapping[str, bytes], model: TireModel, verdict: Verdict) -> 
     )
 
 
-def _predict(story: Story, figures: Mapping[str, bytes]) -> page.Section:
+def _predict(story: Story, figures: page.Images) -> page.Section:
     columns = ["frozen", "of rms"]
     blocks: list[page.Block] = [
         (
@@ -291,12 +292,11 @@ def _predict(story: Story, figures: Mapping[str, bytes]) -> page.Section:
     ]
     for name in list(STORY)[1:]:
         caption = f"The axle identifier, frozen after the slalom, on the {name.replace('_', ' ')}."
-        image = figures[f"replay_{name}"]
-        blocks.append(page.Picture(image, caption, READ["replay"]))
+        blocks.append(page.Picture(figures[f"replay_{name}"], caption, READ["replay"]))
     return page.Section("Prediction of validation drives", blocks)
 
 
-def _paper_study(story: Story, study: Study, figures: Mapping[str, bytes]) -> page.Section:
+def _paper_study(story: Story, study: Study, figures: page.Images) -> page.Section:
     seeds = len(study.errors["slalom"]["integral"])
     certified = certificate_table.verdict_line(story.certificate)
     captions = {
@@ -360,14 +360,13 @@ def declare(new: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    watch = Stopwatch()
-    with output_folder(options.out, force=options.force) as folder:
+    with shared.folder_of(options) as folder:
         work = Progress("demo", _PARTS, long=True)
         story = run_story(partial(work.begin(_LEARNING).step, 2 * len(STORY)))
         folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
         for one in folders.values():
             one.mkdir()
-        figures: dict[str, Mapping[str, bytes]] = {
+        figures: dict[str, page.Images] = {
             "identify": story.axle.write(folders["identify"]),
             "paper_network": story.paper.write(folders["paper_network"]),
         }
@@ -381,7 +380,7 @@ def run(options: argparse.Namespace) -> None:
         driven = drive_story(story, folder)
         work.begin(_REPORTING)
         report = _demo_report(story, shipped, study, driven, figures, folder, options.words)
-        page.write_report(folder / REPORT, report)
+        page.write_report(folder, report)
         columns = [
             *(table_text(maneuver, study) for maneuver in study.errors),
             f"{certificate_table.certificate_text(story.certificate, story.design.force_unit)}\n",
@@ -390,4 +389,4 @@ def run(options: argparse.Namespace) -> None:
             drive_text(driven),
         ]
     tell("\n".join(columns))
-    tell(f"read {options.out / 'report.html'}  ({watch.seconds:.0f} s)")
+    tell(f"read {options.out / 'report.html'}  ({work.seconds:.0f} s)")

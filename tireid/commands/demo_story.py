@@ -42,12 +42,13 @@ _LANE_CHANGE = DoubleLaneChange(
 )
 _STEP = StepSteer(amplitude=np.radians(4.0), onset=2.0, rate_limit=RATE_LIMIT, duration=8.0)
 _FASTER = replace(SLALOM, amplitude=np.radians(3.5), frequency=0.6, duration=20.0)
-STORY: Mapping[str, tuple[Maneuver, float]] = {  # and the speed [m/s]; to learn on is the first
+_Maneuvers = Mapping[str, tuple[Maneuver, float]]  # and the speed [m/s]
+STORY: _Maneuvers = {  # to learn on is the first
     "slalom": (SLALOM, SPEED),
     "double_lane_change": (_LANE_CHANGE, SPEED),
     "step_steer": (_STEP, SPEED),
 }
-DRIVES: Mapping[str, tuple[Maneuver, float]] = {
+DRIVES: _Maneuvers = {
     "slalom_20": (SLALOM, 20.0),
     "step_steer": (_STEP, 20.0),
     "lane_change": (_LANE_CHANGE, 20.0),
@@ -106,19 +107,18 @@ def run_story(progress: Callable[[], None] = lambda: None) -> Story:
         return Results.learnt(law, runs, [FREEZE], recordings[1:])
 
     axle, paper = learnt(LIVE, make_method(LIVE, car)), learnt(REFERENCE, design)
-    return Story(car=car, design=design, axle=axle, paper=paper)
+    return Story(car, design, axle, paper)
 
 
 def drive_to_learn() -> Recording:
     """Return the story's drive that the methods learn on."""
-    slalom = {"slalom": STORY["slalom"]}
-    return plant_recordings(sedan(), np.random.default_rng(1), slalom)[0]
+    return plant_recordings(sedan(), np.random.default_rng(1), {"slalom": STORY["slalom"]})[0]
 
 
 def plant_recordings(
     vehicle: Vehicle,
     rng: np.random.Generator,
-    drives: Mapping[str, tuple[Maneuver, float]] = DRIVES,
+    drives: _Maneuvers = DRIVES,
 ) -> tuple[Recording, ...]:
     """Drive the plant of a vehicle through every maneuver.
 

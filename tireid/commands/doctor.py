@@ -11,8 +11,8 @@ from tireid.commands import DONE, NOT_VALID
 from tireid.commands import options as shared
 from tireid.diagnoses import add_repair, diagnosis_text, write_doctor_report, write_repair
 from tireid.figures.forces import draw_diagnosis
-from tireid.figures.style import save_figure
-from tireid.output import output_folder, require_free, write_json
+from tireid.figures.style import save_figures
+from tireid.output import require_free, write_json
 from tireid.progress import say, tell
 
 
@@ -45,14 +45,14 @@ def run(options: argparse.Namespace) -> int:
     repaired, car = repair.apply(recording, vehicle) if repair else (recording, vehicle)
     after = diagnose(repaired, car) if repair else None
     if options.out is not None:
-        with output_folder(options.out, force=options.force) as folder:
+        with shared.folder_of(options) as folder:
             figure = draw_diagnosis(recording, vehicle, repaired, car)
-            image = save_figure(figure, folder / "slip.png")
+            images = save_figures(folder, {"slip": figure})
             left = None if after is None else after.to_dict()
             found = {**diagnosis.to_dict(), "applied": repair.tables(), "after": left}
             write_json(folder / "summary.json", {**found, "version": __version__})
             write_doctor_report(
-                folder, recording, vehicle, diagnosis, after, image, command=options.words
+                folder, recording, vehicle, diagnosis, after, images["slip"], command=options.words
             )
     tell(diagnosis_text(diagnosis))
     if options.repair is not None:

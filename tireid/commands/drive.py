@@ -26,7 +26,6 @@ from tireid.driving.results import NO_FILM, Drives, headline, write_drive_report
 from tireid.driving.setup import BY_TIRES, Setup, SpeedWish
 from tireid.figures.film import FORMATS
 from tireid.learning import identify
-from tireid.output import output_folder
 from tireid.progress import say, tell
 from tireid.verdicts import warn_of
 
@@ -81,7 +80,7 @@ def declare(new: Any) -> None:
     shared.add_vehicle(parser)
     shared.add_options(parser, bool, {"--confirm": CONFIRM})
     numbers = {
-        "--mu": (1.0, "friction of the road (%(default)s)"),
+        "--mu MU": (1.0, "friction of the road (%(default)s)"),
         "--delay MS": (
             20.0,
             "from a measurement until its command acts, a multiple of 10 ms (%(default)g)",
@@ -128,7 +127,7 @@ def run(options: argparse.Namespace) -> int:
     conditions = conditions_of(options)
     setup = conditions.setup
     driving.require_compiler()
-    with output_folder(options.out, force=options.force) as folder:
+    with shared.folder_of(options) as folder:
         if driving.ORACLE in labels:
             setup.oracle()  # what cannot be is said before the car drives
         source, learnt = frozen_tires(options, labels, conditions)
@@ -140,8 +139,7 @@ def run(options: argparse.Namespace) -> int:
             learnt.save(folder / "weights.json")
         drives = Drives.driven(conditions, labels, learnt, source)
         figures = drives.write(folder, options.film)
-        film = None if options.film == NO_FILM else folder / f"drive.{options.film}"
-        write_drive_report(folder, drives, figures, film, options.words)
+        write_drive_report(folder, drives, figures, options.film, options.words)
         case, _, scores = drives.text().partition("\n")
     tell(f"{case}\ntires: {source}\n{scores}")
     say(f"wrote {options.out}/")
@@ -149,10 +147,10 @@ def run(options: argparse.Namespace) -> int:
 
 
 TIRES = "tires"
-SPEEDS: Mapping[str, float] = {"m/s": 1.0, "km/h": 1.0 / 3.6}
-ACCELERATIONS: Mapping[str, float] = {"g": GRAVITY, "m/s2": 1.0, "m/s²": 1.0}
-BARE: Mapping[str, float] = {"": 1.0}  # without a unit
-SHARES: Mapping[str, float] = {"%": 0.01}
+SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6}
+ACCELERATIONS = {"g": GRAVITY, "m/s2": 1.0, "m/s²": 1.0}
+BARE = {"": 1.0}  # without a unit
+SHARES = {"%": 0.01}
 
 
 def quantity(text: str, *units: Mapping[str, float]) -> tuple[float, str]:
@@ -262,9 +260,8 @@ def conditions_of(options: argparse.Namespace) -> driving.Conditions:
     for s, _ in drops:
         if not path.closed and s >= path.length:
             raise ValueError(f"--mu-drop {s:g} is beyond the path, which is {path.length:.0f} m")
-    setup = Setup(path=path, vehicle=vehicle, mu=options.mu, drops=drops, wish=wish)
     return driving.Conditions(
-        setup=setup,
+        setup=Setup(path=path, vehicle=vehicle, mu=options.mu, drops=drops, wish=wish),
         delay=driving.delay_periods(1e-3 * options.delay, "--delay"),
         noise=options.noise,
         seed=shared.seed_of(options),
@@ -298,11 +295,10 @@ def frozen_tires(
     warn_of(run.verdict, f"the identification drive of {law}")
     assert recording.a_y is not None
     banded = conditions.caution > 0.0 or setup.wish.share is not None
-    learnt = run.tire if banded else run.freeze()
     return (
         f"frozen ones identified by {law} on {recording.duration:.0f} s of random steering on an "
         f"open field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"
-    ), learnt
+    ), run.tire if banded else run.freeze()
 
 
 def require_its_car(options: argparse.Namespace, learnt: Vehicle, driven: Vehicle) -> None:

@@ -4,12 +4,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from identifier.tire_model import load_model
 from tireid.commands import options as shared
 from tireid.emitting import WANTED, emit
 from tireid.output import text_table
 from tireid.progress import say, tell
-from tireid.verdicts import warn_of_stored
 
 
 def declare(new: Any) -> None:
@@ -37,8 +35,8 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError("--out goes with --understeer: the other options name their files")
     if not (options.understeer or options.tir or options.slipx or options.ggv or options.steady):
         raise ValueError(f"nothing is asked for: add one or more of {WANTED}")
-    model = load_model(options.model)
-    warn_of_stored(options.model)
+    model = shared.stored_model(options.model)
+    assert model is not None
     emitted = emit(
         model,
         tir=options.tir,
@@ -49,7 +47,6 @@ def run(options: argparse.Namespace) -> None:
         overwrite=options.force,
     )
     if emitted.understeer is not None:
-        rows = [line.split(",") for line in emitted.understeer.csv.splitlines()]
-        tell(text_table(rows, ">>>>"))
+        tell(text_table([line.split(",") for line in emitted.understeer.csv.splitlines()], ">>>>"))
     for path in emitted.files:
         say(f"wrote {path}")

@@ -1,6 +1,7 @@
 """Thousands of logs in one command: learn each, merge them, watch for changed tires."""
 
 import argparse
+import os
 from collections.abc import Callable, Iterator
 from contextlib import nullcontext
 from dataclasses import replace
@@ -11,16 +12,16 @@ import numpy as np
 
 from identifier.tire_model import STIFFNESS
 from models.extras import needs
+from models.schema import require_few
 from models.vehicle import Vehicle
 from tireid.cluster import cluster
 from tireid.commands import DONE, FAILS
 from tireid.commands.options import (
     add_force,
-    add_jobs,
     add_log_map,
     add_options,
+    folder_of,
     given_map,
-    jobs_of,
 )
 from tireid.fleet.learn import (
     LearnLog,
@@ -33,8 +34,8 @@ from tireid.fleet.learn import (
 from tireid.fleet.merge import BY, COLUMNS, merge, usable
 from tireid.fleet.store import INDEX, LogRow, Store
 from tireid.fleet.watch import ALARM, BASELINE, watch
-from tireid.output import output_folder, text_table, write_json
-from tireid.progress import Progress, Stopwatch, say, tell
+from tireid.output import text_table, write_json
+from tireid.progress import Progress, say, tell
 
 _LISTED = 5  # logs with errors that are named
 
@@ -89,7 +90,7 @@ def _add_learn(tasks: Any) -> None:
     parser.add_argument(
         "--out", required=True, metavar="STORE", help="folder or address of the store"
     )
-    words: dict[str, Any] = {
+    words = {
         "--tags PATTERN": (
             "",
             "what paths end with, as in '{vehicle}/{tires}/{date}-*.csv'; vehicle, tires and date "
@@ -104,7 +105,7 @@ def _add_learn(tasks: Any) -> None:
     }
     add_options(parser, bool, flags)
     add_log_map(parser)
-    add_jobs(parser)
+    add_options(parser, int, {"--jobs N": (os.cpu_count() or 1, "processes (%(default)s)")})
     parser.set_defaults(run=_learn)
 
 
@@ -119,7 +120,10 @@ def _add_question(parser: argparse.ArgumentParser, by: str, out: str) -> None:
 
 def _learn(options: argparse.Namespace) -> int:
     """Learn logs into a store; return 1 where a log could not be used."""
-    clock, jobs, log_map = Stopwatch(), jobs_of(options), given_map(options)
+    jobs, log_map = options.jobs, given_map(options)
+    if jobs < 1:
+        raise ValueError(f"--jobs must be at least 1, it is {jobs}")
+    require_few(ValueError, "--jobs", jobs, "processes", "processes")
     tasks, left = find_logs(options.logs, options.vehicle, options.tags)
     for log, why in list(left.items())[:_LISTED]:
         say(f"{log}: left out, {why}")
@@ -155,7 +159,7 @@ def _learn(options: argparse.Namespace) -> int:
         f"{len(tasks) - learnt} before; {refused} not valid, {len(errors)} could not be used"
         + (f", see the column error of {options.out}" if errors else "")
     )
-    say(f"wrote {options.out} in {clock.seconds:.0f} s")
+    say(f"wrote {options.out} in {progress.seconds:.0f} s")
     return FAILS if errors else DONE
 
 
@@ -183,7 +187,7 @@ def _by(options: argparse.Namespace) -> list[str]:
 def _merge(options: argparse.Namespace) -> int:
     groups = merge(_used(options), _by(options))
     models, rows = [], [["group", "logs", "learning", "stiffness front, rear", "known to"]]
-    with output_folder(options.out, force=options.force) as folder:
+    with folder_of(options) as folder:
         for k, one in enumerate(groups):
             file, known = f"model-{k:04d}.json", np.degrees(one.model.known_slip)
             one.model.save(folder / file)
@@ -215,7 +219,7 @@ def _watch(options: argparse.Namespace) -> int:
     """Say whose tires changed; return 1 where the last day of a car is an alarm."""
     limits = {"baseline": options.baseline, "alarm": options.alarm}
     days, short = watch(_used(options)(), _by(options), **limits)
-    with output_folder(options.out, force=options.force) as folder:
+    with folder_of(options) as folder:
         write_json(folder / "days.json", [day._asdict() for day in days])
     last = {day.car: day for day in days}
     lines = [day.line for day in days if day.alarm] or ["no change was noticed"]

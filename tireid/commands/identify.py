@@ -21,7 +21,7 @@ from tireid.commands.certificate_table import verdict_line
 from tireid.diagnoses import add_repair, doctor_text, with_doctor, write_repair
 from tireid.identified import Results, file_name
 from tireid.learning import identify
-from tireid.output import output_folder, require_free, write_json
+from tireid.output import require_free, write_json
 from tireid.progress import Progress, say, tell
 from tireid.reports.identify import side_slip_text, write_identify_report
 from tireid.verdicts import sensors_text, verdict_text, verdicts_text
@@ -49,12 +49,11 @@ def declare(new: Any) -> None:
     parser.add_argument("--freeze", type=float, metavar="T", help=text, **several)
     text = "validation drives to predict, each with a verdict"
     parser.add_argument("--replay", default=[], metavar="LOG[:RUN]", help=text, **several)
-    parser.add_argument(
-        "--each-day",
-        action="store_true",
-        help="logs of different days: each has zeros of its sensors of its own (found where they "
-        "clearly differ)",
-    )
+    flags = {
+        "--each-day": "logs of different days: each has zeros of its sensors of its own (found "
+        "where they clearly differ)"
+    }
+    shared.add_options(parser, bool, flags)
     shared.add_log_reading(parser)
     add_repair(parser, "identify the repaired log, and write the repair to")
     shared.add_weights(parser, "begin with this model")
@@ -75,10 +74,9 @@ def run(options: argparse.Namespace) -> int:
     others = [_read(log, vehicle, design, options) for log in options.replay]
     _require_distinct([*logs, *others])
     recording = joined(logs)
-    without_v_y = any(one.v_y is None for one in (*logs, *others))
     for one in (*logs, *others):
         check_recording(one, design)
-    if without_v_y:
+    if any(one.v_y is None for one in (*logs, *others)):
         say(f"a log has no lateral velocity: {law} learns, and estimates it")
     say("the doctor looks at the log")
     diagnosis = diagnose(recording, vehicle)
@@ -99,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     count = 1.0 + len(others)
     parts = {_LEARNING: 1.0 + count, _JUDGING: count, _DRAWING: 2.0 + 3.0 * count}
-    with output_folder(options.out, force=options.force) as folder:
+    with shared.folder_of(options) as folder:
         progress = Progress("identify", parts)
         runs: list[History] = []
         for k, one in enumerate((recording, *others)):
@@ -177,24 +175,16 @@ def _closing_line(learnt: History, t: float, vehicle: Vehicle) -> str:
         return "frozen; `tireid compare` sets it beside the other methods"
     known = np.degrees(model.known_slip)
     reach = f"known to {known[0]:.1f} / {known[1]:.1f} deg of slip (front / rear)"
-    given = side_slip_text(learnt)
-    reach = f"{given}\n{reach}" if given else reach
-    if not learnt.online:
-        return reach
-    return (
-        f"{reach}\ncertificate: {certificate.verdict}; parameter limits: enforced (listed in "
-        "summary.json)"
+    listed = (
+        f"certificate: {certificate.verdict}; parameter limits: enforced (listed in summary.json)"
     )
+    given = side_slip_text(learnt), reach, listed * learnt.online
+    return "\n".join(one for one in given if one)
 
 
 def _read(log: str, vehicle: Vehicle, design: Method, options: argparse.Namespace) -> Recording:
-    recording = shared.read_log(
-        log,
-        vehicle,
-        options,
-        check=options.repair is None,  # else once it is repaired
-        dt=design.dt,
-    )
+    check = options.repair is None  # else once it is repaired
+    recording = shared.read_log(log, vehicle, options, check=check, dt=design.dt)
     counted_samples(recording, design.min_speed)  # refuses a car that never drives
     return recording
 

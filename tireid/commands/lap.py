@@ -32,14 +32,14 @@ from tireid.commands.drive import (
     quantity,
     require_its_car,
 )
-from tireid.driving.laps import Lap, drive_laps
+from tireid.driving.laps import drive_laps
 from tireid.driving.runs import FRICTIONS
 from tireid.figures.lap import lap_figure, lap_gg_figure
 from tireid.figures.style import save_figures
-from tireid.output import output_folder, write_json
+from tireid.output import write_json
 from tireid.progress import say, tell
 from tireid.report import Headline, Report, Section, Table, write_report
-from tireid.reports.common import REPORT, drawings, origin
+from tireid.reports.common import drawings, origin
 
 _NOT_COMPLETED = 1
 _BRAKING = INDEX["braking_f"]
@@ -60,10 +60,9 @@ def declare(new: Any) -> None:
         "--laps a simulated car drives it, learns from each lap, and goes again.",
         epilog="Exit code 1 where a lap of --laps was not completed.",
     )
-    text = "weights.json, as identified"
-    parser.add_argument("weights", type=Path, metavar="WEIGHTS", help=text)
+    parser.add_argument("weights", type=Path, metavar="WEIGHTS", help="weights.json, as identified")
     add_path(parser, "course")
-    words: dict[str, Any] = {
+    words = {
         "--share SHARE": (str(SHARE), "of the limits that is used: 70%%, 0.7 (%(default)s)"),
         "--engine A|FILE": (
             str(ENGINE),
@@ -74,7 +73,7 @@ def declare(new: Any) -> None:
         "--v-max V": f"largest {_SUCH['v_max'][2:]} (none)",
     }
     shared.add_options(parser, str, words)
-    numbers: dict[str, Any] = {
+    numbers = {
         "--friction RATIO": (1.0, "of this road over that of the log (%(default)g)"),
         "--confidence P": (0.95, "that a limit is right or too low (%(default)g)"),
         "--laps N": "drive a closed path N times with the simulated car, and learn from each lap",
@@ -96,13 +95,10 @@ def run(options: argparse.Namespace) -> int:
     share = _number(options, "share", SHARES, BARE)
     brakes = _number(options, "brakes", ACCELERATIONS, BARE)
     v_max = _number(options, "v_max", SPEEDS)
-    engine = (
-        _engine(options.engine)
-        if Path(options.engine).is_file()
-        else _number(options, "engine", ACCELERATIONS, BARE)
-    )
-    given: dict[str, Any] = {"share": share, "v_max": v_max, "engine": engine}
-    require_within(ValueError, 0.05, 1.0, **{"--share": share or 0.0})
+    table = Path(options.engine).is_file()
+    engine = _engine(options.engine) if table else _number(options, "engine", ACCELERATIONS, BARE)
+    planned = {"v_max": v_max, "engine": engine, "brakes": brakes}
+    require_within(ValueError, 0.05, 1.0, **{"--share": share})
     if stored_verdict(source) is False:
         raise ValueError(
             f"{source} was not valid on its identification drive: `tireid plan --weights {source}` "
@@ -125,30 +121,35 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"--laps N drives a closed path N times: leave it out for {path.name}")
     elif vehicle.chassis is None:
         raise ValueError("--laps drives a car with a chassis: add --vehicle FILE, with [chassis]")
-    with output_folder(options.out, force=options.force) as folder:
-        rows: list[dict[str, float]] = []
+    with shared.folder_of(options) as folder:
+        rows, completed = list[dict[str, float]](), True
         if n is None:
-            profile = speed_profile(path, limits, brakes=brakes, **given)
+            profile = speed_profile(path, limits, share=share, **planned)
         else:
+            planned["brakes"] = min(brakes or BRAKES, BRAKES)
             for lap in drive_laps(
-                path, vehicle, tire, int(n), brakes=min(brakes or BRAKES, BRAKES), road=ratio,
-                confidence=options.confidence, confirm=bool(options.confirm),
-                friction=1.0 if options.mu is None else options.mu,
-                seed=shared.seed_of(options), **given,
+                path, vehicle, tire, int(n), share=share, planned=planned, road=ratio,
+                confidence=options.confidence, seed=shared.seed_of(options),
+                confirm=bool(options.confirm), friction=1.0 if options.mu is None else options.mu,
             ):  # fmt: skip
-                valid = lap.learnt is not None and lap.learnt.verdict.valid
-                profile, tire = lap.profile, lap.tire
-                rows.append(_row(len(rows) + 1, lap, valid))
-                tell(", ".join(f"{name} {x:.4g}" for name, x in rows[-1].items()))
-                if lap.learnt is not None and valid:
+                valid = bool(lap.learnt and lap.learnt.verdict.valid)
+                profile, tire, drive = lap.profile, lap.tire, lap.driven.drive
+                row = {
+                    "lap": len(rows) + 1, "planned_s": profile.lap_time, "driven_s": drive.t[-1],
+                    "share": lap.share, "a_y_limit_m_s2": lap.limits.a_y[0],
+                    "off_path_m": lap.seen, "valid": valid,
+                }  # fmt: skip
+                rows.append(row)
+                tell(", ".join(f"{name} {x:.4g}" for name, x in row.items()))
+                if lap.learnt and valid:
                     lap.learnt.tire.save(folder / "weights.json", valid=True)
             completed = lap.driven.scores.completed
         _write(folder, options, profile, tire, rows)
     say(f"wrote {options.out}/")
-    return 0 if n is None or completed else _NOT_COMPLETED
+    return 0 if completed else _NOT_COMPLETED
 
 
-def _number(options: argparse.Namespace, word: str, *units: Mapping[str, float]) -> float | None:
+def _number(options: argparse.Namespace, word: str, *units: Mapping[str, float]) -> Any:
     """Return what an option says in SI, None where it is not given."""
     text = getattr(options, word)
     if text is None:
@@ -221,9 +222,11 @@ def _write(
         "top_speed_m_s": v.max(), "peak_a_y_m_s2": np.abs(profile.a_y).max(),
         "peak_braking_m_s2": -profile.a_x.min(), "share": share,
     }  # fmt: skip
-    more = {"limited_by": limited, "laps": laps, "notes": notes, "command": options.words}
-    hashed = {"weights_hash": digest(tire.to_dict()), "version": __version__}
-    write_json(folder / "summary.json", {**facts, **more, **hashed})
+    more = {
+        "limited_by": limited, "laps": laps, "notes": notes, "command": options.words,
+        "weights_hash": digest(tire.to_dict()), "version": __version__,
+    }  # fmt: skip
+    write_json(folder / "summary.json", {**facts, **more})
     figures = save_figures(folder, {"lap": lap_figure(profile), "lap_gg": lap_gg_figure(profile)})
     head = (
         "{}: {:.2f} s, {:.0f} m at {:.1f} to {:.1f} m/s; a_y up to {:.1f}, braking up to {:.1f} "
@@ -247,13 +250,4 @@ def _write(
     ]
     number = Headline(f"{profile.lap_time:.2f} s", "lap time, planned")
     report = Report(f"A lap of {path.name}", sections, f"{head}.", [number], warnings=notes)
-    write_report(folder / REPORT, report)
-
-
-def _row(number: int, lap: Lap, valid: bool) -> dict[str, float]:
-    """Return what is said of a driven lap."""
-    return {
-        "lap": number, "planned_s": lap.profile.lap_time, "driven_s": lap.driven.drive.t[-1],
-        "share": lap.share, "a_y_limit_m_s2": lap.limits.a_y[0], "off_path_m": lap.seen,
-        "valid": valid,
-    }  # fmt: skip
+    write_report(folder, report)

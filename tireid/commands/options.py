@@ -6,8 +6,8 @@ what is there is replaced, `--seed` chance, `--jobs` processes.
 """
 
 import argparse
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -29,15 +29,15 @@ from identifier.verdict import Verdict
 from models.recordings import LogMap, Recording, read_recording, read_repaired, split_log_argument
 from models.recordings.map import CUT, MEND
 from models.recordings.reader import map_of, with_columns
-from models.schema import require_few
 from models.vehicle import Vehicle, sedan
 from tireid.commands import DONE, NOT_VALID
 from tireid.learning import with_v_y
+from tireid.output import output_folder
 from tireid.progress import complain, say
-from tireid.verdicts import warn_of_stored
+from tireid.verdicts import stored_warning
 
 
-def add_options(parser: Any, kind: type, table: Mapping[str, str | tuple[Any, str]]) -> None:
+def add_options(parser: Any, kind: type, table: Mapping[str, Any]) -> None:
     """Add options of one kind to a parser or to a group of it; bool is a flag.
 
     table : by "--word METAVAR" its help, or its default and its help.
@@ -49,9 +49,7 @@ def add_options(parser: Any, kind: type, table: Mapping[str, str | tuple[Any, st
             parser.add_argument(word, action="store_true", help=text)
         else:
             read = None if kind is str else kind
-            parser.add_argument(
-                word, type=read, help=text, default=default, metavar=metavar or None
-            )
+            parser.add_argument(word, type=read, help=text, default=default, metavar=metavar)
 
 
 def add_vehicle(
@@ -81,9 +79,7 @@ def read_vehicle(
     if vehicle.estimates:
         say(f"{source if path is None else path}: {vehicle.estimates}")
     mended = _map_path(options)
-    numbers: dict[str, Any] = (
-        {} if mended is None else dict(LogMap.from_toml(mended).repair.vehicle)
-    )
+    numbers: dict[str, Any] = dict(map_of(mended).repair.vehicle)
     if not numbers:
         return vehicle
     said = ", ".join(f"{name} = {value:.6g}" for name, value in numbers.items())
@@ -98,17 +94,22 @@ def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
     """
     folder = None if command is None else Path(f"tireid-{command}")
     declared = f"folder to write ({folder or 'only where asked'})"
-    parser.add_argument("--out", type=Path, default=folder, metavar="DIR", help=declared)
+    add_options(parser, Path, {"--out DIR": (folder, declared)})
     add_force(parser)
 
 
+def folder_of(options: argparse.Namespace) -> AbstractContextManager[Path]:
+    """Return the folder of --out, as `output_folder` makes it."""
+    return output_folder(options.out, force=options.force)
+
+
 def add_force(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--force", action="store_true", help="replace what is there")
+    add_options(parser, bool, {"--force": "replace what is there"})
 
 
 def add_accept(parser: argparse.ArgumentParser) -> None:
     text = f"exit with 0 where the verdict is not valid, in place of {NOT_VALID}"
-    parser.add_argument("--accept", action="store_true", help=text)
+    add_options(parser, bool, {"--accept": text})
 
 
 def stored_model(path: Path | None) -> TireModel | None:
@@ -116,17 +117,17 @@ def stored_model(path: Path | None) -> TireModel | None:
     if path is None:
         return None
     model = load_model(path)
-    warn_of_stored(path)
+    for said in stored_warning(path):
+        complain(f"warning: {said.text}")
     return model
 
 
 def add_day(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--day",
-        metavar="LOG[:RUN]",
-        help="log with the sensors as they are today, whose zeros are found from it (those of the "
-        "log that identified the tires)",
+    text = (
+        "log with the sensors as they are today, whose zeros are found from it (those of the log "
+        "that identified the tires)"
     )
+    add_options(parser, str, {"--day LOG[:RUN]": text})
 
 
 def model_of_day(options: argparse.Namespace) -> TireModel | None:
@@ -158,12 +159,12 @@ def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
 
 
 def add_weights(parser: argparse.ArgumentParser, what: str) -> None:
-    parser.add_argument("--weights", type=Path, metavar="FILE", help=f"stored model: {what}")
+    add_options(parser, Path, {"--weights FILE": f"stored model: {what}"})
 
 
 def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
     """Add --seed; None where it is not given."""
-    parser.add_argument("--seed", type=int, metavar="N", help=f"of {what} (0)")
+    add_options(parser, int, {"--seed N": f"of {what} (0)"})
 
 
 def seed_of(options: argparse.Namespace) -> int:
@@ -172,18 +173,6 @@ def seed_of(options: argparse.Namespace) -> int:
     if seed < 0:
         raise ValueError(f"--seed must not be negative, it is {seed}")
     return seed
-
-
-def add_jobs(parser: argparse.ArgumentParser) -> None:
-    add_options(parser, int, {"--jobs N": (os.cpu_count() or 1, "processes (%(default)s)")})
-
-
-def jobs_of(options: argparse.Namespace) -> int:
-    jobs = int(options.jobs)
-    if jobs < 1:
-        raise ValueError(f"--jobs must be at least 1, it is {jobs}")
-    require_few(ValueError, "--jobs", jobs, "processes", "processes")
-    return jobs
 
 
 def method_name(text: str) -> str:
@@ -297,7 +286,15 @@ def _map_path(options: argparse.Namespace) -> Path | None:
 
 def given_map(options: argparse.Namespace) -> LogMap:
     """Return how logs are read by --log, and by the other options, which come first."""
-    declared = with_columns(map_of(_map_path(options)), _column_words(options.columns))
+    columns: dict[str, str] = {}
+    for pair in options.columns:
+        name, equals, column = pair.partition("=")
+        if not (name and equals and column):
+            raise ValueError(f"--columns wants NAME=COLUMN, not {pair!r}")
+        if name in columns:
+            raise ValueError(f"--columns gives {name} twice")
+        columns[name] = column
+    declared = with_columns(map_of(_map_path(options)), columns)
     if options.cut_holes:
         declared = replace(declared, holes=CUT)
     if options.mend_clock:
@@ -327,16 +324,3 @@ def read_log(
     for note in recording.notes:
         say(f"{recording.name}: {note}")
     return recording
-
-
-def _column_words(pairs: Sequence[str]) -> dict[str, str]:
-    """Return what is given of columns by the name that they are read as."""
-    columns = {}
-    for pair in pairs:
-        name, equals, column = pair.partition("=")
-        if not (name and equals and column):
-            raise ValueError(f"--columns wants NAME=COLUMN, not {pair!r}")
-        if name in columns:
-            raise ValueError(f"--columns gives {name} twice")
-        columns[name] = column
-    return columns

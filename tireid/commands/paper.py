@@ -1,7 +1,6 @@
 """`tireid paper`: Tables I and II and Figs. 2-5 of the paper, beside ours, with a third column."""
 
 import argparse
-from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,11 +17,11 @@ from identifier.reproducibility import freeze_key
 from models.schema import require_few
 from models.vehicle import sedan
 from tireid.commands.certificate_table import verdict_line
-from tireid.commands.options import add_output
+from tireid.commands.options import add_output, folder_of
 from tireid.figures.forces import force_figure
 from tireid.figures.paper import SCHEME, comparison_figure
 from tireid.figures.style import save_figures
-from tireid.output import output_folder, text_table, write_json
+from tireid.output import text_table, write_json
 from tireid.progress import Progress, say, tell
 from tireid.report import Table, printed
 
@@ -31,7 +30,7 @@ from tireid.report import Table, printed
 # Its gains, its car and its simulator are not public: these numbers stand beside ours, they are not
 # reproduced.
 
-_PAPER: Mapping[str, Mapping[str, Mapping[str, float]]] = {
+_PAPER = {
     "step_steer": {  # Table I
         "instantaneous": {"online": 0.2690, "32": 0.6506, "35": 0.6488},
         "integral": {"online": 0.4077, "32": 0.5562, "35": 0.5015},
@@ -130,8 +129,7 @@ def _header() -> list[str]:
 
 
 def study_table(maneuver: str, study: paper_study.Study, caption: str) -> Table:
-    head = [printed(word) for word in _header()]
-    return Table(caption, head, _rows(maneuver, study))
+    return Table(caption, [printed(word) for word in _header()], _rows(maneuver, study))
 
 
 def table_text(maneuver: str, study: paper_study.Study) -> str:
@@ -232,7 +230,7 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--seeds must be at least 1, it is {options.seeds}")
     require_few(ValueError, "--seeds", options.seeds, "runs", "runs")
     parts = {_STUDY: float(options.seeds), _DRAWING: 10.0}
-    with output_folder(options.out, force=options.force) as folder:
+    with folder_of(options) as folder:
         progress = Progress("paper", parts, long=True)
         study = paper_study.run_study(
             options.seeds, partial(progress.begin(_STUDY).step, paper_study.STEPS)

@@ -14,7 +14,7 @@ from tireid import __version__
 from tireid.commands import options as shared
 from tireid.figures.plan import plan_figure
 from tireid.figures.style import save_figures
-from tireid.output import output_folder, text_table, write_csv, write_json
+from tireid.output import text_table, write_csv, write_json
 from tireid.progress import say, tell
 
 CAUTION = (
@@ -42,7 +42,7 @@ def declare(new: Any) -> None:
     parser.add_argument("--speed", metavar="V", nargs="+", type=float, help=text)
     text = "length and width of the field [m] (without limits)"
     parser.add_argument("--area", metavar=("L", "W"), nargs=2, type=float, help=text)
-    numbers: dict[str, Any] = {
+    numbers = {
         "--time S": (TIME, "length of a maneuver (%(default)g)"),
         "--mu MU": "friction of the road, a guess (0.85, or that of --weights)",
         "--grip PERCENT": (100.0 * SHARE, "share of the grip that is used at most (%(default)g)"),
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> None:
     }  # fmt: skip
     inputs = {"vehicle": vehicle_numbers(vehicle), "weights": str(options.weights), "area": area}
     inputs |= numbers
-    with output_folder(options.out, force=options.force) as folder:
+    with shared.folder_of(options) as folder:
         found = plan(vehicle, start=model, **numbers)
         listed = [_numbers(one, area) for one in found]
         fit = [one for one, known in zip(found, listed, strict=True) if known["fits"]]

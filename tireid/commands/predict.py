@@ -27,13 +27,13 @@ from tireid.figures.tires import slip_figure
 from tireid.identified import error_cells
 from tireid.learning import replay
 from tireid.progress import say, tell
-from tireid.reports.common import REPORT, drawings, origin
+from tireid.reports.common import drawings, origin
 from tireid.reports.identify import (
     band_sentence,
     curve_drawing,
     error_numbers,
     error_table,
-    stored_model_warnings,
+    extrapolated,
 )
 from tireid.verdicts import (
     known_headline,
@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
     half = None if model.band is None else model.band.over(recording)
     facts, friction = summary(prediction, half), verdict.friction
     lines = _prediction_text(prediction, facts)
-    with output.output_folder(options.out, force=options.force) as folder:
+    with shared.folder_of(options) as folder:
         alpha = recording.alpha(model.vehicle.l_f, model.vehicle.l_r)
         forces = {"predicted": prediction.axle_force, "half_band": half}
         columns = {"t_s": recording.t, **output.axle_columns("alpha_{}_rad", alpha)}
@@ -102,8 +102,7 @@ def run(options: argparse.Namespace) -> int:
         )
     error, table = prediction.against_truth, ""
     if error is not None:
-        name = visible(recording.name)
-        cells = [name, *error_cells(error, prediction.true_force)]
+        cells = [visible(recording.name), *error_cells(error, prediction.true_force)]
         table = output.text_table([["predicted", "front", "rear"], cells], "<>>")
     sensors = sensors_text(model, [recording])
     tell(
@@ -218,7 +217,7 @@ def _prediction_text(prediction: Prediction, facts: Mapping[str, Any]) -> str:
 def write_predict_report(
     folder: Path,
     prediction: Prediction,
-    figures: Mapping[str, bytes],
+    figures: page.Images,
     lines: str,
     *,
     source: Path,
@@ -229,10 +228,9 @@ def write_predict_report(
     lines : what is said of it beside its errors.   source : the model's file.
     """
     model, recording, verdict = prediction.model, prediction.recording, prediction.verdict
-    notes: list[str | page.Marked] = [
-        *stored_warning(source),
-        *stored_model_warnings(model, recording),
-    ]
+    notes: list[str | page.Marked] = [*stored_warning(source)]
+    notes += [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
+    notes += extrapolated(model, recording)
     error, found = prediction.against_truth, list[page.Block]()
     if error is not None:
         found.append(error_table([[recording.name, *error_numbers(error, prediction.true_force)]]))
@@ -267,7 +265,7 @@ def write_predict_report(
             ),
         ],
     )
-    page.write_report(folder / REPORT, report)
+    page.write_report(folder, report)
 
 
 def _predict_headlines(prediction: Prediction) -> list[page.Headline]:

@@ -4,19 +4,17 @@ The share of the limits grows where the car's own sensors saw it stay near its p
 where they did not; the limits themselves grow slowly, whatever was learnt.
 """
 
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from identifier.speed_limits import SpeedLimits, speed_limits
 from identifier.tire_model import TireModel
-from models.tires import Tire
 from models.vehicle import Vehicle
 from mpc.cars import BRAKES
-from mpc.loop.record import Drive
 from mpc.path import Path, SpeedProfile, speed_profile
-from mpc.path.speed import SHARE, Engine
+from mpc.path.speed import SHARE
 from tireid.driving.runs import ClosedLoop, drive
 from tireid.driving.setup import PERIOD
 from tireid.learning import identify
@@ -59,47 +57,34 @@ def drive_laps(
     laps: int,
     *,
     share: float = SHARE,
-    engine: Engine | None = None,
-    brakes: float = BRAKES,
-    v_max: float | None = None,
+    planned: Mapping[str, Any] | None = None,
     road: float = 1.0,
     confidence: float = 0.95,
-    confirm: bool = False,
-    friction: float = 1.0,
-    tires: tuple[Tire, Tire] | None = None,
     seed: int = 0,
+    **driven: Any,
 ) -> Iterator[Lap]:
-    """Yield lap after lap, until one is not completed; the arguments are those of `drive`.
+    """Yield lap after lap, until one is not completed.
 
     A lap that speaks against its tires teaches nothing.
 
-    engine, brakes, v_max : as of `speed_profile`.
+    planned : engine, brakes and v_max, as of `speed_profile`.   driven : as of `drive`.
     road : friction that the first lap is planned for, over that of the identified tires.
     confidence : as of `speed_limits`.
     """
     limits = first_limits(tire, confidence).scaled(road)
     for number in range(laps):
-        profile = speed_profile(
-            path, limits, share=share, engine=engine, brakes=brakes, v_max=v_max
-        )
-        driven = drive(
-            path, vehicle, tire, speeds=profile, confirm=confirm, friction=friction,
-            tires=tires, seed=seed + number,
-        )  # fmt: skip
-        if not driven.scores.completed:
-            yield Lap(tire, limits, share, profile, driven, _seen(driven.drive), None)
+        profile = speed_profile(path, limits, share=share, **(planned or {"brakes": BRAKES}))
+        loop = drive(path, vehicle, tire, speeds=profile, seed=seed + number, **driven)
+        n = min(round(_SEEN / PERIOD), len(loop.drive))
+        averaged = np.convolve(loop.drive.e_y_seen, np.full(n, 1.0 / n), mode="valid")
+        learnt, seen = None, float(np.abs(averaged).max())
+        if loop.scores.completed:
+            learnt = identify(loop.drive.recording(), vehicle, start=tire, check=False)
+        yield Lap(tire, limits, share, profile, loop, seen, learnt)
+        if learnt is None:
             return
-        learnt = identify(driven.drive.recording(), vehicle, start=tire, check=False)
-        lap = Lap(tire, limits, share, profile, driven, _seen(driven.drive), learnt)
-        yield lap
-        share = min(_MOST, _GROWS * share) if lap.seen <= _NEAR else _SHRINKS * share
+        share = min(_MOST, _GROWS * share) if seen <= _NEAR else _SHRINKS * share
         if learnt.verdict.valid:
             tire = learnt.tire
             newer = speed_limits(tire, confidence=confidence)
             limits = newer.at_most(_LIMITS_GROW * float(limits.a_y[0]))
-
-
-def _seen(driven: Drive) -> float:
-    """Return the largest deviation that the car saw, averaged over its noise [m]."""
-    n = min(round(_SEEN / PERIOD), len(driven))
-    return float(np.abs(np.convolve(driven.e_y_seen, np.full(n, 1.0 / n), mode="valid")).max())

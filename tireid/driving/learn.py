@@ -39,12 +39,11 @@ class _Driver:
     """Steers to one side and the other, ever farther, until the car slides; then at random so far.
 
     Attributes: angle, commanded now [rad].
-    most : lateral acceleration [m/s²] that is enough.
     seed : of times and angles.
     """
 
-    def __init__(self, car: DoubleTrackCar, most: float, seed: int) -> None:
-        self._rng, self._period, self._most = np.random.default_rng(seed), car.period, most
+    def __init__(self, car: DoubleTrackCar, seed: int) -> None:
+        self._rng, self._period = np.random.default_rng(seed), car.period
         self._size, self._grows, self._side = car.vehicle.wheelbase * _FIRST / _SPEED**2, _GROWS, 1
         self._begins, self._ends = 0.0, _STRAIGHT  # of the swing [s]
         self.angle = self._from = self._to = 0.0
@@ -59,7 +58,7 @@ class _Driver:
         self._side_slip += share * (measured.v_y / measured.v_x - self._side_slip)
         self._peak = max(self._peak, abs(self._a_y))
         out = min(max(_OUT * max(self._peak, self._best), _LEAST_OUT), _MOST_OUT)
-        self._too_far |= abs(self._side_slip) > out or abs(self._a_y) > self._most
+        self._too_far |= abs(self._side_slip) > out
         if measured.t >= self._ends:
             self._size_swing()
             self._begin_swing(measured.t)
@@ -73,7 +72,6 @@ class _Driver:
 
     def _size_swing(self) -> None:
         """Size the next swing by what the last one has shown."""
-        expected = self._grows * self._peak  # of the swing that is done: a_y comes after the angle
         if self._too_far:
             self._largest = self._size if self._grows == _GROWS else self._largest
             self._size /= _GROWS
@@ -82,10 +80,9 @@ class _Driver:
             if self._grows == _GROWS:
                 gained = self._peak > _NO_MORE * self._best
                 self._in_vain = 0 if gained else self._in_vain + 1
-                if self._in_vain == _IN_VAIN or expected >= self._most:
+                if self._in_vain == _IN_VAIN:
                     self._grows = 1.0
-            self._size *= min(self._grows, self._most / max(expected, 1e-6))
-            self._size = min(self._size, self._largest)
+            self._size = min(self._grows * self._size, self._largest)
         self._best = max(self._best, self._peak)
         self._peak, self._too_far = 0.0, False
 
@@ -104,19 +101,17 @@ def learning_drive(
     rng: np.random.Generator,
     *,
     seed: int,
-    most: float = math.inf,
     lateral: LateralVelocity | None = None,
 ) -> Recording:
     """Drive a car without a path and return what its sensors saw; a car that spins ends it.
 
     Steering is random and grows from swing to swing until the sensors show that more of it no
-    longer turns the car, that its tail steps out, or `most`; then it is held there.
+    longer turns the car, or that its tail steps out; then it is held there.
 
-    most : lateral acceleration that is enough [m/s²].
     lateral : estimates v_y, and a_y in the plane of the road, in place of the sensors; None takes
     what they measure.
     """
-    driver, progress = _Driver(car, most, seed), Progress("the drive to learn on")
+    driver, progress = _Driver(car, seed), Progress("the drive to learn on")
     state, samples, forces = car.start(_SPEED), [], []
     n = round(DURATION / car.period)
     for k in range(n):

@@ -1,6 +1,6 @@
 """The files of `tireid drive`: numbers as JSON, every signal as CSV, figures as PNG, the film."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
@@ -42,8 +42,18 @@ from tireid.figures.style import save_figures
 from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
 from tireid.output import axle_columns, finite, text_table, write_csv, write_json
 from tireid.progress import say
-from tireid.report import Block, Headline, Picture, Report, Section, Table, printed, write_report
-from tireid.reports.common import READ, REPORT, drawings, origin
+from tireid.report import (
+    Block,
+    Headline,
+    Images,
+    Picture,
+    Report,
+    Section,
+    Table,
+    printed,
+    write_report,
+)
+from tireid.reports.common import READ, drawings, origin
 
 NO_FILM = "none"
 
@@ -185,8 +195,7 @@ def score_rows(runs: Sequence[ClosedLoop]) -> list[list[str]]:
         failures = ", ".join(f"{n} {name}" for name, n in score.failures.items()) or "0"
         times = " / ".join(f"{score.solve_ms[key]:.3f}" for key in ("median", "p99", "max"))
         off = [f"{score.rms_e_y_m:.3f} m", f"{score.peak_e_y_m:.3f} m"]
-        completed = "yes" if score.completed else end
-        rows.append([run.label, *off, completed, failures, f"{times} ms"])
+        rows.append([run.label, *off, "yes" if score.completed else end, failures, f"{times} ms"])
     return rows
 
 
@@ -205,29 +214,26 @@ _COLUMNS_ESTIMATED = {
     "inertial_v_y": "v_y_inertial_m_s",
     "inertial_v_y_sd": "v_y_inertial_sd_m_s",
 }
-_UNITS = {  # of signals of a drive, by their name
-    **dict.fromkeys(("s", "X", "Y", "e_y"), "m"),
-    **dict.fromkeys(("psi", "delta", "command", "e_psi"), "rad"),
-    **dict.fromkeys(("v_x", "v_y", "v_ref"), "m_s"),
-    **dict.fromkeys(("a_x", "a_y"), "m_s2"),
-    **{"t": "s", "r": "rad_s", "kappa": "1_m"},
-}
-_SIGNALS = (
-    *("t", "s", "X", "Y", "psi", "v_x", "v_y", "r", "a_x", "a_y", "delta", "command"),
-    *("e_y", "e_psi", "kappa", "v_ref"),
-)
+_UNITS = {  # of signals of a drive, by their name, in the order of columns
+    "t": "s", "s": "m", "X": "m", "Y": "m", "psi": "rad", "v_x": "m_s", "v_y": "m_s", "r": "rad_s",
+    "a_x": "m_s2", "a_y": "m_s2", "delta": "rad", "command": "rad", "e_y": "m", "e_psi": "rad",
+    "kappa": "1_m", "v_ref": "m_s",
+}  # fmt: skip
 
 
 def _drive_columns(drive: Drive) -> dict[str, Array]:
     """Return every signal of a drive by the name of its column, with its unit."""
-    measured = [(name, values) for name, values in drive.measured.items() if name != "t"]
     return {
-        **{f"{name}_{_UNITS[name]}": getattr(drive, name) for name in _SIGNALS},
+        **{f"{name}_{_UNITS[name]}": getattr(drive, name) for name in _UNITS},
         **axle_columns("alpha_{}_rad", axle_slip(drive)),
         **axle_columns("Fy{}_N", drive.axle_force),
         "status": drive.status.astype(np.float64),
         "solve_time_s": drive.solve_time,
-        **{f"{name}_measured_{_UNITS[name]}": values for name, values in measured},
+        **{
+            f"{name}_measured_{_UNITS[name]}": values
+            for name, values in drive.measured.items()
+            if name != "t"
+        },
         **{_COLUMNS_ESTIMATED[name]: values for name, values in drive.estimates.items()},
     }
 
@@ -256,7 +262,7 @@ def _known_curves(
 
 
 def write_drive_report(
-    folder: Path, drives: Drives, figures: Mapping[str, bytes], film: Path | None, command: str
+    folder: Path, drives: Drives, figures: Images, film: str, command: str
 ) -> None:
     """Write the report of drives along one path."""
     runs = drives.runs
@@ -267,12 +273,9 @@ def write_drive_report(
         numbers=_drive_headlines(runs),
         warnings=_drive_warnings(runs),
         sections=[
-            Section("How the car drove", _drive_blocks(runs, figures, film)),
+            Section("How the car drove", _drive_blocks(folder, runs, figures, film)),
             Section("The tracker's tires", known_blocks(runs, figures)),
-            Section(
-                "Timing",
-                drawings(figures, {"solve_times": "How long a step took."}),
-            ),
+            Section("Timing", drawings(figures, {"solve_times": "How long a step took."})),
             origin(
                 command,
                 first.drive.vehicle,
@@ -282,7 +285,7 @@ def write_drive_report(
             ),
         ],
     )
-    write_report(folder / REPORT, report)
+    write_report(folder, report)
 
 
 def _drive_headlines(runs: Sequence[ClosedLoop]) -> list[Headline]:
@@ -321,12 +324,12 @@ def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
 
 
 def _drive_blocks(
-    runs: Sequence[ClosedLoop], figures: Mapping[str, bytes], film: Path | None
+    folder: Path, runs: Sequence[ClosedLoop], figures: Images, film: str
 ) -> list[Block]:
     blocks: list[Block] = [Table("Scores of the drives.", SCORES, score_rows(runs))]
-    if film is not None:
+    if film != NO_FILM:
         caption = f"The drive on {runs[0].label} tires; outlines are the other cars."
-        blocks.append(Picture(film, caption, READ["film"]))
+        blocks.append(Picture(folder / f"drive.{film}", caption, READ["film"]))
     captions = {
         "path": "The path from above.",
         "errors": "Deviation, heading, acceleration and speed along the path.",
@@ -335,7 +338,7 @@ def _drive_blocks(
     return [*blocks, *drawings(figures, captions)]
 
 
-def known_blocks(runs: Sequence[ClosedLoop], figures: Mapping[str, bytes]) -> list[Block]:
+def known_blocks(runs: Sequence[ClosedLoop], figures: Images) -> list[Block]:
     """Return what trackers believed of the tires, and what they were given on the way."""
     captions = {
         "tires": "Forces of the first drive, and the tire models of the trackers.",
@@ -344,6 +347,5 @@ def known_blocks(runs: Sequence[ClosedLoop], figures: Mapping[str, bytes]) -> li
     blocks: list[Block] = [*drawings(figures, captions)]
     notes = [[run.label, f"{t:.2f}", printed(text)] for run in runs for t, text in run.drive.notes]
     if notes:
-        header = ["tires", "time [s]", "what"]
-        blocks.append(Table("Decisions along the way.", header, notes))
+        blocks.append(Table("Decisions along the way.", ["tires", "time [s]", "what"], notes))
     return blocks

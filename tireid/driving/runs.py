@@ -357,9 +357,8 @@ def drive(
     ):
         if needed and tire is None:
             raise ValueError(f"{why}: none is given")
-    setup = Setup(path=path, vehicle=vehicle, mu=friction, drops=(), wish=wish, tires=tires)
     conditions = Conditions(
-        setup=setup,
+        setup=Setup(path=path, vehicle=vehicle, mu=friction, drops=(), wish=wish, tires=tires),
         delay=delay_periods(delay),
         noise=noise,
         seed=seed,

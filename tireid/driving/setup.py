@@ -84,8 +84,7 @@ class Setup(NamedTuple):
 
         mu : its friction; None is that of the start.
         """
-        tire = self.car(open_field=True).tire
-        return _oracle(self.vehicle, tire, self.mu if mu is None else mu)
+        return _oracle(self.vehicle, self.car(open_field=True).tire, self.mu if mu is None else mu)
 
     def profile(self) -> SpeedProfile:
         """Return the wanted speed along the path.

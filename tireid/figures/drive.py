@@ -38,6 +38,10 @@ _HIGHEST = 5.0  # panel [in]
 _CARS_EVERY = 2.6  # wheelbases between two outlines
 
 
+_Drives = Mapping[str, "Drive"]  # by their tires
+Drops = Sequence[tuple[float, float]]  # arc length [m] and friction from there on
+
+
 @style.styled
 def drive_solve_figure(drive: "Drive") -> Figure:
     """Draw the solve times of a drive, their median and the time that one of a hundred exceeds."""
@@ -60,13 +64,13 @@ def drive_solve_figure(drive: "Drive") -> Figure:
     return figure
 
 
-PATH: Mapping[str, Any] = {
+PATH: style.Look = {
     "color": "#9ADBC6",
     "linewidth": 3.5,
     "solid_capstyle": "butt",
     "label": "path",
 }
-CONES: Mapping[str, Any] = {
+CONES: style.Look = {
     "linestyle": "",
     "marker": "o",
     "markersize": 2.6,
@@ -77,7 +81,7 @@ CONES: Mapping[str, Any] = {
 }
 ORACLE = "oracle"  # the name of the true tire
 AT_THE_END = " at the end"  # what a label ends with that is of a tire as it was then
-_TIRES: Mapping[str, Mapping[str, Any]] = {
+_TIRES = {
     "linear": {"color": style.GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.3},
     "frozen": {"color": style.ORANGE, "linestyle": "-", "linewidth": 1.2},
     ORACLE: {"color": style.BLACK, "linestyle": (0, (5, 1.5)), "linewidth": 1.1},
@@ -97,10 +101,10 @@ ARC = "arc length of the path [m]"
 
 @style.styled
 def drive_errors_figure(
-    drives: Mapping[str, "Drive"],
+    drives: _Drives,
     *,
     off_path: float,
-    drops: Sequence[tuple[float, float]] = (),
+    drops: Drops = (),
     faults: Sequence[SensorFault] = (),
 ) -> Figure:
     """Draw lateral deviation, heading error, lateral acceleration and speed over arc length.
@@ -142,14 +146,13 @@ def drive_errors_figure(
     low, high = panels[3].get_ylim()
     room = max(0.5 * (2.0 - high + low), 0.0)  # a speed that is held is a level line
     panels[3].set_ylim(low - room, high + room)
-    last = max(float(drive.s[-1]) for drive in drives.values())
-    panels[-1].set(xlabel=ARC, xlim=(0.0, last))
+    panels[-1].set(xlabel=ARC, xlim=(0.0, max(float(drive.s[-1]) for drive in drives.values())))
     figure.align_ylabels(panels)
     style.legend_above(figure, last=(*drives, _REPLANNED))
     return figure
 
 
-def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
+def mark_drops(axes: Axes, drops: Drops) -> None:
     """Mark where the friction of the road changes.
 
     drops : arc length [m] and friction from there on.
@@ -162,8 +165,8 @@ def mark_drops(axes: Axes, drops: Sequence[tuple[float, float]]) -> None:
 
 def _mark_road(
     axes: Axes,
-    drives: Mapping[str, "Drive"],
-    drops: Sequence[tuple[float, float]],
+    drives: _Drives,
+    drops: Drops,
     faults: Sequence[SensorFault],
 ) -> None:
     """Mark drops, shade where a sensor is broken, mark where a supervisor came to doubt it."""
@@ -195,11 +198,11 @@ def _mark_road(
 
 @style.styled
 def drive_steering_figure(
-    drives: Mapping[str, "Drive"],
+    drives: _Drives,
     *,
     angle_limit: float,
     rate_limit: float,
-    drops: Sequence[tuple[float, float]] = (),
+    drops: Drops = (),
     faults: Sequence[SensorFault] = (),
 ) -> Figure:
     """Draw commanded angles of the front wheels over arc length, and the rate of the first drive.
@@ -263,10 +266,7 @@ def car_shape(vehicle: Vehicle, X: float, Y: float, psi: float, delta: float = 0
     chassis = vehicle.chassis
     tracks = (_TRACK * long,) * 2 if chassis is None else (chassis.track_front, chassis.track_rear)
     half = 0.5 * (max(tracks) + _BODY_BESIDE_TRACK * long)
-    front, rear = (
-        vehicle.l_f + _FRONT_OVERHANG * long,
-        -vehicle.l_r - _REAR_OVERHANG * long,
-    )
+    front, rear = vehicle.l_f + _FRONT_OVERHANG * long, -vehicle.l_r - _REAR_OVERHANG * long
     angle = np.linspace(0.0, 2.0 * np.pi, _CORNERS)
     round_ = np.column_stack([np.cos(angle), np.sin(angle)])
     body = np.sign(round_) * np.abs(round_) ** _ROUNDING * (0.5 * (front - rear), half)
@@ -294,14 +294,13 @@ _INNER_WIDTH = style.PAGE - 0.75  # what labels leave of the page [in]
 
 
 @style.styled
-def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
+def drive_path_figure(drives: _Drives) -> Figure:
     """Draw the path, its cones and where every car drove; the first with its outlines."""
     path = next(iter(drives.values())).path
     low, high = _extent(path, drives)
     width, height = high - low
-    rows = 1
-    if width > _NARROW * height:
-        rows = min(_MOST_ROWS, max(1, round(width / _ROW_LENGTH)))
+    long = width > _NARROW * height
+    rows = min(_MOST_ROWS, max(1, round(width / _ROW_LENGTH))) if long else 1
     step = width / rows
     inch = min(_INNER_WIDTH / step, _HIGHEST / height)  # of a meter
     figure = style.new_figure(rows * (height * inch + 0.3) + 0.6)
@@ -310,14 +309,14 @@ def drive_path_figure(drives: Mapping[str, "Drive"]) -> Figure:
         ends = float(low[0] + row * step), float(low[0] + (row + 1) * step)
         axes.set(xlim=ends, ylim=(low[1], high[1]), aspect="equal", ylabel="Y [m]")
         _draw(axes, path, drives)
-        axes.set_yticks(axes.get_yticks()[1:-1:1])
+        axes.set_yticks(axes.get_yticks()[1:-1])
         axes.set_ylim(low[1], high[1])
     panels[-1].set_xlabel("X [m]")
     style.legend_above(figure, last=tuple(drives))
     return figure
 
 
-def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
+def _extent(path: "Path", drives: _Drives) -> tuple[Array, Array]:
     """Corners of what is shown: the path with its cones, and the tracks as far as not absurd."""
     places = np.vstack([np.column_stack([path.X, path.Y]), path.cones])
     low, high = places.min(axis=0) - _MARGIN, places.max(axis=0) + _MARGIN
@@ -331,7 +330,7 @@ def _extent(path: "Path", drives: Mapping[str, "Drive"]) -> tuple[Array, Array]:
     return low, high
 
 
-def _draw(axes: Axes, path: "Path", drives: Mapping[str, "Drive"]) -> None:
+def _draw(axes: Axes, path: "Path", drives: _Drives) -> None:
     axes.plot(path.X, path.Y, **PATH)
     if len(path.cones):
         axes.plot(*path.cones.T, **CONES)

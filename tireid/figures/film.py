@@ -22,7 +22,16 @@ from mpc.loop.record import Drive
 from mpc.tires import PredictionTire
 from mpc.tires.tire import curves_at
 from tireid.driving.known import Known
-from tireid.figures.drive import AT_THE_END, CONES, ORACLE, PATH, car_shape, mark_drops, tire_look
+from tireid.figures.drive import (
+    AT_THE_END,
+    CONES,
+    ORACLE,
+    PATH,
+    Drops,
+    car_shape,
+    mark_drops,
+    tire_look,
+)
 from tireid.figures.style import AXLES, BLUE, LOOK, PURPLE, SKY, force_range, force_unit_of
 from tireid.figures.tires import TireCurve, axle_slip
 from tireid.progress import say
@@ -47,7 +56,7 @@ class Film(NamedTuple):
     title: str
     drives: Mapping[str, Drive]
     curves: Sequence[TireCurve]
-    drops: Sequence[tuple[float, float]] = ()
+    drops: Drops = ()
     known: Sequence[Known] = ()
     tire: PredictionTire | None = None
 

@@ -23,8 +23,8 @@ from models.vehicle import Vehicle
 from tireid.figures import style
 from tireid.figures.thinned import drawn_samples, drawn_times
 
-_Curve = tuple[Array, Mapping[str, Any]]  # forces of both axles (n, 2) [N], and their look
-_RESIDUAL: Mapping[str, Any] = {"linewidth": 0.8, "linestyle": "-"}
+_Curve = tuple[Array, style.Look]  # forces of both axles (n, 2) [N], and their look
+_RESIDUAL: style.Look = {"linewidth": 0.8, "linestyle": "-"}
 
 
 def _force_panels(
@@ -115,7 +115,7 @@ def force_figure(
         for axes, (at, replay) in zip(panels[first:, axle], replays.items(), strict=False):
             style.note(axes, _errors(replay, unit, axle))
             if first:
-                style.mark_freeze(panels[0, axle], at, prediction=False)
+                style.mark_freeze(panels[0, axle], at)
             style.mark_freeze(axes, at, prediction=True)
         if len(panels) > len(rows):
             against = "online" if truth is None else "truth"

@@ -1,8 +1,6 @@
 """A planned lap: on the map and over arc length, which axle limits it, and how far it goes."""
 
-from collections.abc import Mapping
 from itertools import product
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,7 +14,7 @@ from tireid.figures.forces import inputs_figure
 _POINTS = 2500  # of a lap that are drawn
 _AXLES = {"front": "#A5D2ED", "rear": "#F6CBB0"}
 _ABOVE = 1.15  # of the top speed, up to which the limit of the turn is drawn
-_DASHED: Mapping[str, Any] = {"color": style.BLACK, "linewidth": 1.0, "linestyle": (0, (3, 1.5))}
+_DASHED: style.Look = {"color": style.BLACK, "linewidth": 1.0, "linestyle": (0, (3, 1.5))}
 
 
 def plot(what: Recording | SpeedProfile) -> Figure:
@@ -68,8 +66,7 @@ def lap_gg_figure(profile: SpeedProfile) -> Figure:
     (planner, share), v = profile.planned, profile.v
     limits, figure = planner.limits, style.new_figure(4.2)
     axes = figure.subplots()
-    asked = profile.a_x + limits.drag * v**2
-    points = axes.scatter(profile.a_y, asked, c=v, s=3.0, zorder=3.0)
+    points = axes.scatter(profile.a_y, profile.a_x + limits.drag * v**2, c=v, s=3.0, zorder=3.0)
     figure.colorbar(points, ax=axes, label="speed [m/s]")
     for speed, side in product((v.min(), v.max()), (limits.push.most, -limits.brake.most)):
         row = int(np.abs(limits.v - speed).argmin())

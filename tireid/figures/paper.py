@@ -58,7 +58,7 @@ def error_figure(
     for (name, bound), (color, dashes) in zip(known.items(), cycle(looks), strict=False):
         axes.axhline(bound, color=color, linestyle=dashes, linewidth=1.1, label=name)
     for t_freeze in freeze_times:
-        style.mark_freeze(axes, t_freeze, prediction=False)
+        style.mark_freeze(axes, t_freeze)
     unit = force_unit_name(style.paper_design(history).force_unit)
     axes.set(ylabel=rf"error norm $|\tilde{{\xi}}|$ [{unit} s]")
     style.label_time(axes, recording.t)
@@ -102,7 +102,7 @@ def weights_figure(history: History, freeze_times: Sequence[float] = ()) -> Figu
             values = values[peak <= 10.0 * np.median(peak[np.isfinite(peak)])]
         axes.set_ylim(style.force_range(values))
         for t_freeze in freeze_times:
-            style.mark_freeze(axes, t_freeze, prediction=False)
+            style.mark_freeze(axes, t_freeze)
         style.legend_beside(axes)
     figure.align_ylabels()
     return figure
@@ -115,7 +115,7 @@ def _lines(axes: Axes, t: Array, values: Array, color: str, label: str) -> None:
 
 
 _Quartiles = tuple[float, float, float]  # median, lower and upper quartile
-_MARKS: Mapping[str, tuple[str, str]] = {  # color, marker
+_MARKS = {  # color, marker
     "instantaneous": (style.ORANGE, "s"),
     "integral": (style.BLUE, "o"),
     "instantaneous_scaled": (style.GREEN, "D"),
@@ -146,11 +146,10 @@ def comparison_figure(
         places = {name: k + _OFFSET * (number - 1) for k, name in enumerate(columns)}
         middle, *ends = np.array(list(row.values()), dtype=np.float64).T
         middle[~np.isfinite(middle)] = np.nan
-        whiskers = np.nan_to_num(np.abs(middle - ends), nan=0.0, posinf=0.0)
         axes.errorbar(
             [places[name] for name in row],
             middle,
-            yerr=whiskers,
+            yerr=np.nan_to_num(np.abs(middle - ends), nan=0.0, posinf=0.0),
             fmt=marker,
             label=label,
             color=color,

@@ -1,8 +1,5 @@
 """A stored model beside the motion of a drive: the force that it shows, and the road's friction."""
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from matplotlib.figure import Figure
 
@@ -11,7 +8,7 @@ from identifier.verdict import RoadFriction, WindowForces
 from models.vehicle import Vehicle
 from tireid.figures import style
 
-_POINTS: Mapping[str, Any] = {"linestyle": "", "marker": ".", "markersize": 3.0}
+_POINTS: style.Look = {"linestyle": "", "marker": ".", "markersize": 3.0}
 
 
 @style.styled

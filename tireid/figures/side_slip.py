@@ -25,8 +25,8 @@ _BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no
 _FIRST = "inertial"  # which has the band where several estimate v_y
 _OTHERS = (style.ORANGE, style.GREEN, style.PURPLE, style.AMBER, style.SKY, style.GREY)
 _BAND = "within 2 standard deviations"
-_SHADE: Mapping[str, Any] = {"color": style.BLUE, "alpha": 0.2, "linewidth": 0.0}
-_ALONE: Mapping[str, Any] = {"color": style.GREY, "label": "inertial identifier alone"}
+_SHADE: style.Look = {"color": style.BLUE, "alpha": 0.2, "linewidth": 0.0}
+_ALONE: style.Look = {"color": style.GREY, "label": "inertial identifier alone"}
 
 
 @style.styled
@@ -60,7 +60,7 @@ def _draw(
     axes: Axes,
     recording: Recording,
     given: Mapping[str, SideSlip],
-    looks: Mapping[str, Mapping[str, Any]],
+    looks: Mapping[str, style.Look],
 ) -> None:
     """Draw the side slip of a recording, with the band of the first estimate."""
     truth, first = recording.logged_v_y, next(iter(given.values()))

@@ -18,7 +18,6 @@ from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine, LayoutEngine
-from matplotlib.legend import Legend
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 from PIL import Image
@@ -50,12 +49,15 @@ BLACK, GREY, BLUE, ORANGE = "#000000", "#767676", "#0072B2", "#D55E00"
 GREEN, PURPLE, SKY, AMBER = "#009E73", "#AA4499", "#56B4E9", "#E69F00"
 SERIES = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, GREY)
 
-TRUTH: Mapping[str, Any] = {"color": BLACK, "linewidth": 1.5, "label": "truth"}
-ONLINE: Mapping[str, Any] = {"color": BLUE, "linewidth": 0.9, "label": "online"}
-_DASHED = {"color": ORANGE, "linestyle": (0, (3.5, 1.2))}
-FROZEN: Mapping[str, Any] = {**_DASHED, "linewidth": 1.1, "label": "frozen weights"}
-_DOTTED = {"color": GREY, "linestyle": (0, (1, 1.2))}
-LINEAR: Mapping[str, Any] = {**_DOTTED, "linewidth": 1.2, "label": "linear tire"}
+Look = Mapping[str, Any]  # of a curve, as words of matplotlib
+TRUTH: Look = {"color": BLACK, "linewidth": 1.5, "label": "truth"}
+ONLINE: Look = {"color": BLUE, "linewidth": 0.9, "label": "online"}
+FROZEN: Look = {
+    "color": ORANGE, "linestyle": (0, (3.5, 1.2)), "linewidth": 1.1, "label": "frozen weights",
+}  # fmt: skip
+LINEAR: Look = {
+    "color": GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.2, "label": "linear tire",
+}  # fmt: skip
 
 _look = rc_params_from_file(Path(__file__).with_name("look.mplstyle"), use_default_template=False)
 LOOK: dict[str, Any] = dict(_look.items())
@@ -191,16 +193,12 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
     return buffer.getvalue()
 
 
-def save_figure(figure: Figure, path: Path) -> bytes:
-    """Write a figure as PNG, and return it."""
-    image = figure_png(figure)
-    write_file(path, image)
-    return image
-
-
 def save_figures(folder: Path, figures: Mapping[str, Figure]) -> dict[str, bytes]:
     """Write figures as PNG under their names; return these, which a report shows, too."""
-    return {name: save_figure(one, folder / f"{name}.png") for name, one in figures.items()}
+    images = {name: figure_png(one) for name, one in figures.items()}
+    for name, image in images.items():
+        write_file(folder / f"{name}.png", image)
+    return images
 
 
 TIME = "time [s]"
@@ -236,7 +234,7 @@ def label_time(axes: Axes, t: Array) -> None:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value - zero:g}"))
 
 
-def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool) -> None:
+def mark_freeze(axes: Axes, t_freeze: float, *, prediction: bool = False) -> None:
     """Draw the freeze as a line and, where the replay goes on, shade what it predicts.
 
     The limits of the time axis must be set before.
@@ -288,34 +286,20 @@ def legend_above(figure: Figure, *, columns: int | None = None, last: Sequence[s
         engine = figure.get_layout_engine()
         if isinstance(engine, _Margins):
             engine.entries = -(-len(entries) // columns)
-        _bolder(
-            figure.legend(
-                list(entries.values()),
-                list(entries),
-                ncols=columns,
-                loc="outside upper center",
-                borderaxespad=0.2,
-            )
-        )
+        place = {"loc": "outside upper center", "borderaxespad": 0.2}
+        _bold_legend(figure, entries, ncols=columns, **place)
 
 
 def legend_beside(axes: Axes) -> None:
     """Put the legend of one panel to its right, where it covers no data."""
     entries = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    _bolder(
-        axes.legend(
-            list(entries.values()),
-            list(entries),
-            loc="upper left",
-            bbox_to_anchor=(1.01, 1.0),
-            borderaxespad=0.0,
-        )
-    )
+    place = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0), "borderaxespad": 0.0}
+    _bold_legend(axes, entries, **place)
 
 
-def _bolder(legend: Legend) -> None:
-    """Make thin lines and faint dots of a legend large enough to tell their colors."""
-    for line in legend.get_lines():
+def _bold_legend(owner: Any, entries: Mapping[str, Any], **place: Any) -> None:
+    """Put a legend, its thin lines and faint dots large enough to tell their colors."""
+    for line in owner.legend([*entries.values()], [*entries], **place).get_lines():
         line.set_linewidth(max(line.get_linewidth(), 1.2))
         if line.get_marker() == ".":
             line.set_markersize(7.0)

@@ -39,8 +39,7 @@ def drawn_times(recording: Recording, t: Array) -> Array:
 
     t : times of some of its samples, rising (k,) [s].
     """
-    begins = recording.t[list(recording.breaks)]
-    segment = np.searchsorted(begins, t, side="right")
+    segment = np.searchsorted(recording.t[list(recording.breaks)], t, side="right")
     return np.where(np.diff(segment, prepend=segment[:1]) > 0, np.nan, t)
 
 

@@ -1,7 +1,7 @@
 """Axle force against slip angle: the shape of the tire, as measured and as learnt."""
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _UNKNOWN = "slip not known"
 _BAND = "band of 90 %"
-_CLOUD: Mapping[str, Any] = {
+_CLOUD: style.Look = {
     "linestyle": "",
     "marker": ".",
     "markersize": 2.2,
@@ -57,7 +57,7 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     limits = style.force_range(reference, frozen)
     stiffness = vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear
 
-    learnt: Mapping[str, Any] = {**_CLOUD, "color": style.ORANGE, "label": "frozen weights"}
+    learnt: style.Look = {**_CLOUD, "color": style.ORANGE, "label": "frozen weights"}
     figure, panels = style.axle_panels([3.2] if known is None else [3.2, 1.3], sharex="col")
     for axle, (axes, lowest) in enumerate(zip(panels[0], panels[-1], strict=True)):
         x, y, truth = alpha[:, axle], frozen[:, axle], reference[:, axle]
@@ -104,14 +104,13 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
             linewidth=0.4,
             zorder=1.5,
         )
-    label = f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}"
     axes.plot(
         degrees,
         model.force(slip)[:, axle] / newtons,
         color=style.BLUE,
         linewidth=1.2,
         zorder=4,
-        label=label,
+        label=f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}",
     )
 
 
@@ -156,8 +155,7 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
         axes.plot(alpha[:, axle], force[:, axle], color=style.SKY, **cloud)
         for curve in curves:
             drawn = style.drawable(curve.force[:, axle] / unit.newtons, limits)
-            look = tire_look(curve.label)
-            axes.plot(np.rad2deg(curve.alpha), drawn, label=curve.label, **look)
+            axes.plot(np.rad2deg(curve.alpha), drawn, label=curve.label, **tire_look(curve.label))
         axes.set(xlim=(-reach, reach), ylim=limits)
         _label_slip(axes)
     style.label_forces(panels, unit, residual=False)
@@ -188,6 +186,6 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
         axes.set(ylabel=label, xlim=(t[0], t[-1]))
         axes.set_ylim(0.0, 1.1 * float(values.max()) or 1.0)
         for freeze in freeze_times:
-            style.mark_freeze(axes, freeze, prediction=False)
+            style.mark_freeze(axes, freeze)
     style.label_time(panels[-1], t)
     return figure

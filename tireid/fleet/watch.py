@@ -19,6 +19,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import chdtrc
 
 from codegen.arrays import Array
 from identifier.estimate.information import PLACE, SIZE, Information, coordinates
@@ -89,11 +90,13 @@ def watch(
         driven[car][day] = driven[car].get(day, Information.nothing()) + one
     compared = {car: _compared(driven[car], beliefs[car], baseline) for car in sorted(driven)}
     T = _scatter(list(compared.values()))
-    days = [
-        _judged(car, day, driven[car][day].seconds, z, S_day + S_reference + T + T / m, alarm)
-        for car, some in compared.items()
-        for day, z, S_day, S_reference, m in some
-    ]
+    days = []
+    for car, some in compared.items():
+        for day, z, S_day, S_reference, m in some:
+            S = S_day + S_reference + T + T / m
+            x2, sd = float(z @ np.linalg.solve(S, z)), np.sqrt(np.diag(S)).tolist()
+            p, seconds = float(chdtrc(3, x2)), driven[car][day].seconds
+            days.append(Day(car, day, seconds, tuple(z.tolist()), tuple(sd), x2, p, p < alarm))
     return days, [car for car, some in compared.items() if not some]
 
 
@@ -138,12 +141,4 @@ def _scatter(cars: Sequence[_Compared]) -> Array:
     found = np.zeros(3)
     if steps:
         found = np.maximum(np.median(steps, axis=0) / MEDIAN / 2.0 - np.median(known, axis=0), 0.0)
-    total = USUAL_STEPS * USUAL**2 + len(steps) * found
-    return np.diag(total / (USUAL_STEPS + len(steps)))
-
-
-def _judged(car: str, day: str, seconds: float, z: Array, S: Array, alarm: float) -> Day:
-    x2 = float(z @ np.linalg.solve(S, z))
-    p = math.erfc(math.sqrt(x2 / 2.0)) + math.sqrt(2.0 * x2 / math.pi) * math.exp(-x2 / 2.0)
-    sd = np.sqrt(np.diag(S))
-    return Day(car, day, seconds, tuple(z.tolist()), tuple(sd.tolist()), x2, p, p < alarm)
+    return np.diag((USUAL_STEPS * USUAL**2 + len(steps) * found) / (USUAL_STEPS + len(steps)))

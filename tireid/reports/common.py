@@ -15,15 +15,13 @@ from models.files import digest, digest_of_bytes
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
-from tireid.report import Picture, Section, Table
-
-REPORT = "report.html"
+from tireid.report import Images, Picture, Section, Table
 
 with Path(__file__).with_name("read.toml").open("rb") as file:
     READ: dict[str, str] = tomllib.load(file)  # how to read each figure, in one line
 
 
-def drawings(figures: Mapping[str, bytes], captions: Mapping[str, str]) -> list[Picture]:
+def drawings(figures: Images, captions: Mapping[str, str]) -> list[Picture]:
     """Return the figures that there are of some, by their captions."""
     return [
         Picture(figures[name], text, READ[name])
@@ -37,10 +35,9 @@ def _recording_digest(recording: Recording) -> str:
 
     Of more than `LONG` samples bytes are counted, of fewer their decimals.
     """
-    signals = (recording.t, recording.v_x, recording.logged_v_y, recording.r)
-    steering = (recording.delta_f, recording.delta_r)
-    truth = (recording.a_y, recording.axle_force)
-    parts = [part for part in (*signals, *steering, *truth) if part is not None]
+    names = ("t", "v_x", "logged_v_y", "r", "delta_f", "delta_r", "a_y", "axle_force")
+    signals = [getattr(recording, name) for name in names]
+    parts = [part for part in signals if part is not None]
     if len(recording) <= LONG:
         return digest([part.tolist() for part in parts])
     return digest_of_bytes(

@@ -1,6 +1,6 @@
 """The report of `tireid identify`: what was learnt, how well it predicts, where not to ask it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import astuple
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from tireid import report as page
 from tireid import verdicts
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
 from tireid.identified import Results
-from tireid.reports.common import READ, REPORT, drawings, origin
+from tireid.reports.common import READ, drawings, origin
 
 _EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
 
@@ -33,7 +33,7 @@ _EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth
 def write_identify_report(
     folder: Path,
     found: Results,
-    figures: Mapping[str, bytes],
+    figures: page.Images,
     diagnosis: Diagnosis,
     command: str,
 ) -> None:
@@ -80,7 +80,7 @@ def write_identify_report(
             ),
         ],
     )
-    page.write_report(folder / REPORT, report)
+    page.write_report(folder, report)
 
 
 def _how_learnt(learnt: History) -> str:
@@ -124,7 +124,7 @@ def identify_headlines(found: Results) -> list[page.Headline]:
     return [*numbers, *verdicts.known_headline(found.model)]
 
 
-def _evaluated_headlines(evaluated: Mapping[str, Verdict]) -> list[page.Headline]:
+def _evaluated_headlines(evaluated: verdicts.Verdicts) -> list[page.Headline]:
     """Return on how many validation drives a model is valid, and its error."""
     meaning = "replayed validation drives with a valid prediction"
     numbers = verdicts.verdicts_headline(evaluated, meaning)
@@ -136,7 +136,7 @@ def _evaluated_headlines(evaluated: Mapping[str, Verdict]) -> list[page.Headline
     return numbers
 
 
-def curve_drawing(figures: Mapping[str, bytes], verdict: Verdict) -> page.Picture:
+def curve_drawing(figures: page.Images, verdict: Verdict) -> page.Picture:
     """Return the learnt curve with its band, the first figure of a report."""
     word = "" if verdict.valid else f"{verdict.word[0].upper()}{verdict.word[1:]}. "
     caption = f"{word}Axle force over slip angle: drive, curve and its band."
@@ -154,19 +154,13 @@ def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
             said.append(
                 f"{name} has no true forces: errors are against the forces identified online."
             )
-        said += _extrapolated(model, recording)
+        said += extrapolated(model, recording)
     if model.known_slip is None:
         said.append("This kind of model does not report the slip range that it was identified for.")
     return said
 
 
-def stored_model_warnings(model: TireModel, recording: Recording) -> list[str]:
-    """Return what speaks against a stored model over a drive beside the verdict."""
-    estimated = [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
-    return [*estimated, *_extrapolated(model, recording)]
-
-
-def _extrapolated(model: TireModel, recording: Recording) -> list[str]:
+def extrapolated(model: TireModel, recording: Recording) -> list[str]:
     """Return at which axles a drive slips farther than the model knows, in words."""
     beyond = beyond_known(model, recording)
     if model.known_slip is None or beyond is None:
@@ -179,7 +173,7 @@ def _extrapolated(model: TireModel, recording: Recording) -> list[str]:
     ]
 
 
-def learnt_blocks(law: str, model: TireModel, figures: Mapping[str, bytes]) -> list[page.Block]:
+def learnt_blocks(law: str, model: TireModel, figures: page.Images) -> list[page.Block]:
     facts = [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
     blocks: list[page.Block] = [
         (
@@ -214,7 +208,7 @@ def band_sentence(model: TireModel) -> str:
     )
 
 
-def _evaluated(evaluated: Mapping[str, Verdict]) -> list[page.Block]:
+def _evaluated(evaluated: verdicts.Verdicts) -> list[page.Block]:
     rows: list[list[page.Cell]] = []
     for name, verdict in evaluated.items():
         errors = verdict.model_error or (None, None)
@@ -230,7 +224,7 @@ def _evaluated(evaluated: Mapping[str, Verdict]) -> list[page.Block]:
     return [page.Table(caption, ["drive", "verdict", "front [%]", "rear [%]"], rows)]
 
 
-def _errors(found: Results, figures: Mapping[str, bytes]) -> list[page.Block]:
+def _errors(found: Results, figures: page.Images) -> list[page.Block]:
     learnt, *others = found.runs
     rows, online = list[list[page.Cell]](), learnt.online
     for run in (learnt, *found.parts, *others):
