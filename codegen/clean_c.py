@@ -299,7 +299,7 @@ class Statements:
             return f"({self._real(args[0])} {BINARY[op]} {self._real(args[1])})"
         if op in MACROS:
             return f"{self.prefix.upper()}_{MACROS[op]}({_bare(self._real(args[0]))})"
-        rules: Mapping[str, Callable[[], str]] = {
+        rules = {
             "not": lambda: f"(!{self._condition(args[0])})",
             "neg": lambda: f"(-{self._real(args[0])})",
             "inv": lambda: f"({literal(1.0, self.prefix)} / {self._real(args[0])})",

@@ -68,7 +68,7 @@ def unpacked(packed: Array, q: int) -> Array:
     F[:, *np.array(triangle(q)).T] = packed
     D = np.einsum("aii->ai", F).copy()
     np.einsum("aii->ai", F)[:] = 1.0
-    P: Array = np.einsum("aij,aj,akj->aik", F, D, F)
+    P = np.einsum("aij,aj,akj->aik", F, D, F)
     return 0.5 * (P + P.transpose(0, 2, 1))
 
 

@@ -106,8 +106,7 @@ def unit_matrix(alpha: Array, ladder: tuple[float, ...]) -> Array:
     """Return tanh(α/α_j) (k, n) in numpy.
     alpha : slip angles [rad], (k,).   ladder : slip scales [rad], (n,).
     """
-    units: Array = np.tanh(np.asarray(alpha)[:, None] / np.array(ladder))
-    return units
+    return np.tanh(np.asarray(alpha)[:, None] / np.array(ladder))
 
 
 def unit_slopes(alpha: Array | float, ladder: tuple[float, ...]) -> Array:

@@ -96,8 +96,7 @@ def _projected(force: Array, ladder: tuple[float, ...]) -> Array:
     """Return the weights whose curves come closest to given ones, with a little ridge.
     force : curves at `SLIPS` (300,) or (300, k).   ladder : slip scales of the units [rad].
     """
-    weights: Array = _projector(ladder) @ force
-    return weights
+    return _projector(ladder) @ force
 
 
 @cache

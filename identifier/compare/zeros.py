@@ -36,7 +36,7 @@ def zeros(model: TireModel, recording: Recording) -> Day:
     sd = priors.sd[WHERE]
     windows = brisk_windows(part, slowest)
     value = np.zeros(len(NUMBERS))
-    P: Array = np.asarray(np.linalg.inv(prior), np.float64)
+    P = np.asarray(np.linalg.inv(prior), np.float64)
     enough = len(windows) * windows.duration / 2.0 >= ENOUGH and part.logged_v_y is not None
     if enough:
         loads = np.array(vehicle.axle_loads)
@@ -47,8 +47,7 @@ def zeros(model: TireModel, recording: Recording) -> Day:
 
         def missed(of: Array) -> Array:
             force = windows.mean(model.predict(corrected(part, of)) / loads)
-            away: Array = np.nan_to_num((measured - force) / size, nan=1e3)
-            return away
+            return np.nan_to_num((measured - force) / size, nan=1e3)
 
         e = missed(value)
         for _ in range(_ITERATIONS):

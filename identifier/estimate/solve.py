@@ -130,8 +130,7 @@ class Problem:
 
     def times(self, k: int) -> Array:
         """Return when the residuals of a drive are [s]."""
-        found: Array = self.drives[k].t[:: self._strides[k]][self._kept[k]]
-        return found
+        return self.drives[k].t[:: self._strides[k]][self._kept[k]]
 
     def thinned(self) -> "Problem":
         """Return the problem of one road with means of samples, for first guesses."""

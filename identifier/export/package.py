@@ -161,8 +161,7 @@ def synthetic_samples(specialized: SpecializedStep, n: int = _SAMPLES) -> Array:
 
 
 def _triangle(phase: Array) -> Array:
-    wave: Array = 4.0 * np.abs(phase - np.floor(phase + 0.5)) - 1.0
-    return wave
+    return 4.0 * np.abs(phase - np.floor(phase + 0.5)) - 1.0
 
 
 def run_in_virtual_machine(

@@ -323,8 +323,7 @@ class InertialIdentifier(Method):
         sensors = state["sensors"].reshape(-1, len(SENSORS))[1:]
         tilt = state["body"].reshape(-1, 2)[1:, 0]
         bias, roll = (sensors[:, SENSORS.index(name)] for name in ("bias", "roll"))
-        beside: Array = bias + roll * tilt / GRAVITY
-        return beside
+        return bias + roll * tilt / GRAVITY
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
         """Return the model with the carried weights: where tires are held, as sure as typical ones.

@@ -204,7 +204,7 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     )
     car, laws, trust, dt, slowest = s.car, s.laws, s.trust, s.dt, s.learning_speed
     into = learnt.into(n, s.curves, s.compliance)
-    load: Load = partial(load_ratio, s.downforce) if pressed else static_load
+    load = partial(load_ratio, s.downforce) if pressed else static_load
     seen = ca.vertcat(0, s.x[1])  # a missing v_y speaks against no sample
     gated = gate(s.plausibility, dt, s.gate, seen, s.u, s.v_x)
     runs = ca.logic_and(gated.on, gated.v_x >= slowest)

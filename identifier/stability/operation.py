@@ -147,8 +147,7 @@ def estimated_input_feedback(lost: BicycleParameters, v_x: float) -> Array:
     m, I_z, l_f, l_r, *stiffness = lost
     K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
     slip = np.array([[1.0, l_f], [1.0, -l_r]])
-    feedback: Array = np.diag(stiffness) @ (slip @ K) / v_x
-    return feedback
+    return np.diag(stiffness) @ (slip @ K) / v_x
 
 
 # From a car and how hard it is driven to what a certificate must know: signals and disturbances.

@@ -380,7 +380,7 @@ def _verdict(evaluated: _Evaluated, listed: list[Objection], whole: Recording) -
     counted = recording.v_x >= model.min_speed
     motion = motion_error(found.predicted, recording, model.vehicle, counted)
     lateral, yaw = (None, None) if motion is None else motion.explained
-    measures: dict[str, tuple[float, ...] | float | None] = {
+    measures = {
         "force_missed": tuple(map(float, found.model_error)),
         "rms_force_static_loads": tuple(map(float, found.force)),
         "peak_force_static_loads": tuple(map(float, found.peak)),

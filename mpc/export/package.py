@@ -200,7 +200,7 @@ def build_mpc_package(
     """
     packaging.check_name(name, "_mpc")
     tracker = Tracker(tire, problem, period=period, delay=delay, caution=caution)
-    params: _Params = tracker.params
+    params = tracker.params
     content = _ingredients(tracker, name, single=single)
     about = _summary(tracker, content)
     files = c_sources(

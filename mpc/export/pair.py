@@ -78,7 +78,7 @@ Arrays = dict[str, tuple[Sequence[float], str]]
 
 
 def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
-    numbers: Numbers = {
+    numbers = {
         "CURVES": (1, "identified are curves over slip; else a network"),
         "UNITS": (f"{len(model.ladder)}U", "of a curve"),
         "SWAY": (repr(GRAVITY / model.sway.frequency**2), "g over the roll's frequency^2 [m]"),
@@ -95,7 +95,7 @@ def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
 def _of_network(model: NetworkModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
     del tracker
     assert model.network.scale is not None, "an identified network has scales"
-    numbers: Numbers = {
+    numbers = {
         "CURVES": (0, "identified is a network; else curves over slip"),
         "UNITS": (f"{model.network.hidden}U", "of the hidden layer"),
         "INPUTS": (f"{len(model.network.inputs)}U", "of the network"),
@@ -140,7 +140,7 @@ def build_pair(
         single=single,
         caution=caution,
     )
-    values: dict[str, str | Words] = {
+    values = {
         "name": specialized.name,
         "NAME": specialized.name.upper(),
         "version": identifier.about["version"],

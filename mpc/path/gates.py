@@ -109,7 +109,7 @@ def line_through_gates(
     lower = np.concatenate((low, np.zeros(4), np.full(4 * x.size, -np.inf)))
     cost = k + _GENTLY * ca.sum1(np.gradient(x) * ca.sqrt(stretch) * kappa_ds**2)
     problem = {"x": ca.vertcat(c, k), "f": cost, "g": rows}
-    solver: Any = ca.nlpsol("line", "ipopt", problem, _OPTIONS)
+    solver = ca.nlpsol("line", "ipopt", problem, _OPTIONS)
     guess = np.append(np.linspace(start[1], end[1], n), 0.05)
     solution = solver(x0=guess, lbg=lower, ubg=upper)
     if not solver.stats()["success"]:

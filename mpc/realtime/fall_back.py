@@ -108,7 +108,7 @@ def _riccati(A: Array, G: Array, Q: Array) -> Array:
     for _ in range(_DOUBLINGS):
         W = _solved(eye + G @ P, np.hstack([A, G]))
         A_1, G_1 = W[:, : len(A)], W[:, len(A) :]
-        step: Array = A.T @ P @ A_1
+        step = A.T @ P @ A_1
         A, G, P = A @ A_1, G + A @ G_1 @ A.T, P + 0.5 * (step + step.T)
         if np.abs(step).max() <= _ENOUGH * np.abs(P).max():
             break
