@@ -60,8 +60,7 @@ def impulse_signals(
 
 def modelled_force(model: TireModel, recording: Recording, windows: Windows) -> Array:
     """Return mean axle forces of a model over the same windows [static axle loads], (m, 2)."""
-    loads = np.array(model.vehicle.axle_loads)
-    return windows.mean(model.predict(recording) / loads)
+    return windows.mean(model.predict(recording) / model.vehicle.axle_loads)
 
 
 def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> Array:
@@ -174,7 +173,7 @@ def evidence(model: TireModel, recording: Recording, road: Array | None = None) 
     return Evidence(
         windows=windows,
         measured=measured_force(recording, vehicle, windows, road),
-        modelled=windows.mean(predicted / np.array(vehicle.axle_loads)),
+        modelled=windows.mean(predicted / vehicle.axle_loads),
         noise=noise_variance(recording, vehicle, windows),
         predicted=predicted,
     )

@@ -103,7 +103,7 @@ class BandCalibration:
         """Return s, by which errors of the model are larger at speeds, (k,).
         v_x : speeds [m/s], positive, (k,).
         """
-        return np.asarray(np.clip(self.speed / v_x, *STRETCH), dtype=np.float64)
+        return np.clip(self.speed / v_x, *STRETCH)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the calibration as plain numbers, ready for JSON."""

@@ -127,7 +127,7 @@ def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> _CurveFact
     up, down = np.maximum(W, 0.0).T, np.minimum(W, 0.0).T
 
     def least(s: Array) -> Array:
-        return np.asarray((s[1:] @ up + s[:-1] @ down).min(axis=1))
+        return (s[1:] @ up + s[:-1] @ down).min(axis=1)
 
     rising, opposing = least(slopes) > 0.0, least(secants)
     return _CurveFacts(

@@ -4,7 +4,6 @@ Tensors are (batch, columns) of one number type; the batch may have any size. Op
 of opset 13, which every runtime of the last years knows, and of which CasADi reads back all.
 """
 
-
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike

@@ -274,7 +274,7 @@ class InertialIdentifier(Method):
         damped = np.vstack([T, 1e-3 * np.eye(n)])
         wanted = np.hstack([T @ W.T - stiffer, stiffer])
         found = np.linalg.lstsq(damped, np.vstack([wanted, np.zeros((n, 4))]), rcond=None)[0]
-        return np.asarray(found.T, np.float64)
+        return found.T
 
     def _into(self, curves: Array, compliance: Array) -> Array:
         """Return what steps of what is learnt move of each axle's numbers, (2, n + 3, k)."""

@@ -139,9 +139,9 @@ def _passivity(
     D = -np.linalg.inv(dynamics).T if direction is None else direction
     resolvent = np.linalg.inv(s[:, None, None] * np.eye(2) - dynamics)
     scalar = c_xi + c_z / (s + forgetting)
-    H = np.asarray(scalar[:, None, None] * (D @ resolvent), dtype=np.complex128)
+    H = scalar[:, None, None] * (D @ resolvent)
     hermitian = (H + H.conj().transpose(0, 2, 1)) / 2.0
-    return np.asarray(np.linalg.eigvalsh(hermitian)[:, 0], dtype=np.float64)
+    return np.linalg.eigvalsh(hermitian)[:, 0]
 
 
 def drift_frequency(

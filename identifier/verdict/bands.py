@@ -59,7 +59,7 @@ def within_band(model: TireModel, recording: Recording, level: float = LEVEL) ->
     found = evidence(model, part.recording)
     if found is None or model.band is None:
         return None
-    half = model.band.of_curves(part.recording, level) / np.array(model.vehicle.axle_loads)
+    half = model.band.of_curves(part.recording, level) / model.vehicle.axle_loads
     noise = normal_quantile(level) ** 2 * found.noise
     wide = np.sqrt(found.windows.mean(half) ** 2 + noise)
     return np.mean(np.abs(found.measured - found.modelled) <= wide, axis=0)

@@ -133,7 +133,7 @@ def road_friction(
         assert tires.band is not None
         away[k] = found.measured - modelled_force(tires, part.recording, windows)
         slope[k] = windows.mean(tires.band.slope_over(part.recording))
-    half = band.of_curves(part.recording) / np.array(model.vehicle.axle_loads)
+    half = band.of_curves(part.recording) / model.vehicle.axle_loads
     sd = windows.mean(half) / normal_quantile(LEVEL)
     beside = _BESIDE if recording.logged_v_y is not None else math.hypot(_BESIDE, _OF_ESTIMATE)
     variance = sd**2 + found.noise + beside**2 + (_OF_FORCE * found.measured) ** 2

@@ -285,8 +285,9 @@ def _unsure(evaluated: _Evaluated) -> Iterator[Objection]:
 
 
 def _no_tire(evaluated: _Evaluated) -> Iterator[Objection]:
-    loads = np.array(evaluated.model.vehicle.axle_loads)
-    secant = evaluated.model.force(np.array([_SECANT]))[0] / _SECANT / loads
+    secant = (
+        evaluated.model.force(np.array([_SECANT]))[0] / _SECANT / evaluated.model.vehicle.axle_loads
+    )
     least, most = RULES.stiffness
     for axle, each in zip(AXLES, secant, strict=True):
         if not least <= each <= most:

@@ -129,7 +129,7 @@ class _Car:
 
 def _road(n: int, period: float) -> Array:
     """Return a lane change and its way back, bent by cubics, (n, 2)."""
-    t = period * np.arange(n, dtype=np.float64)
+    t = period * np.arange(n)
     kappa = np.zeros(n)
     for begin, sign in ((0.4, 1.0), (0.4 + _LANE_CHANGE, -1.0)):
         z = np.clip((t - begin) / _LANE_CHANGE, 0.0, 1.0)

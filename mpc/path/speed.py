@@ -114,7 +114,7 @@ class SpeedProfile:
             y, x = np.append(-brake, push[::-1]), np.append(turn, turn[::-1])
             reach.append(np.interp(np.arctan2(f, a_y), np.arctan2(y, x), np.hypot(y, x)))
         edge = [np.interp(v, limits.v, r) for v, r in zip(self.v, np.array(reach).T, strict=True)]
-        return np.asarray(np.hypot(f, a_y) / edge)
+        return np.hypot(f, a_y) / edge
 
     def to_csv(self, file: str | PathLike[str], *, tum: bool = False) -> None:
         """Write the speeds and what they ask of the tires, a row for each sample.
@@ -204,10 +204,10 @@ class SpeedProfile:
         if self.path.closed:
             laps = np.floor(t / self.lap_time)
             within = np.interp(t - laps * self.lap_time, self._t, self.path.s)
-            return np.asarray(laps * self.path.length + within)
+            return laps * self.path.length + within
         before, after = np.minimum(t, 0.0), np.maximum(t - self.lap_time, 0.0)
         there = np.interp(t, self._t, self.path.s)
-        return np.asarray(there + before * self.v[0] + after * self.v[-1])
+        return there + before * self.v[0] + after * self.v[-1]
 
 
 class _Lead(SpeedProfile):

@@ -121,18 +121,18 @@ def _times(velocity: Any, t: Array, length_at_t: Array, s: Array) -> Array:
         at = np.clip(at - error / _norm(velocity(at)), t[i], t[i + 1])
         if np.abs(error).max() < 1e-12 * s[-1]:
             break
-    return np.asarray(at)
+    return at
 
 
 def _lengths(velocity: Any, start: Array, end: Array) -> Array:
     """Return the arc lengths from each start to its end, by quadrature."""
     half = 0.5 * (end - start)
     nodes = start[:, None] + half[:, None] * (1.0 + _LOBES)
-    return np.asarray(half * (_norm(velocity(nodes)) @ _SHARES))
+    return half * (_norm(velocity(nodes)) @ _SHARES)
 
 
 def _norm(vectors: Array) -> Array:
-    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
+    return np.hypot(vectors[..., 0], vectors[..., 1])
 
 
 def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
