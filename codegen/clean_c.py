@@ -37,7 +37,9 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
     """Return a graph with choices and our own functions as nodes.
     whole : False leaves our own functions as the scalars that they are made of.
     """
-    result = rebuilt(graph, lambda new, _, node, __: _with_choice(new, node))
+    result = rebuilt(
+        graph, lambda new, _, node, __: new.add(_choice(new, node) or _slope(new, node) or node)
+    )
 
     def replaced(new: Graph, place: int, node: Node, place_of: Mapping[int, int]) -> int:
         made = _by_sines(new, node)
@@ -48,10 +50,6 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
         return made
 
     return rebuilt(result, replaced) if whole else result
-
-
-def _with_choice(graph: Graph, node: Node) -> int:
-    return graph.add(_choice(graph, node) or _slope(graph, node) or node)
 
 
 def _choice(graph: Graph, node: Node) -> Node | None:

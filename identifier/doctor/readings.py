@@ -415,13 +415,15 @@ def _chosen(ranked: list[_Explanation]) -> Read:
     nearly = best.cost + _AS_GOOD
     best = next((one for one in others if one.changes == turned and one.cost < nearly), best)
     others = [one for one in others if one.cost >= best.cost]
-    other = next((one for one in others if _means_else(one, best)), ranked[-1])
+    other = next(
+        (
+            one
+            for one in others
+            if not all(any(change.is_like(an) for an in one.gross) for change in best.gross)
+        ),
+        ranked[-1],
+    )
     return Read(best=best, other=other)
-
-
-def _means_else(one: _Explanation, best: _Explanation) -> bool:
-    """Whether an explanation lacks a gross fault of the best one, or has another in its place."""
-    return not all(any(change.is_like(other) for other in one.gross) for change in best.gross)
 
 
 def _longer(

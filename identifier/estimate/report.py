@@ -45,14 +45,10 @@ def estimates(model: Any) -> tuple[Estimate, ...]:
     top, wide = phi.max(axis=0), [sd[0] for sd in band.of_phi(peak)]
     sd_top = np.hypot(wide[0], top * band.load_doubt)
 
-    def sd_of(name: str) -> tuple[float, float]:
-        """Return the standard deviation of a parameter, and the prior's."""
-        k = INDEX[name]
-        return math.sqrt(model.covariance[k, k]), math.sqrt(before[k, k])
-
     rows: list[tuple[str, Axle, float, float, str, float | None, bool]] = []
     for i, axle in enumerate(AXLES):
-        now, prior = sd_of(f"compliance_{axle[0]}")
+        k = INDEX[f"compliance_{axle[0]}"]
+        now, prior = (math.sqrt(P[k, k]) for P in (model.covariance, before))
         known = [sd[0][i] <= _DECIDED * sd[1][i] for sd in (stiff, wide)]
         rows += [
             (

@@ -349,13 +349,9 @@ def fmu_text(specialized: SpecializedStep, version: Version) -> dict[str, str]:
             members["sources/buildDescription.xml"] = built
         return members
 
-    return with_token(_token(with_token("")))
-
-
-def _token(members: Mapping[str, str]) -> str:
-    """Return a GUID made of the content: another model has another."""
-    content = "\0".join(f"{name}\0{text}" for name, text in sorted(members.items()))
-    return f"{{{UUID(hashlib.sha256(content.encode()).hexdigest()[:32])}}}"
+    members = sorted(with_token("").items())
+    content = "\0".join(f"{name}\0{text}" for name, text in members)  # another model has another
+    return with_token(f"{{{UUID(hashlib.sha256(content.encode()).hexdigest()[:32])}}}")
 
 
 def _archive(members: Mapping[str, bytes]) -> bytes:

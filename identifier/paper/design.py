@@ -154,7 +154,8 @@ class PaperIdentifier(Method):
             network=network or natural_network(vehicle),
             law=gains_of,
             dt=dt,
-            force_unit=_natural_force_unit(vehicle.mass),
+            # Gains are well scaled where forces are of order one: 1 kN for a car, 1 N for a 1:10.
+            force_unit=float(10.0 ** round(np.log10(vehicle.mass * GRAVITY / 15))),
             min_speed=vehicle.lowest_speed,
             seed=seed,
             driving=driving,
@@ -262,16 +263,6 @@ def _observed(vehicle: Vehicle, force_unit: float, x: Array) -> dict[str, Array]
 @lru_cache(maxsize=1024)
 def _K_inv(parameters: BicycleParameters) -> Array:
     return np.array(ca.DM(bicycle(parameters, 1.0).K_inv))  # K does not depend on v_x
-
-
-def _natural_force_unit(mass: float) -> float:
-    """Return the power of ten [N] nearest to a fifteenth of a car's weight.
-
-    The gains are well scaled where forces are of order one: 1 kN for a passenger car, 1 N for a
-    1:10 model.
-    mass : mass of the car [kg].
-    """
-    return float(10.0 ** round(np.log10(mass * GRAVITY / 15)))
 
 
 # What the certificate of a design must know.
