@@ -98,19 +98,6 @@ class Slips(NamedTuple):
     rolling: Expression
 
 
-def _slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) -> Slips:
-    """Slips weighed by their stiffnesses, safe for a locked wheel and for any angle.
-    alpha : slip angle, paper's sign [rad].
-    kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
-    C_alpha : cornering stiffness [N/rad].   C_kappa : longitudinal slip stiffness [N].
-    """
-    tan_alpha = ca.sin(alpha) / ca.fmax(ca.fabs(ca.cos(alpha)), _COSINE_FLOOR)
-    p_x = C_kappa * kappa
-    p_y = C_alpha * tan_alpha
-    size = ca.sqrt(p_x**2 + p_y**2 + NO_FORCE**2)
-    return Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, _ROLLING_FLOOR))
-
-
 # What tires share whose stiffness is the same at every load.
 
 
@@ -158,6 +145,9 @@ class BrushTire(ConstantStiffness):
         gamma : camber [rad]; without effect.
         """
         del gamma
-        s = _slips(alpha, kappa, self.C_alpha, self.C_kappa)
+        p_x = self.C_kappa * kappa
+        p_y = self.C_alpha * (ca.sin(alpha) / ca.fmax(ca.fabs(ca.cos(alpha)), _COSINE_FLOOR))
+        size = ca.sqrt(p_x**2 + p_y**2 + NO_FORCE**2)
+        s = Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, _ROLLING_FLOOR))
         per_demand = self.per_demand(s, F_z, mu)
         return TireForces(s.p_x * per_demand, s.p_y * per_demand)
