@@ -139,7 +139,7 @@ class Evidence:
         n = max(1, int(_SEGMENT * len(self.windows)))
         size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
         residual = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
-        total = np.concatenate([[0.0], np.cumsum(residual)])
+        total = np.append(0.0, np.cumsum(residual))
         first = int(np.argmax(total[n:] - total[:-n]))
         last = first + n
         place = np.arange(len(self.windows))

@@ -107,7 +107,7 @@ class _CurveFacts(NamedTuple):
 def _cells(until: float) -> Array:
     """Return the ends of cells of slip from 0 on [rad]."""
     narrow = np.geomspace(min(_SMALLEST_CELL, 0.1 * until), until, _CELLS)
-    return np.concatenate([[0.0], narrow])
+    return np.append(0.0, narrow)
 
 
 def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> _CurveFacts:

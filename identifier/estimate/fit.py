@@ -284,7 +284,7 @@ def _reach(
         if not on.any():
             continue
         if roads is not None:
-            one = one.on(np.concatenate([[0.0], roads.ln_m])[roads.labels[i]])
+            one = one.on(np.append(0.0, roads.ln_m)[roads.labels[i]])
         driven = simulate(one, posterior.p, vehicle)
         force = np.abs(one.signals[:, 0] * one.signals[:, 2]) / GRAVITY
         e = np.nan_to_num(driven["residual"] / error_size(force)[:, None])

@@ -90,7 +90,7 @@ class Nodes:
     @property
     def begins(self) -> NDArray[np.bool_]:
         """At which nodes nothing is known of the one before, (n,)."""
-        return self.counts & ~np.concatenate([[False], self.goes[:-1]])
+        return self.counts & ~np.append(False, self.goes[:-1])
 
 
 def earlier(signal: Array, samples: float) -> Array:

@@ -156,7 +156,7 @@ class Problem:
         """Return a drive on its roads."""
         if self.labels is None:
             return self.drives[k].on(road) if road else self.drives[k]
-        return self.drives[k].on(np.concatenate([[0.0], p[len(NAMES) :]])[self.labels[k]] + road)
+        return self.drives[k].on(np.append(0.0, p[len(NAMES) :])[self.labels[k]] + road)
 
     def _over_size(self, e: Array, p: Array) -> Array:
         """Return e over its size, which shrinks with v_x: that shrinks what is missed, and

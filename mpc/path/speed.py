@@ -75,7 +75,7 @@ class SpeedProfile:
         self.path, self.planned = path, planned
         self.limited_by, self.axle = np.asarray(limited_by, str), np.asarray(axle, str)
         pace = 0.5 * (1.0 / self.v[1:] + 1.0 / self.v[:-1])
-        self._t = np.concatenate([[0.0], np.cumsum(pace * np.diff(path.s))])
+        self._t = np.append(0.0, np.cumsum(pace * np.diff(path.s)))
         self._acceleration = self.v * np.gradient(self.v, path.s)
 
     def __repr__(self) -> str:
@@ -235,7 +235,7 @@ class _Lead(SpeedProfile):
             planned=profile.planned,
         )
         pace = 0.5 * (1.0 / v[1:] + 1.0 / v[:-1])
-        self._lead_t = np.concatenate([[0.0], np.cumsum(pace * np.diff(s))])
+        self._lead_t = np.append(0.0, np.cumsum(pace * np.diff(s)))
         self._lead_a = v * np.gradient(v, s)
         self._after = profile.time_at(float(s[-1])) - float(self._lead_t[-1])
 

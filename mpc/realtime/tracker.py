@@ -91,7 +91,7 @@ class Tracker:
     def times(self) -> Array:
         """Times after a measurement at which to tell curvature and speed [s], (N + 1,)."""
         middles = np.arange(self.problem.horizon) + 0.5
-        return np.concatenate([[0.0], self._ahead + self.problem.dt * middles])
+        return np.append(0.0, self._ahead + self.problem.dt * middles)
 
     @property
     def plan_times(self) -> Array:

@@ -87,7 +87,7 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     """
     tire = tire_of(vehicle) if tire is None else tire
     alpha = slip_grid(_LARGEST_SLIP * min(mu, 1.0))
-    grid = np.concatenate([[0.0], alpha])
+    grid = np.append(0.0, alpha)
     force = np.stack([cornering_force(vehicle, tire, axle, grid, mu) for axle in (0, 1)])
     force = force[:, 1:] - force[:, :1]  # wheels that are not mirrored push at zero slip, too
     lengths = np.array(relaxation_lengths(vehicle, (tire, tire)))
