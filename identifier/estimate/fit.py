@@ -100,7 +100,7 @@ def fit(
     RecordingError
         Where a log has neither v_y nor a_y.
     """
-    before = Priors.of(vehicle) if priors is None else priors
+    before = priors or Priors.of(vehicle)
     parts: list[tuple[float, Information]] = []
     found: Posterior | None = None
     reach = Reach() if start is None else Reach(*start.reach[:5])

@@ -304,8 +304,7 @@ def estimate(
     labels : by drive, which road each sample is on (n,), 0 that of the curves; None is one road.
     enough : improvement of the cost, below which it ends [nats].
     """
-    priors = Priors.of(vehicle) if priors is None else priors
-    problem = Problem(drives, vehicle, priors, labels)
+    problem = Problem(drives, vehicle, priors or Priors.of(vehicle), labels)
     if begin is None:
         coarse = problem.thinned()
         each = enough if coarse is problem else _COARSELY

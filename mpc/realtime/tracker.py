@@ -52,7 +52,7 @@ class Tracker:
         caution: float = 0.0,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        problem = Problem() if problem is None else problem
+        problem = problem or Problem()
         longest = (N_COMMANDS - 1) * period
         if not 0.0 < period <= problem.dt:
             raise ValueError(f"period must be positive and at most {problem.dt}, it is {period}")
