@@ -105,6 +105,16 @@ def _lateral_curvature(
     return ca.fmin((c.PEY1 + c.PEY2 * df_z) * (1.0 - asymmetry) * c.LEY, 1.0)  # (4.E24)
 
 
+def _pure_lateral(
+    c: Coefficients, alpha: Expression, gamma: Expression, F_z: Expression, mu: Expression
+) -> Expression:
+    """F_y0 [N] of a wheel that rolls freely, (4.E19)."""
+    B_y, C_y, D_y, S_Hy, S_Vy = _lateral_shape(c, gamma, F_z, mu)
+    alpha_y = alpha + S_Hy  # (4.E20)
+    E_y = _lateral_curvature(c, alpha_y, gamma, F_z)
+    return _magic_curve(alpha_y, B_y, C_y, D_y, E_y) + S_Vy  # (4.E19)
+
+
 def _combined_lateral(
     c: Coefficients,
     alpha: Expression,
@@ -120,14 +130,11 @@ def _combined_lateral(
     E_yk = ca.fmin(c.REY1 + c.REY2 * df_z, 1.0)  # (4.E64)
     S_Hyk = c.RHY1 + c.RHY2 * df_z  # (4.E65)
     G_yk = _weight(kappa, S_Hyk, B_yk, C_yk, E_yk)  # (4.E59)-(4.E61)
-    B_y, C_y, D_y, S_Hy, S_Vy = _lateral_shape(c, gamma, F_z, mu)
-    D_Vyk = D_y * (c.RVY1 + c.RVY2 * df_z + c.RVY3 * gamma)
+    mu_F_z = _lateral_shape(c, gamma, F_z, mu).D  # μ_y F_z, camber included
+    D_Vyk = mu_F_z * (c.RVY1 + c.RVY2 * df_z + c.RVY3 * gamma)
     D_Vyk = D_Vyk * ca.cos(ca.atan(c.RVY4 * alpha))  # (4.E67)
     S_Vyk = D_Vyk * ca.sin(c.RVY5 * ca.atan(c.RVY6 * kappa)) * c.LVYKA  # (4.E66)
-    alpha_y = alpha + S_Hy  # (4.E20)
-    E_y = _lateral_curvature(c, alpha_y, gamma, F_z)
-    F_y0 = _magic_curve(alpha_y, B_y, C_y, D_y, E_y) + S_Vy  # (4.E19), of a wheel that rolls freely
-    return G_yk * F_y0 + S_Vyk  # (4.E58)
+    return G_yk * _pure_lateral(c, alpha, gamma, F_z, mu) + S_Vyk  # (4.E58)
 
 
 # Longitudinal force of the Magic Formula 5.2 (PAC2002), pure and combined slip.

@@ -464,16 +464,14 @@ def _engine(engine: Engine) -> Callable[[float], float]:
     return lambda _: given
 
 
-def steady_speed(path: Path, *, a_y_max: float, share: float = 1.0) -> float:
-    """Return the constant speed [m/s] at which the tightest place takes share a_y_max.
+def steady_speed(path: Path, *, a_y_max: float) -> float:
+    """Return the constant speed [m/s] at which the tightest place takes a_y_max.
 
     Parameters
     ----------
-    a_y_max : lateral acceleration at the limit of grip [m/s²].
-    share : of a_y_max [-].
+    a_y_max : lateral acceleration at the limit of grip, or less [m/s²].
     """
-    named = {f"{path.name}: {name}": x for name, x in (("a_y_max", a_y_max), ("share", share))}
-    require_positive(PathError, **named)
+    require_positive(PathError, **{f"{path.name}: a_y_max": a_y_max})
     if path.peak_curvature * path.length < 1e-6:
         raise PathError(f"{path.name}: has no turn that limits the speed, choose one")
-    return math.sqrt(share * a_y_max / path.peak_curvature)
+    return math.sqrt(a_y_max / path.peak_curvature)
