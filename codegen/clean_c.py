@@ -37,7 +37,9 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
     """Return a graph with choices and our own functions as nodes.
     whole : False leaves our own functions as the scalars that they are made of.
     """
-    result = rebuilt(graph, lambda new, _, node, __: _with_choice(new, node))
+    result = rebuilt(
+        graph, lambda new, _, node, __: new.add(_choice(new, node) or _slope(new, node) or node)
+    )
 
     def replaced(new: Graph, place: int, node: Node, place_of: Mapping[int, int]) -> int:
         made = _by_sines(new, node)
@@ -48,10 +50,6 @@ def recognized(graph: Graph, *, whole: bool = True) -> Graph:
         return made
 
     return rebuilt(result, replaced) if whole else result
-
-
-def _with_choice(graph: Graph, node: Node) -> int:
-    return graph.add(_choice(graph, node) or _slope(graph, node) or node)
 
 
 def _choice(graph: Graph, node: Node) -> Node | None:
@@ -299,7 +297,7 @@ class Statements:
             return f"({self._real(args[0])} {BINARY[op]} {self._real(args[1])})"
         if op in MACROS:
             return f"{self.prefix.upper()}_{MACROS[op]}({_bare(self._real(args[0]))})"
-        rules: Mapping[str, Callable[[], str]] = {
+        rules = {
             "not": lambda: f"(!{self._condition(args[0])})",
             "neg": lambda: f"(-{self._real(args[0])})",
             "inv": lambda: f"({literal(1.0, self.prefix)} / {self._real(args[0])})",

@@ -226,21 +226,21 @@ def assumed(graph: Graph, condition: int, holds: bool) -> Graph:
 
 
 @simplifying(False)
-def lifted(function: ca.Function, port: str = "constants") -> tuple[ca.Function, Array]:
+def lifted(function: ca.Function) -> tuple[ca.Function, Array]:
     """Return a function that is given its constants, and the constants.
 
     It computes the same bits, operation by operation; functions that differ in their constants
     alone become the same function.
-    port : name of the input that is added, the last; constants (n,) in their order in `function`.
+    The input `constants` (n,) is added as the last; in their order in `function`.
     """
     graph, n_in = graph_of(function), function.n_in()
     constants = [place for place in graph.reached() if graph.nodes[place].op == "const"]
     values = np.array([graph.nodes[place].value for place in constants])
     for entry, place in enumerate(constants):
         graph.nodes[place] = Node("input", port=n_in, entry=entry)
-    names = [*function.name_in(), port]
+    names = [*function.name_in(), "constants"]
     ports = [ca.SX.sym(name, *function.size_in(name)) for name in function.name_in()]
     results = [ca.SX(*function.size_out(i)) for i in range(function.n_out())]
-    ports.append(ca.SX.sym(port, values.size))
+    ports.append(ca.SX.sym("constants", values.size))
     like = ca.Function(function.name(), ports, results, names, function.name_out())
     return function_of(graph, like), values

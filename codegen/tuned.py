@@ -41,7 +41,10 @@ def _tuned(serialized: str, sampled: tuple[str, ...]) -> Tuned:
     graph = recognized(graph_of(function))
     names = function.name_in()
     place = decision(graph, {names.index(port) for port in sampled})
-    true, false = (simplified(_part(graph, place, holds)) for holds in (True, False))
+    true, false = (
+        simplified(graph if place is None else assumed(graph, place, holds))
+        for holds in (True, False)
+    )
     if len(false.reached()) > _WORTHWHILE * len(true.reached()):
         place, true = None, simplified(graph)
         false = true
@@ -54,10 +57,6 @@ def _tuned(serialized: str, sampled: tuple[str, ...]) -> Tuned:
         results = [ca.if_else(holds, a, b) for a, b in zip(results, others, strict=True)]
     whole = ca.Function(function.name(), ports, results, names, function.name_out())
     return Tuned(whole, condition, where_true, where_false if place is not None else None)
-
-
-def _part(graph: Graph, place: int | None, holds: bool) -> Graph:
-    return graph if place is None else assumed(graph, place, holds)
 
 
 def _condition(graph: Graph, place: int, function: ca.Function) -> ca.Function:

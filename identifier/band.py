@@ -47,7 +47,7 @@ class BandSpread(NamedTuple):
         factor : f, (k, 2) or one for all.
         """
         wide = np.sqrt(factor**2 * self.scaled + np.maximum(factor, 1.0) ** 2 * self.fixed)
-        return np.asarray(normal_quantile(level) * wide)
+        return normal_quantile(level) * wide
 
     def needed_factor(self, error: Array, noise: Array | float) -> Array:
         """Return f², with which a band of `LEVEL` just reaches an error; 0 where none is needed.
@@ -242,7 +242,7 @@ class Band(ABC):
 
     def _half(self, slip: Array, v_x: Array, pressed: Array, level: float) -> Array:
         width = self.spread(slip, v_x, pressed).half_width(self.factor(slip, v_x), level)
-        return width * np.array(self.model.vehicle.axle_loads)
+        return width * self.model.vehicle.axle_loads
 
     def of_curves(self, recording: Recording, level: float = LEVEL) -> Array:
         """Return half its width at the slip and speed of a drive, (n, 2) [N].

@@ -43,8 +43,7 @@ def measured_force(
         v_y what the accelerometer shows beside forces; None where nobody knows of it.
     """
     impulse, sideways = impulse_signals(recording, vehicle, road)
-    force: Array = windows.rate(impulse) + windows.mean(sideways)[:, None]
-    return force
+    return windows.rate(impulse) + windows.mean(sideways)[:, None]
 
 
 def impulse_signals(
@@ -54,15 +53,14 @@ def impulse_signals(
     car = Car(*car_numbers(vehicle).T)
     v_y = recording.logged_v_y
     still = np.zeros(len(recording)) if v_y is None else v_y
-    impulse: Array = axle_impulse(car, still[:, None], recording.r[:, None])
+    impulse = axle_impulse(car, still[:, None], recording.r[:, None])
     sideways = recording.needed("a_y") if v_y is None else recording.v_x * recording.r
     return impulse, sideways / GRAVITY - (0.0 if road is None else road)
 
 
 def modelled_force(model: TireModel, recording: Recording, windows: Windows) -> Array:
     """Return mean axle forces of a model over the same windows [static axle loads], (m, 2)."""
-    loads = np.array(model.vehicle.axle_loads)
-    return windows.mean(model.predict(recording) / loads)
+    return windows.mean(model.predict(recording) / model.vehicle.axle_loads)
 
 
 def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> Array:
@@ -70,7 +68,7 @@ def noise_variance(recording: Recording, vehicle: Vehicle, windows: Windows) -> 
     turning = (car_numbers(vehicle)[:, 2] * white_noise(recording.r)) ** 2
     v_y = recording.logged_v_y
     lateral = 0.0 if v_y is None else white_noise(v_y) / GRAVITY
-    variance: Array = 2.0 * (lateral**2 + turning) / windows.duration**2
+    variance = 2.0 * (lateral**2 + turning) / windows.duration**2
     if v_y is None:
         variance += (white_noise(recording.needed("a_y")) / GRAVITY) ** 2 / windows.n
     return variance
@@ -105,24 +103,21 @@ class Evidence:
     def peak(self) -> Array:
         """Force that 2 % of the windows exceed, three sigma of noise taken off, (2,)."""
         largest = np.percentile(np.abs(self.measured), 98.0, axis=0)
-        peak: Array = np.maximum(largest - 3.0 * np.sqrt(self.noise), 0.0)
-        return peak
+        return np.maximum(largest - 3.0 * np.sqrt(self.noise), 0.0)
 
     @property
     def model_error(self) -> Array:
         """Share of the measured force that is not explained, noise taken off, (2,); else one."""
         size = np.sqrt(np.mean(self.measured**2, axis=0))
         rms = clean_rms(self.measured - self.modelled, self.noise)
-        share: Array = np.divide(rms, size, out=np.ones(2), where=size > 0.0)
-        return share
+        return np.divide(rms, size, out=np.ones(2), where=size > 0.0)
 
     def worst(self, n: int) -> Array:
         """Return the largest of that share over `n` windows that follow each other, (2,)."""
         size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
         missed = ((self.measured - self.modelled) ** 2 - self.noise) / size
         total, n = np.cumsum(np.vstack([np.zeros(2), missed]), axis=0), min(n, len(missed))
-        share: Array = np.sqrt(np.maximum((total[n:] - total[:-n]).max(axis=0) / n, 0.0))
-        return share
+        return np.sqrt(np.maximum((total[n:] - total[:-n]).max(axis=0) / n, 0.0))
 
     def where(self, kept: NDArray[np.bool_]) -> "Evidence":
         """Return the evidence of some of the windows (m,)."""
@@ -144,7 +139,7 @@ class Evidence:
         n = max(1, int(_SEGMENT * len(self.windows)))
         size = np.maximum(np.mean(self.measured**2, axis=0), 1e-12)
         residual = np.sum((self.measured - self.modelled) ** 2 / size, axis=1)
-        total = np.concatenate([[0.0], np.cumsum(residual)])
+        total = np.append(0.0, np.cumsum(residual))
         first = int(np.argmax(total[n:] - total[:-n]))
         last = first + n
         place = np.arange(len(self.windows))
@@ -160,8 +155,7 @@ def clean_rms(signal: Array, noise: Array) -> Array:
     """Return the root mean square of a signal whose noise has a known variance, (2,).
     signal : (m, 2).   noise : its variance (2,).
     """
-    rms: Array = np.sqrt(np.maximum(np.mean(signal**2, axis=0) - noise, 0.0))
-    return rms
+    return np.sqrt(np.maximum(np.mean(signal**2, axis=0) - noise, 0.0))
 
 
 def brisk_from(model: TireModel) -> float:
@@ -179,7 +173,7 @@ def evidence(model: TireModel, recording: Recording, road: Array | None = None) 
     return Evidence(
         windows=windows,
         measured=measured_force(recording, vehicle, windows, road),
-        modelled=windows.mean(predicted / np.array(vehicle.axle_loads)),
+        modelled=windows.mean(predicted / vehicle.axle_loads),
         noise=noise_variance(recording, vehicle, windows),
         predicted=predicted,
     )
@@ -195,8 +189,7 @@ def road_push(recording: Recording, model: TireModel) -> Array | None:
     if recording.logged_v_y is None:
         found = model.estimated_v_y(recording.as_logged())
         return None if found is None else found.beside
-    bank: Array = Drive.of(recording, model.vehicle, replay=True).signals[:, 6] / GRAVITY
-    return bank
+    return Drive.of(recording, model.vehicle, replay=True).signals[:, 6] / GRAVITY
 
 
 # A frozen model against measured motion, without true forces: the mean of (F_f + F_r)/m is the

@@ -21,7 +21,7 @@ import numpy as np
 from identifier.paper.design import PaperIdentifier
 from identifier.paper.laws import Gains, diagonal
 from identifier.paper.network import Network
-from identifier.reproducibility import AxleRmse, Replay, freeze_key, online_error, reproduce
+from identifier.reproducibility import Replay, freeze_key, online_error, reproduce
 from identifier.run import History, identify
 from models.maneuvers import Maneuver, SampledSteer, Slalom
 from models.plant import Plant
@@ -108,20 +108,16 @@ def run_trial(recording: Recording, maneuver: str, design: PaperIdentifier) -> _
     replays = {t: reproduce(history, t, since=since) for t in FREEZES[maneuver]}
     measures = {ONLINE: online_error(history, since=since)}
     for t, result in replays.items():
-        measures |= {frozen_column(m, t): error for m, error in _measures(result).items()}
+        sides = result.reproduction
+        assert sides is not None
+        measures |= {
+            frozen_column(PAST_ONLINE, t): sides.past_against_online,
+            frozen_column(PAST, t): sides.past_against_truth,
+            frozen_column(AFTER, t): sides.after_against_truth,
+            frozen_column(ALL, t): result.against_truth,
+        }
     errors = {name: error.both / 1000.0 for name, error in measures.items() if error is not None}
     return _Trial(history=history, replays=replays, errors=errors)
-
-
-def _measures(result: Replay) -> dict[str, AxleRmse | None]:
-    sides = result.reproduction
-    assert sides is not None
-    return {
-        PAST_ONLINE: sides.past_against_online,
-        PAST: sides.past_against_truth,
-        AFTER: sides.after_against_truth,
-        ALL: result.against_truth,
-    }
 
 
 class Study(NamedTuple):

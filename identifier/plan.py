@@ -214,7 +214,7 @@ class _Likely(NamedTuple):
     def log(self, maneuver: Maneuver, speed: float, z: Array) -> tuple[Recording, Array, Array]:
         """Return what exact sensors show, and the way X, Y of the center of gravity [m], (n,)."""
         v_y, r = z[:, :2].T
-        t, psi = DT * np.arange(r.size, dtype=np.float64), np.cumsum(r) * DT
+        t, psi = DT * np.arange(r.size), np.cumsum(r) * DT
         log = Recording(
             name="plan", t=t, v_x=np.full(t.size, speed), v_y=v_y, r=r,
             delta_f=maneuver.steering(t)[:, 0], delta_r=np.zeros(t.size),

@@ -102,7 +102,7 @@ def counted_samples(
     min_speed : samples below this speed [m/s] do not count.
     since : nor do samples before this time [s]; None begins at the first.
     """
-    counted: NDArray[np.bool_] = recording.v_x >= min_speed
+    counted = recording.v_x >= min_speed
     if since is not None:
         counted = counted & (recording.t >= since)
     if not counted.any():

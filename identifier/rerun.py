@@ -128,7 +128,7 @@ class Recalled(OnDemand):
     def _joined(self, port: str) -> Array:
         n, found = len(self.run), np.empty(0)
         for block in self.run.blocks():
-            values: Array = getattr(block, self._kind)[port]
+            values = getattr(block, self._kind)[port]
             if len(values) >= n:
                 return values
             if not found.size:

@@ -52,25 +52,34 @@ def _check(maneuver: Any, *, steepest: float) -> None:
         )
 
 
-def _check_sine(maneuver: Any) -> None:
-    _check(maneuver, steepest=2.0 * math.pi * maneuver.frequency * abs(maneuver.amplitude))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Steered:
+    rate_limit: float
+    duration: float
+    rear_ratio: float = 0.0
 
-
-def _both(front: Any, rear_ratio: float) -> Array:
-    return np.column_stack((front, rear_ratio * front))
+    def _both(self, front: Any) -> Array:
+        return np.column_stack((front, self.rear_ratio * front))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StepSteer:
+class _Swung(_Steered):
+    amplitude: float
+    frequency: float
+    onset: float
+
+    def __post_init__(self) -> None:
+        _check(self, steepest=2.0 * math.pi * self.frequency * abs(self.amplitude))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StepSteer(_Steered):
     """A ramp at `rate_limit` to a held angle: the step steer of ISO 7401, slow up to the limit.
     amplitude : final angle [rad].
     """
 
     amplitude: float
     onset: float
-    rate_limit: float
-    duration: float
-    rear_ratio: float = 0.0
 
     def __post_init__(self) -> None:
         _check(self, steepest=0.0)
@@ -78,58 +87,40 @@ class StepSteer:
     def steering(self, t: Array) -> Array:
         rate = self.rate_limit / max(1.0, abs(self.rear_ratio))
         angle = np.clip(rate * (t - self.onset), 0.0, abs(self.amplitude))
-        return _both(np.copysign(angle, self.amplitude), self.rear_ratio)
+        return self._both(np.copysign(angle, self.amplitude))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Slalom:
+class Slalom(_Swung):
     """A sine from onset to the end.
     amplitude : of the sine [rad].   frequency : of the sine [Hz].
     """
 
-    amplitude: float
-    frequency: float
-    onset: float
-    rate_limit: float
-    duration: float
-    rear_ratio: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check_sine(self)
+    __slots__ = ()
 
     def steering(self, t: Array) -> Array:
         phase = 2.0 * math.pi * self.frequency * np.maximum(t - self.onset, 0.0)
-        return _both(self.amplitude * np.sin(phase), self.rear_ratio)
+        return self._both(self.amplitude * np.sin(phase))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class DoubleLaneChange:
+class DoubleLaneChange(_Swung):
     """One sine to the next lane, a pause, and the opposite sine back: steered, not path-tracked.
     amplitude : of both sines [rad].   frequency : of both sines [Hz].
     pause : time straight ahead between them [s].
     """
 
-    amplitude: float
-    frequency: float
     pause: float
-    onset: float
-    rate_limit: float
-    duration: float
-    rear_ratio: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check_sine(self)
 
     def steering(self, t: Array) -> Array:
         there = np.clip((t - self.onset) * self.frequency, 0.0, 1.0) % 1.0
         second = self.onset + 1.0 / self.frequency + self.pause
         back = np.clip((t - second) * self.frequency, 0.0, 1.0) % 1.0
         wave = np.sin(2.0 * math.pi * there) - np.sin(2.0 * math.pi * back)
-        return _both(self.amplitude * wave, self.rear_ratio)
+        return self._both(self.amplitude * wave)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RandomSteer:
+class RandomSteer(_Swung):
     """Random angles, joined by half cosines: excitation without a period.
 
     The angles are drawn from `numpy.random.default_rng(seed)`, uniform in +-amplitude and one every
@@ -138,16 +129,7 @@ class RandomSteer:
     amplitude : largest angle [rad].   frequency : of the fastest swing [Hz].
     """
 
-    amplitude: float
-    frequency: float
     seed: int
-    onset: float
-    rate_limit: float
-    duration: float
-    rear_ratio: float = 0.0
-
-    def __post_init__(self) -> None:
-        _check_sine(self)
 
     def steering(self, t: Array) -> Array:
         rng = np.random.default_rng(self.seed)
@@ -156,11 +138,11 @@ class RandomSteer:
         swing = np.clip(2.0 * self.frequency * (t - self.onset), 0.0, swings)
         first = np.minimum(swing.astype(int), swings - 1)
         blend = 0.5 - 0.5 * np.cos(math.pi * (swing - first))
-        return _both(angles[first] + blend * np.diff(angles)[first], self.rear_ratio)
+        return self._both(angles[first] + blend * np.diff(angles)[first])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class SampledSteer:
+class SampledSteer(_Steered):
     """Given angles at given times, joined by straight lines, as a planned maneuver is.
     times : of the angles [s], rising, (k,); straight ahead before the first.
     angles : of the front wheels [rad], (k,), the first zero.
@@ -169,9 +151,6 @@ class SampledSteer:
 
     times: tuple[float, ...]
     angles: tuple[float, ...]
-    rate_limit: float
-    duration: float
-    rear_ratio: float = 0.0
 
     def __post_init__(self) -> None:
         t, angles = np.array(self.times), np.array(self.angles)
@@ -187,4 +166,4 @@ class SampledSteer:
         _check(self, steepest=float(np.abs(np.diff(angles) / np.diff(t)).max()))
 
     def steering(self, t: Array) -> Array:
-        return _both(np.interp(t, self.times, self.angles), self.rear_ratio)
+        return self._both(np.interp(t, self.times, self.angles))

@@ -40,6 +40,15 @@ def require_positive_fields(record: Any) -> None:
     require_positive(ValueError, **{one.name: getattr(record, one.name) for one in fields(record)})
 
 
+class Positive:
+    """A record whose numbers are all finite and above zero."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        require_positive_fields(self)
+
+
 def require_within(refusal: type[ValueError], low: float, high: float, /, **values: float) -> None:
     """Refuse every value outside the closed interval from `low` to `high`."""
     for name, value in values.items():

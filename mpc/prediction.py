@@ -136,7 +136,7 @@ def build_stage(structure: TireStructure) -> ca.Function:
     at = motion(structure, p)
     f = ca.Function("motion", list(p), [at.x_dot, at.x_dot_x, at.x_dot_u])
     q, cost = _cost(p, at)
-    return _finished("stage", {**p._asdict(), "q": q}, [*_runge_kutta(f, p), *cost], _RESULTS)
+    return _finished("stage", p, [*_runge_kutta(f, p), *cost], _RESULTS, q=q)
 
 
 @cache
@@ -147,8 +147,7 @@ def build_end(structure: TireStructure) -> ca.Function:
     """
     p = stage_ports(structure)
     q, cost = _cost(p, motion(structure, p))
-    ports = {name: port for name, port in p._asdict().items() if name not in ("u", "dt")}
-    return _finished("end", {**ports, "q": q}, cost, _RESULTS[3:])
+    return _finished("end", p, cost, _RESULTS[3:], "u", "dt", q=q)
 
 
 def _cost(p: Ports, at: Motion) -> tuple[ca.SX, list[ca.SX]]:
@@ -167,9 +166,8 @@ def build_axles(structure: TireStructure) -> ca.Function:
     """
     p = stage_ports(structure)
     _, kinematic, _, force, lengths = _axles(structure, p)
-    ports = {name: port for name, port in p._asdict().items() if name not in ("u", "kappa", "dt")}
     results = [force, ca.vertcat(*kinematic), ca.vertcat(*lengths)]
-    return _finished("axles", ports, results, ("force", "slip", "length"))
+    return _finished("axles", p, results, ("force", "slip", "length"), "u", "kappa", "dt")
 
 
 def _runge_kutta(f: ca.Function, p: Ports) -> tuple[ca.SX, ca.SX, ca.SX]:
@@ -194,8 +192,9 @@ def _average(k: list[ca.SX]) -> ca.SX:
 
 
 def _finished(
-    name: str, ports: dict[str, ca.SX], results: list[ca.SX], names: tuple[str, ...]
+    name: str, p: Ports, results: list[ca.SX], names: tuple[str, ...], *without: str, **more: ca.SX
 ) -> ca.Function:
+    ports = {key: port for key, port in (p._asdict() | more).items() if key not in without}
     dense = [ca.densify(value) for value in results]
     function = ca.Function(name, list(ports.values()), dense, list(ports), list(names))
     return tuned(function, sampled=()).function

@@ -103,7 +103,7 @@ class BandCalibration:
         """Return s, by which errors of the model are larger at speeds, (k,).
         v_x : speeds [m/s], positive, (k,).
         """
-        return np.asarray(np.clip(self.speed / v_x, *STRETCH), dtype=np.float64)
+        return np.clip(self.speed / v_x, *STRETCH)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the calibration as plain numbers, ready for JSON."""
@@ -155,8 +155,7 @@ def colored(P: Array, prior: Array, color: float, factor: float = 1.0) -> Array:
     unknown = np.minimum(share / UNKNOWN**2, 1.0)
     share = share * (factor**2 * (1.0 - unknown) + max(factor, 1.0) ** 2 * unknown)
     half = half @ along * np.sqrt(share)
-    wider: Array = half @ half.T
-    return wider
+    return half @ half.T
 
 
 def colored_variance(left: Array, before: Array, color: Array) -> Array:
@@ -164,8 +163,7 @@ def colored_variance(left: Array, before: Array, color: Array) -> Array:
     left, before : h'P h and h'P₀ h, (k, 2).   color : how much less samples tell, at least 1, (2,).
     """
     share = np.minimum(left / np.maximum(before, TINY), 1.0)
-    wider: Array = np.maximum(left, before * share * color / (1.0 + share * (color - 1.0)))
-    return wider
+    return np.maximum(left, before * share * color / (1.0 + share * (color - 1.0)))
 
 
 def sensor_noise(recording: Recording, vehicle: Vehicle) -> Array:
@@ -189,8 +187,7 @@ def root(P: Array) -> Array:
     """
     sd = np.sqrt(np.diag(P))
     size, along = np.linalg.eigh(P / np.outer(sd, sd))
-    half: Array = sd[:, None] * along * np.sqrt(np.maximum(size, 0.0))
-    return half
+    return sd[:, None] * along * np.sqrt(np.maximum(size, 0.0))
 
 
 def declared_spread(

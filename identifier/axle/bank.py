@@ -24,14 +24,14 @@ import casadi as ca
 
 from identifier.axle.car import larger, smaller, within
 from identifier.axle.learning import RegressionNumbers, filtered
-from models.rules import require_positive_fields
+from models.rules import Positive
 from models.vehicle import GRAVITY
 
 UNPROVEN = 0.5  # of the force that teaches curves: the most that an unproven channel may change
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RoadSlope:
+class RoadSlope(Positive):
     """What of the difference between accelerometer and motion is a road that is not level.
     time : τ of its mean [s].
     level : sine of an angle by which the sensor may be off level [-]; from twice that on it is a
@@ -54,9 +54,6 @@ class RoadSlope:
     share: float = 0.15
     doubt: float = 0.03
     memory: float = 20.0
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
 
     def at(self, dt: float) -> "SlopeNumbers":
         """Return the numbers of a step.

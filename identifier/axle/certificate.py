@@ -107,7 +107,7 @@ class _CurveFacts(NamedTuple):
 def _cells(until: float) -> Array:
     """Return the ends of cells of slip from 0 on [rad]."""
     narrow = np.geomspace(min(_SMALLEST_CELL, 0.1 * until), until, _CELLS)
-    return np.concatenate([[0.0], narrow])
+    return np.append(0.0, narrow)
 
 
 def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> _CurveFacts:
@@ -127,7 +127,7 @@ def curve_facts(W: Array, ladder: tuple[float, ...], until: float) -> _CurveFact
     up, down = np.maximum(W, 0.0).T, np.minimum(W, 0.0).T
 
     def least(s: Array) -> Array:
-        return np.asarray((s[1:] @ up + s[:-1] @ down).min(axis=1))
+        return (s[1:] @ up + s[:-1] @ down).min(axis=1)
 
     rising, opposing = least(slopes) > 0.0, least(secants)
     return _CurveFacts(
@@ -215,7 +215,10 @@ def certified(design: Design, vehicle: Vehicle, driving: Driving) -> tuple[Prope
     apart = _widest_range(set_, design.ladder, _LARGEST_SLIP)
     jump = jump_by_learning(design)
     forgets = -math.expm1(-dt / design.regression.memory)
-    lean = _lean_over_rounding(design)
+    # how far a limited step leans inwards, over what rounding in float may do to it
+    inside, n = design.bounds.of_ladder(design.ladder), len(design.ladder)
+    nearest = max(inside.per_grip, inside.per_weight, inside.per_falling, inside.per_rising)
+    lean = float(LEAN / nearest / (8.0 * n * FLOAT * design.bounds.weight))
     proven = (
         Property(
             name="forgets",
@@ -294,11 +297,3 @@ def jump_by_learning(design: Design) -> float:
     """
     b, n = design.bounds, len(design.ladder)
     return design.regression.rate * design.dt + LEAN * n * (b.weight + b.most_grip)
-
-
-def _lean_over_rounding(design: Design) -> float:
-    """Return how far a limited step leans inwards, over what rounding in float may do to it."""
-    n, b = len(design.ladder), design.bounds
-    inside = b.of_ladder(design.ladder)
-    nearest = max(inside.per_grip, inside.per_weight, inside.per_falling, inside.per_rising)
-    return float(LEAN / nearest / (8.0 * n * FLOAT * b.weight))

@@ -68,7 +68,7 @@ def unpacked(packed: Array, q: int) -> Array:
     F[:, *np.array(triangle(q)).T] = packed
     D = np.einsum("aii->ai", F).copy()
     np.einsum("aii->ai", F)[:] = 1.0
-    P: Array = np.einsum("aij,aj,akj->aik", F, D, F)
+    P = np.einsum("aij,aj,akj->aik", F, D, F)
     return 0.5 * (P + P.transpose(0, 2, 1))
 
 
@@ -76,7 +76,7 @@ def per_variance(prior: Array, n: int, widest: float) -> Array:
     """Return 1/limit of the trace of the weights and of each other variance, (2, q - n + 1).
     prior : covariance before the first sample, (2, q, q).   widest : limit over the prior's [-].
     """
-    return np.asarray(1.0 / (widest * (1.0 - _ROUNDING) * _sizes(prior, n)), dtype=np.float64)
+    return 1.0 / (widest * (1.0 - _ROUNDING) * _sizes(prior, n))
 
 
 def _sizes(P: Array, n: int) -> Array:
@@ -90,7 +90,7 @@ def narrowed(P: Array, limits: Array) -> Array:
     P : covariances (2, q, q).   limits : from `per_variance`.
     """
     n = P.shape[1] - limits.shape[1] + 1
-    return np.asarray(P / np.maximum((_sizes(P, n) * limits).max(axis=1), 1.0)[:, None, None])
+    return P / np.maximum((_sizes(P, n) * limits).max(axis=1), 1.0)[:, None, None]
 
 
 def factors_of(packed: list[Any], q: int) -> Factors:

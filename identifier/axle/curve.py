@@ -106,8 +106,7 @@ def unit_matrix(alpha: Array, ladder: tuple[float, ...]) -> Array:
     """Return tanh(α/α_j) (k, n) in numpy.
     alpha : slip angles [rad], (k,).   ladder : slip scales [rad], (n,).
     """
-    units: Array = np.tanh(np.asarray(alpha)[:, None] / np.array(ladder))
-    return units
+    return np.tanh(np.asarray(alpha)[:, None] / np.array(ladder))
 
 
 def unit_slopes(alpha: Array | float, ladder: tuple[float, ...]) -> Array:
@@ -116,7 +115,7 @@ def unit_slopes(alpha: Array | float, ladder: tuple[float, ...]) -> Array:
     """
     scales = np.array(ladder)
     at = np.minimum(np.asarray(alpha)[..., None] / scales, 300.0)  # whose cosh² is a number
-    return np.asarray(1.0 / (scales * np.cosh(at) ** 2), dtype=np.float64)
+    return 1.0 / (scales * np.cosh(at) ** 2)
 
 
 # Where the model has been: how long it learnt, by range of slip.

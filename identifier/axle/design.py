@@ -331,7 +331,7 @@ def curve_tracks(
     slope = (W / np.array(ladder)).sum(axis=2)
     lag = compliance * np.maximum(slope, 0.0) + SHORTEST * vehicle.wheelbase
     return (
-        Track("cornering stiffness", "N/rad", slope * np.array(vehicle.axle_loads)),
+        Track("cornering stiffness", "N/rad", slope * vehicle.axle_loads),
         Track("relaxation length", "m", lag),
         Track("force at saturation", "static load", W.sum(axis=2)),
     )

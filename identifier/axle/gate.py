@@ -16,7 +16,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.axle.car import car_numbers, downforce_numbers, larger
 from identifier.setup import Port
-from models.rules import require_positive_fields
+from models.rules import Positive
 from models.vehicle import GRAVITY, Vehicle
 
 BAD_IN_A_ROW = 3
@@ -29,7 +29,7 @@ GATE_PORT = Port(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Plausibility:
+class Plausibility(Positive):
     """Bounds of what a car can do; generous, since they are there for faults.
     min_speed : below this speed [m/s] forces read zero.
     learning_speed : below this speed [m/s] learning rests.
@@ -58,9 +58,6 @@ class Plausibility:
     steering_jump: float = 0.1
     hold: float = 0.25
     settle: float = 0.5
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle) -> "Plausibility":

@@ -25,14 +25,14 @@ from identifier.axle.covariance import (
     updated,
     width,
 )
-from models.rules import require_positive_fields
+from models.rules import Positive, require_positive_fields
 
 _TINY = 1e-12  # of a size that is divided by
 LEAN = 1e-4  # of a step that is limited: towards the center, by more than rounding can do
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Regression:
+class Regression(Positive):
     """Filter, error model and memory; times belong to drivers and sensors, not to the car's size.
     bandwidth : κ [1/s].   memory : of directional forgetting, in time with excitation [s].
     error : additive error of y [static axle loads]: 0.02 is 0.2 m/s².
@@ -64,9 +64,6 @@ class Regression:
     clip: float = 5.0
     widest: float = 2.0
     rate: float = 30.0
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
 
     def at(self, dt: float) -> "RegressionNumbers":
         """Return the numbers of a step.
@@ -197,7 +194,7 @@ def update(
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RoadChange:
+class RoadChange(Positive):
     """When another friction is believed, and which errors teach less.
     evidence : from which another road is believed [nats].
     explains : share of the squared errors that it must take off, without its prior [-].
@@ -217,9 +214,6 @@ class RoadChange:
     fast: float = 0.2
     trend: float = 10.0
     slow: float = 20.0
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
 
     def at(self, dt: float, rate: float) -> "RoadNumbers":
         """Return the numbers of a step.
@@ -413,7 +407,7 @@ def rising_shares(ladder: tuple[float, ...]) -> Array:
     ladder : slip scales of the units [rad].
     """
     slopes = 1.0 / np.array(ladder)
-    return np.asarray(slopes / slopes.sum(), dtype=np.float64)
+    return slopes / slopes.sum()
 
 
 def inward(limit: float) -> float:

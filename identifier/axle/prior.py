@@ -13,7 +13,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.axle.curve import unit_matrix
 from identifier.band import SD_FRICTION
-from models.rules import require_positive_fields
+from models.rules import Positive
 from models.vehicle import Vehicle
 
 _RIDGE = 0.3  # keeps projected weights small where units are alike
@@ -23,7 +23,7 @@ SLIPS = np.linspace(0.002, 0.6, 300)  # rad, where a curve and its projection mu
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Prior:
+class Prior(Positive):
     """Means and standard deviations before the first sample.
     friction : of the road [-].   sd_stiffness : of ln C [-].
     sd_friction : of ln μ [-].   sd_shape : of each weight on its own [static axle loads].
@@ -42,9 +42,6 @@ class Prior:
     sd_sway_share: float = 0.3
     sd_steering: float = 0.002
     sd_v_y: float
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
 
     def means(self, vehicle: Vehicle, ladder: tuple[float, ...]) -> tuple[Array, Array]:
         """Return weights (2, n) and [compliance, sway share, offset] (2, 3).
@@ -89,15 +86,14 @@ def fiala_force(alpha: Array, stiffness: float, friction: float) -> Array:
     alpha : slip angles [rad], (k,).   stiffness : C/F_z [1/rad].   friction : μ [-].
     """
     sliding = np.minimum(np.tan(alpha) * stiffness / (3.0 * friction), 1.0)
-    return np.asarray(friction * (1.0 - (1.0 - sliding) ** 3), dtype=np.float64)
+    return friction * (1.0 - (1.0 - sliding) ** 3)
 
 
 def _projected(force: Array, ladder: tuple[float, ...]) -> Array:
     """Return the weights whose curves come closest to given ones, with a little ridge.
     force : curves at `SLIPS` (300,) or (300, k).   ladder : slip scales of the units [rad].
     """
-    weights: Array = _projector(ladder) @ force
-    return weights
+    return _projector(ladder) @ force
 
 
 @cache

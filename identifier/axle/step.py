@@ -254,16 +254,6 @@ def _learning_ports(n: int, *, pressed: bool) -> dict[str, Any]:
     }
 
 
-def _band_ports(n: int) -> dict[str, Any]:
-    """Return the ports of the band."""
-    return {
-        "banding": (2, BandNumbers),
-        "slip_factors": (2, len(CENTERS)),
-        "speed_factors": (2, len(AT_SPEEDS)),
-        "prior": (2, len(triangle(n + 3))),
-    }
-
-
 class _Sample(NamedTuple):
     """A sample of the regression, rows front and rear.
     h : regressor (2, q), zero but for the offset where there is no force to learn from.
@@ -297,16 +287,32 @@ def build_step(
     pressed : whether the load of the axles changes with speed; adds the input `downforce` (2,).
     """
     n = len(steps) + 1
+    band: dict[str, Any] = {
+        "banding": (2, BandNumbers),
+        "slip_factors": (2, len(CENTERS)),
+        "speed_factors": (2, len(AT_SPEEDS)),
+        "prior": (2, len(triangle(n + 3))),
+    }
     ports, s = symbols(
         **_learning_ports(n, pressed=pressed),
         bounds=BoundNumbers,
         rising=n,
         excitation=(2, 1 + len(EDGES)),
-        **(_band_ports(n) if bands else {}),
+        **(band if bands else {}),
     )
     f = _forward(s, steps)
     h, y, next_state = _regression(f, s)
-    y, next_state["bank"] = _without_bank(f, s, y)
+    next_state["bank"] = slope_step(
+        s.road,
+        s.regression,
+        s.bank,
+        a_y=s.a_y,
+        motion=ca.dot(s.car.share, y),
+        first=f.gated.first,
+        on=f.gated.on,
+        learns=f.gated.learns,
+    )
+    y -= road_push(s.road, s.bank, UNPROVEN * s.regression.least_force)
     sample, peak = _sample_of(f, s, h, y)
     axles = [_learn(s, sample, i) for i in (0, 1)]
     theta = ca.vertcat(*(_bounded(s, axles[i], i) for i in (0, 1)))
@@ -372,21 +378,6 @@ def _regression(f: _Forward, s: SimpleNamespace) -> tuple[Any, Any, dict[str, An
     return low[:, :q], xi - low[:, q], next_state
 
 
-def _without_bank(f: _Forward, s: SimpleNamespace, y: Any) -> tuple[Any, Any]:
-    """Return y without what the road pushes (2,), and the state behind it."""
-    after = slope_step(
-        s.road,
-        s.regression,
-        s.bank,
-        a_y=s.a_y,
-        motion=ca.dot(s.car.share, y),
-        first=f.gated.first,
-        on=f.gated.on,
-        learns=f.gated.learns,
-    )
-    return y - road_push(s.road, s.bank, UNPROVEN * s.regression.least_force), after
-
-
 def _sample_of(f: _Forward, s: SimpleNamespace, h: Any, y: Any) -> tuple[_Sample, Any]:
     """Return the sample of the regression, and the peak of the measured force."""
     numbers, errors, learns, W = s.regression, s.errors, f.gated.learns, s.W
@@ -400,7 +391,9 @@ def _sample_of(f: _Forward, s: SimpleNamespace, h: Any, y: Any) -> tuple[_Sample
     e = y - y_hat
     sigma = _deviation(f, numbers, y_hat)
     bound = numbers.clip * sigma * errors.slow
-    force, peak = _recent_force(s, y, learns)
+    last = s.filters[:, -1]
+    force = last + learns * numbers.smooth * (y - last)  # mean over a moment, and its recent peak
+    peak = ca.if_else(learns, larger(ca.fabs(force), s.errors.peak * numbers.decay), s.errors.peak)
     holds = peak >= numbers.least_force
     sample = _Sample(
         h=ca.horzcat(h[:, :-1] * holds, h[:, -1]),
@@ -417,14 +410,6 @@ def _sample_of(f: _Forward, s: SimpleNamespace, h: Any, y: Any) -> tuple[_Sample
         inflation=inflation,
     )
     return sample, peak
-
-
-def _recent_force(s: SimpleNamespace, y: Any, learns: Any) -> tuple[Any, Any]:
-    """Return the mean of y over a moment and its recent peak, (2,) each."""
-    last = s.filters[:, -1]
-    force = last + learns * s.regression.smooth * (y - last)
-    peak = larger(ca.fabs(force), s.errors.peak * s.regression.decay)
-    return force, ca.if_else(learns, peak, s.errors.peak)
 
 
 def _deviation(f: _Forward, numbers: RegressionNumbers, y_hat: Any) -> Any:

@@ -36,7 +36,7 @@ from identifier.method import Method
 from identifier.setup import AXLE_FORCE, COVARIANCE, Port, Setup
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters, bicycle
-from models.rules import require_positive_fields
+from models.rules import Positive
 from models.vehicle import GRAVITY, Vehicle
 
 SHAPE = 1.4  # C of a passenger tire, Pacejka, Tyre and Vehicle Dynamics, figure 4.9
@@ -195,7 +195,7 @@ def _scan() -> Scan:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LaggedEkf(Method):
+class LaggedEkf(Positive, Method):
     """Stiffness and friction of each axle behind a fixed lag, with a_y where there is one.
 
     The size of the car alone sets its numbers.
@@ -211,9 +211,6 @@ class LaggedEkf(Method):
     wheelbase: float
     dt: float = 0.01
     min_speed: float = 1.0
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:

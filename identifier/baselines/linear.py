@@ -16,7 +16,7 @@ from identifier.method import Method, require_fresh
 from identifier.setup import Setup
 from identifier.tire_model import TireModel
 from models.bicycle import BicycleParameters, linear_axle_force
-from models.rules import require_positive_fields
+from models.rules import Positive
 from models.schema import Table
 from models.vehicle import Vehicle
 
@@ -77,16 +77,13 @@ class LinearModel(TireModel):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LinearBaseline(Method):
+class LinearBaseline(Positive, Method):
     """The linear tire with the stiffness that the vehicle states.
     dt : sampling interval [s].   min_speed : below this speed [m/s] forces read zero.
     """
 
     dt: float = 0.01
     min_speed: float = 1.0
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
 
     @classmethod
     def for_vehicle(cls, vehicle: Vehicle, *, dt: float = 0.01) -> Self:

@@ -52,7 +52,7 @@ def run_comparison(
     *,
     seed: int,
     progress: Callable[[str], None],
-    left_out: Mapping[str, str] | None = None,
+    left_out: Mapping[str, str],
     seen: Callable[[str, History], None] | None = None,
 ) -> Comparison:
     """Run every method over every recording.
@@ -73,7 +73,7 @@ def run_comparison(
         seed=seed,
         trials=trials,
         step_times=step_times(timed, vehicle, max(recordings, key=len)),
-        left_out=left_out or {},
+        left_out=left_out,
     )
 
 

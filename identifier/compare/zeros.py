@@ -36,19 +36,17 @@ def zeros(model: TireModel, recording: Recording) -> Day:
     sd = priors.sd[WHERE]
     windows = brisk_windows(part, slowest)
     value = np.zeros(len(NUMBERS))
-    P: Array = np.asarray(np.linalg.inv(prior), np.float64)
+    P = np.asarray(np.linalg.inv(prior), np.float64)
     enough = len(windows) * windows.duration / 2.0 >= ENOUGH and part.logged_v_y is not None
     if enough:
-        loads = np.array(vehicle.axle_loads)
         measured = measured_force(part, vehicle, windows)
         turning = np.abs(windows.mean(part.v_x * part.r)) / GRAVITY
         size = np.hypot(_SIZE[0], _SIZE[1] * turning)[:, None]
         weight = 0.5 * windows.duration / _MEMORY
 
         def missed(of: Array) -> Array:
-            force = windows.mean(model.predict(corrected(part, of)) / loads)
-            away: Array = np.nan_to_num((measured - force) / size, nan=1e3)
-            return away
+            force = windows.mean(model.predict(corrected(part, of)) / vehicle.axle_loads)
+            return np.nan_to_num((measured - force) / size, nan=1e3)
 
         e = missed(value)
         for _ in range(_ITERATIONS):

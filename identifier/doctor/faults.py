@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.day import ENOUGH, ONE_SPEED, sideways
@@ -525,7 +524,7 @@ def prepared(recording: Recording, vehicle: Vehicle) -> Search | None:
 def _inside(drive: Drive) -> Drive:
     """Return a drive whose ends do not count."""
     n = min(round(RULES.margin / drive.dt), len(drive.signals) // 2)
-    counts: NDArray[np.bool_] = drive.counts.copy()
+    counts = drive.counts.copy()
     counts[:n], counts[counts.size - n :] = False, False
     return replace(drive, counts=counts)
 

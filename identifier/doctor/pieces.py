@@ -7,7 +7,6 @@ runs across a gap. Pieces are slices of the drive: nothing is copied.
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.arrays import blocks, large
 from identifier.evidence import BRISK
@@ -71,7 +70,7 @@ def segments_of(
         lively = np.where(recording.v_x[part] > brisk, recording.r[part] ** 2, 0.0)
         so_far = total[part.start : part.start + 1]
         total[part.start + 1 : part.stop + 1] = np.cumsum(np.concatenate([so_far, lively]))[1:]
-    bounds: NDArray[np.intp] = np.linspace(0, n, pieces + 1).astype(np.intp)
+    bounds = np.linspace(0, n, pieces + 1).astype(np.intp)
     places: list[slice] = []
     for first, last in pairwise(bounds):
         starts = np.arange(first, last - length + 1, max(1, length // 10))

@@ -178,7 +178,11 @@ def but_front_leaves(one: _AxleMotion, motion: Motion, vehicle: Vehicle, reading
     total = max(math.log(froude / _FAST), 0.0) ** 2
     total += _curve_leaves(one.force[1], one.slip[1], declared)
     if motion.a_y is not None:
-        total += _accelerometer_leaves(reading.a_y * motion.a_y, one.acceleration)
+        pair = (reading.a_y * motion.a_y, one.acceleration)
+        measured, moved = (signal - signal.mean() for signal in pair)
+        slope = float(np.clip(measured @ moved / (moved @ moved + 1e-12), *_ROLLING))
+        left = float(np.sum((measured - slope * moved) ** 2))
+        total += math.log(min(left / (float(measured @ measured) + 1e-12), 1.0) + _EXACT)
     return total
 
 
@@ -211,14 +215,6 @@ def _curve_leaves(force: Array, slip: Array, declared: float) -> float:
     along, power = bent @ force, np.einsum("ij,ij->i", bent, bent)
     left = size - 2.0 * FRICTION * along[_RATIO_OF] + FRICTION**2 * power[_RATIO_OF]
     return float(np.min(np.log(np.clip(left / size, 0.0, 1.0) + _EXACT) + disbelief))
-
-
-def _accelerometer_leaves(a_y: Array, acceleration: Array) -> float:
-    """Return the logarithm of the share of a_y that the motion does not explain."""
-    measured, moved = a_y - a_y.mean(), acceleration - acceleration.mean()
-    slope = float(np.clip(measured @ moved / (moved @ moved + 1e-12), *_ROLLING))
-    left = float(np.sum((measured - slope * moved) ** 2)) / (float(measured @ measured) + 1e-12)
-    return math.log(min(left, 1.0) + _EXACT)
 
 
 # What may be wrong, alone and together.
@@ -415,13 +411,15 @@ def _chosen(ranked: list[_Explanation]) -> Read:
     nearly = best.cost + _AS_GOOD
     best = next((one for one in others if one.changes == turned and one.cost < nearly), best)
     others = [one for one in others if one.cost >= best.cost]
-    other = next((one for one in others if _means_else(one, best)), ranked[-1])
+    other = next(
+        (
+            one
+            for one in others
+            if not all(any(change.is_like(an) for an in one.gross) for change in best.gross)
+        ),
+        ranked[-1],
+    )
     return Read(best=best, other=other)
-
-
-def _means_else(one: _Explanation, best: _Explanation) -> bool:
-    """Whether an explanation lacks a gross fault of the best one, or has another in its place."""
-    return not all(any(change.is_like(other) for other in one.gross) for change in best.gross)
 
 
 def _longer(

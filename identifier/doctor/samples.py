@@ -39,8 +39,9 @@ _ESTIMATED, _SWITCHED = ("v_y", "r"), 2  # channels that may be, how often they 
 
 def sample_findings(recording: Recording) -> list[Finding]:
     pieces = driven_pieces(recording)
-    if computed := _computed(pieces):
-        return [computed]
+    words = [one for one in map(computed_v_y, pieces) if one is not None]
+    if 2 * len(words) > len(pieces):  # with which nothing else can be found
+        return [_found("computed", "v_y", math.nan, CERTAIN, words[0])]
     listed = [*_missing(pieces), *(one for piece in pieces for one in _piece_findings(piece))]
     late = {one.channel: one.size for one in listed if one.code == "jitter"}
     return [
@@ -80,14 +81,6 @@ def _piece_findings(recording: Recording) -> list[Finding]:
         if name not in named:
             found += _channel(name, recording, jump is not None)
     return found
-
-
-def _computed(pieces: tuple[Recording, ...]) -> Finding | None:
-    """Return a v_y that follows a formula in most pieces, with which nothing else can be found."""
-    words = [one for one in map(computed_v_y, pieces) if one is not None]
-    if 2 * len(words) <= len(pieces):
-        return None
-    return _found("computed", "v_y", math.nan, CERTAIN, words[0])
 
 
 def _missing(pieces: tuple[Recording, ...]) -> Iterator[Finding]:

@@ -247,7 +247,7 @@ def hardest(recording: Recording, seconds: float) -> slice:
     power = recording.v_x * recording.r
     power *= power
     begins = np.arange(0, len(recording), each)
-    total = np.cumsum(np.concatenate([[0.0], np.add.reduceat(power, begins)]))
+    total = np.cumsum(np.append(0.0, np.add.reduceat(power, begins)))
     m = max(n // each, 1)
     first = min(each * int(np.argmax(total[m:] - total[:-m])), len(recording) - n)
     return slice(first, first + n)

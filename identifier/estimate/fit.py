@@ -100,7 +100,7 @@ def fit(
     RecordingError
         Where a log has neither v_y nor a_y.
     """
-    before = Priors.of(vehicle) if priors is None else priors
+    before = priors or Priors.of(vehicle)
     parts: list[tuple[float, Information]] = []
     found: Posterior | None = None
     reach = Reach() if start is None else Reach(*start.reach[:5])
@@ -284,7 +284,7 @@ def _reach(
         if not on.any():
             continue
         if roads is not None:
-            one = one.on(np.concatenate([[0.0], roads.ln_m])[roads.labels[i]])
+            one = one.on(np.append(0.0, roads.ln_m)[roads.labels[i]])
         driven = simulate(one, posterior.p, vehicle)
         force = np.abs(one.signals[:, 0] * one.signals[:, 2]) / GRAVITY
         e = np.nan_to_num(driven["residual"] / error_size(force)[:, None])

@@ -13,7 +13,7 @@ in.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import casadi as ca
@@ -123,8 +123,7 @@ class Information:
 
     def counted(self, share: float) -> "Information":
         """Return the same where a second counts for that share of one."""
-        return Information(matrix=share * self.matrix, vector=share * self.vector,
-                           seconds=self.seconds)  # fmt: skip
+        return replace(self, matrix=share * self.matrix, vector=share * self.vector)
 
     def around(self, p: Array) -> tuple[float, Array, Array]:
         """Return the loss [nats] but for a constant, its slope (p,) and curvature (p, p)."""
@@ -150,8 +149,5 @@ class Information:
         moved = self.matrix @ along
         gain = np.linalg.solve(np.diag(sd**-2.0) + along.T @ moved, moved.T).T
         matrix = self.matrix - gain @ moved.T
-        return Information(
-            matrix=0.5 * (matrix + matrix.T),
-            vector=self.vector - gain @ (along.T @ self.vector),
-            seconds=self.seconds,
-        )
+        vector = self.vector - gain @ (along.T @ self.vector)
+        return replace(self, matrix=0.5 * (matrix + matrix.T), vector=vector)

@@ -437,7 +437,7 @@ class _Latent:
         S = believed + (at.C - believed - Y.T @ Y) / self.trust.lasting
         slopes, free = -_solved(L, Y, "T").reshape(len(z), N, -1)[:, 0], self.free
         fixed = np.setdiff1d(np.arange(len(self.index)), free)
-        inverse: Array = np.asarray(np.linalg.inv(S[np.ix_(free, free)]), np.float64)
+        inverse = np.asarray(np.linalg.inv(S[np.ix_(free, free)]), np.float64)
         if fixed.size:  # what moves makes up for a part of what is fixed
             slopes[:, fixed] -= slopes[:, free] @ inverse @ S[np.ix_(free, fixed)]
         return covariance, inverse, slopes

@@ -90,8 +90,7 @@ class Nodes:
     @property
     def begins(self) -> NDArray[np.bool_]:
         """At which nodes nothing is known of the one before, (n,)."""
-        first: NDArray[np.bool_] = self.counts & ~np.concatenate([[False], self.goes[:-1]])
-        return first
+        return self.counts & ~np.append(False, self.goes[:-1])
 
 
 def earlier(signal: Array, samples: float) -> Array:
@@ -134,7 +133,7 @@ def _piece(
             *(mean(one) for one in (rho, rate, jerk)),
         ]
     )
-    counts: NDArray[np.bool_] = np.asarray(on.reshape(-1, every).all(axis=1))
+    counts = np.asarray(on.reshape(-1, every).all(axis=1))
     goes = np.append(counts[:-1] & counts[1:], False)
     return mean(recording.t[some]), given, np.column_stack([mean(r), mean(a_y)]), counts, goes
 

@@ -113,7 +113,7 @@ def _new_values(signal: Array) -> NDArray[np.intp]:
     apart, far = np.diff(changes), np.abs(step[changes - 1]) > FAR * rounded
     apart = apart[far[1:] & far[:-1]]
     if apart.size > 2 and np.median(apart) > 1.0:
-        return np.concatenate([[0], changes])
+        return np.append(0, changes)
     bend = np.abs(np.diff(step)) > most
     bends = 1 + np.flatnonzero(bend)
     ends = bends[np.append(np.diff(bends) > 1, True)] if bends.size else bends
@@ -121,7 +121,7 @@ def _new_values(signal: Array) -> NDArray[np.intp]:
     moves = np.abs(step[1:]) > max(most, FAR * rounded)
     few = np.count_nonzero(bend & moves) < _BENT[rounded > 0.0] * np.count_nonzero(moves)
     if ends.size > 3 and few and np.median(np.diff(ends)) > 2.0:
-        return np.concatenate([[0], ends])
+        return np.append(0, ends)
     return np.arange(len(signal))
 
 
@@ -146,7 +146,7 @@ class _Kinematics:
         zero = np.zeros(self.n - 1)
         self.felt = zero if a_y is None else self._over(a_y)
         self.moved = zero if a_y is None else self._over(a_y - recording.v_x * recording.r)
-        self.first = np.concatenate([[0], np.flatnonzero(~self.goes) + 1])
+        self.first = np.append(0, np.flatnonzero(~self.goes) + 1)
 
     def _over(self, signal: Array) -> Array:
         return 0.5 * self.dt * (signal[1:] + signal[:-1])

@@ -219,7 +219,7 @@ class Priors:
         for k in self.typed:
             z2 = self.information[k, k] * away[k] ** 2
             curvature[k, k] *= (_TAILS + 1.0) / (_TAILS + 1.0 + z2)
-        gradient: Array = curvature @ away
+        gradient = curvature @ away
         if self.data is not None:
             n = len(NAMES)  # of other roads no drive before tells
             _, slope, bend = self.data.around(p[:n])

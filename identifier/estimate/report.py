@@ -34,7 +34,7 @@ def estimates(model: Any) -> tuple[Estimate, ...]:
     """Return the numbers of the axles of a `FittedModel`, and which of them the drives decided."""
     before = model.band.prior_covariance
     given = model.vehicle.bicycle[4:]
-    band, loads, lag = model.band, np.array(model.vehicle.axle_loads), model.relaxation_length
+    band, loads, lag = model.band, model.vehicle.axle_loads, model.relaxation_length
     stiff, sd_C, hidden = stiffness_doubt(model)
     stiffness = model.stiffness
     C = stiffness / loads
@@ -45,14 +45,10 @@ def estimates(model: Any) -> tuple[Estimate, ...]:
     top, wide = phi.max(axis=0), [sd[0] for sd in band.of_phi(peak)]
     sd_top = np.hypot(wide[0], top * band.load_doubt)
 
-    def sd_of(name: str) -> tuple[float, float]:
-        """Return the standard deviation of a parameter, and the prior's."""
-        k = INDEX[name]
-        return math.sqrt(model.covariance[k, k]), math.sqrt(before[k, k])
-
     rows: list[tuple[str, Axle, float, float, str, float | None, bool]] = []
     for i, axle in enumerate(AXLES):
-        now, prior = sd_of(f"compliance_{axle[0]}")
+        k = INDEX[f"compliance_{axle[0]}"]
+        now, prior = (math.sqrt(P[k, k]) for P in (model.covariance, before))
         known = [sd[0][i] <= _DECIDED * sd[1][i] for sd in (stiff, wide)]
         rows += [
             (
@@ -75,7 +71,7 @@ def stiffness_doubt(model: Any) -> tuple[list[Array], Array, Array]:
     Standard deviations of the fit and of the prior, (2,) each; that with a steering ratio that may
     be wrong and with the loads, (2,); whether the drive leaves it to the ratio, (2,).
     """
-    at, C = np.full((1, 2), _SLOPE_STEP), model.stiffness / np.array(model.vehicle.axle_loads)
+    at, C = np.full((1, 2), _SLOPE_STEP), model.stiffness / model.vehicle.axle_loads
     stiff = [sd[0] / _SLOPE_STEP for sd in model.band.of_phi(at)]
     opened, held = model.band.ratio_open
     free = opened.of_phi(at)[0][0] / _SLOPE_STEP
@@ -88,7 +84,7 @@ def stiffness_doubt(model: Any) -> tuple[list[Array], Array, Array]:
 def of_ratio(model: Any) -> tuple[tuple[str, str], ...]:
     """Return the note on stiffnesses that a wrong steering ratio would change."""
     _, sd, hidden = stiffness_doubt(model)
-    shares = 100.0 * sd * np.array(model.vehicle.axle_loads) / model.stiffness
+    shares = 100.0 * sd * model.vehicle.axle_loads / model.stiffness
     return tuple(
         (
             "steering_ratio",

@@ -130,8 +130,7 @@ class Problem:
 
     def times(self, k: int) -> Array:
         """Return when the residuals of a drive are [s]."""
-        found: Array = self.drives[k].t[:: self._strides[k]][self._kept[k]]
-        return found
+        return self.drives[k].t[:: self._strides[k]][self._kept[k]]
 
     def thinned(self) -> "Problem":
         """Return the problem of one road with means of samples, for first guesses."""
@@ -157,7 +156,7 @@ class Problem:
         """Return a drive on its roads."""
         if self.labels is None:
             return self.drives[k].on(road) if road else self.drives[k]
-        return self.drives[k].on(np.concatenate([[0.0], p[len(NAMES) :]])[self.labels[k]] + road)
+        return self.drives[k].on(np.append(0.0, p[len(NAMES) :])[self.labels[k]] + road)
 
     def _over_size(self, e: Array, p: Array) -> Array:
         """Return e over its size, which shrinks with v_x: that shrinks what is missed, and
@@ -305,8 +304,7 @@ def estimate(
     labels : by drive, which road each sample is on (n,), 0 that of the curves; None is one road.
     enough : improvement of the cost, below which it ends [nats].
     """
-    priors = Priors.of(vehicle) if priors is None else priors
-    problem = Problem(drives, vehicle, priors, labels)
+    problem = Problem(drives, vehicle, priors or Priors.of(vehicle), labels)
     if begin is None:
         coarse = problem.thinned()
         each = enough if coarse is problem else _COARSELY

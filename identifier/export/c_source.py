@@ -108,11 +108,11 @@ def _switches(specialized: SpecializedStep) -> dict[str, tuple[object, str]]:
             f"the C looks for the last plausible sample in {GATE}, not {specialized.believed}"
         )
     count, order = len(rules(learnt)), covariance_order(learnt)
-    ruled: dict[str, tuple[object, str]] = {
+    ruled = {
         "COVARIANCE": (f"{order}U", "rows of a covariance among the weights"),
         "SLACK": (SLACK, "of a variance, in parts, to zero"),
     }
-    band: dict[str, tuple[object, str]] = {
+    band = {
         "TELLS_BAND": (1, "half_band is an output: half the width of the band around axle_force")
     }
     return {

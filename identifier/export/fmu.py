@@ -255,14 +255,6 @@ _CAN_3: tuple[str, ...] = (
 )
 
 
-def _build_description(name: str, sources: Sequence[str]) -> str:
-    """Return sources/buildDescription.xml of FMI 3.0."""
-    files = (_element("SourceFile", {"name": name}) for name in sources)
-    listed = _element("SourceFileSet", {"language": "C99"}, *files)
-    configuration = _element("BuildConfiguration", {"modelIdentifier": name}, listed)
-    return _document(_element("fmiBuildDescription", {"fmiVersion": "3.0"}, configuration))
-
-
 def _units(table: Sequence[_Variable]) -> Element:
     used = {variable.unit for variable in table}
     angle = {"rad": ("deg", _DEGREES), "rad/s": ("deg/s", _DEGREES)}
@@ -345,17 +337,16 @@ def fmu_text(specialized: SpecializedStep, version: Version) -> dict[str, str]:
         members = {f"sources/{name}": content for name, content in files.items()}
         members["modelDescription.xml"] = _description(specialized, version, token, names)
         if version == 3:
-            built = _build_description(specialized.name, names)
-            members["sources/buildDescription.xml"] = built
+            listed = (_element("SourceFile", {"name": one}) for one in names)
+            built = _element("SourceFileSet", {"language": "C99"}, *listed)
+            built = _element("BuildConfiguration", {"modelIdentifier": specialized.name}, built)
+            built = _element("fmiBuildDescription", {"fmiVersion": "3.0"}, built)
+            members["sources/buildDescription.xml"] = _document(built)
         return members
 
-    return with_token(_token(with_token("")))
-
-
-def _token(members: Mapping[str, str]) -> str:
-    """Return a GUID made of the content: another model has another."""
-    content = "\0".join(f"{name}\0{text}" for name, text in sorted(members.items()))
-    return f"{{{UUID(hashlib.sha256(content.encode()).hexdigest()[:32])}}}"
+    members = sorted(with_token("").items())
+    content = "\0".join(f"{name}\0{text}" for name, text in members)  # another model has another
+    return with_token(f"{{{UUID(hashlib.sha256(content.encode()).hexdigest()[:32])}}}")
 
 
 def _archive(members: Mapping[str, bytes]) -> bytes:

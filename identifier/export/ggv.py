@@ -15,7 +15,7 @@ from identifier.tire_model import TireModel
 
 def diamond(side: Sides) -> Array:
     """Return the largest a_x of the diamond on one side, (n,) [m/s²]."""
-    return np.asarray((side.most[:, :-1] / (1.0 - SHARES[:-1])).min(axis=1))
+    return (side.most[:, :-1] / (1.0 - SHARES[:-1])).min(axis=1)
 
 
 def ggv_text(model: TireModel) -> str:

@@ -1,6 +1,6 @@
 """How the ports of a step lie in the structures of the exported C."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from math import isqrt
 from typing import NamedTuple
 
@@ -82,7 +82,7 @@ def initializer(value: Array, dimensions: tuple[int, ...], prefix: str) -> str:
     """Return a nested initializer by rows.   value : the numbers (of any shape)."""
     if not dimensions:
         return literal(float(value.ravel()[0]), prefix)
-    rows: Iterator[Array] = iter(value.reshape(dimensions[0], -1))
+    rows = iter(value.reshape(dimensions[0], -1))
     return "{ " + ", ".join(initializer(row, dimensions[1:], prefix) for row in rows) + " }"
 
 

@@ -4,8 +4,6 @@ Tensors are (batch, columns) of one number type; the batch may have any size. Op
 of opset 13, which every runtime of the last years knows, and of which CasADi reads back all.
 """
 
-from typing import Any
-
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
@@ -91,9 +89,7 @@ class _Graph:
             ", ".join(f"{kind}[batch, 1] {one.name}" for one in row) for row in (inputs, outputs)
         )
         head = " => ".join(f"({row})" for row in ports)
-        model: Any = onnx.parser.parse_model(
-            "\n".join([f"{_HEAD} {name} {head} {{", *self.lines, "}"])
-        )
+        model = onnx.parser.parse_model("\n".join([f"{_HEAD} {name} {head} {{", *self.lines, "}"]))
         model.doc_string = model.graph.doc_string = doc
         for node in model.graph.node:
             node.name = node.output[0]
@@ -106,8 +102,7 @@ class _Graph:
             model.graph.initializer.append(onnx.numpy_helper.from_array(array, key))
         onnx.helper.set_model_props(model, metadata)
         onnx.checker.check_model(model, full_check=True)
-        content: bytes = model.SerializeToString(deterministic=True)
-        return content
+        return model.SerializeToString(deterministic=True)
 
 
 # The paper's network, frozen: F_y = C α + U Ŵ tanh(V̂ x̄), zero below the minimum speed. Rows are

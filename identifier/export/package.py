@@ -147,7 +147,7 @@ def synthetic_samples(specialized: SpecializedStep, n: int = _SAMPLES) -> Array:
     Where v_y is given it is measured at the end alone; a_y is that of the motion, with a gap.
     n : number of samples.
     """
-    k = np.arange(n, dtype=np.float64)
+    k = np.arange(n)
     wave, slow = _triangle(k / 60.0), _triangle(k / 97.0 + 0.2)
     v_x = specialized.min_speed * np.minimum(0.0973 * np.maximum(k - _REST, 0.0), 15.0)
     v_x = np.where((k >= n // 2) & (k < n // 2 + _REST), 0.5 * specialized.min_speed, v_x)
@@ -161,8 +161,7 @@ def synthetic_samples(specialized: SpecializedStep, n: int = _SAMPLES) -> Array:
 
 
 def _triangle(phase: Array) -> Array:
-    wave: Array = 4.0 * np.abs(phase - np.floor(phase + 0.5)) - 1.0
-    return wave
+    return 4.0 * np.abs(phase - np.floor(phase + 0.5)) - 1.0
 
 
 def run_in_virtual_machine(

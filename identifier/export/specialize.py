@@ -170,7 +170,7 @@ def _specialized(
     sampled_ports = SAMPLED if with_a_y else SAMPLED[:-1]
     ports = {port: ca.SX.sym(port, *step.size_in(port)) for port in carry}
     ports |= {port: ca.SX.sym(port, 2 if port in ("x", "u") else 1) for port in sampled_ports}
-    signals: dict[str, ca.SX] = {"a_y": ca.SX(np.nan), **ports}
+    signals = {"a_y": ca.SX(np.nan), **ports}
     sampled = {port: signals[port] for port in (*carry, *setup.scan.over)}
     rest = {port: value for port, value in setup.carry.items() if port not in carry}
     constants = {

@@ -95,7 +95,7 @@ def _gradients(model: TireModel, force: Array, v_x: Array, a_y: Array) -> Array:
 
 def weights(car: Vehicle, v_x: float | Array) -> Array:
     """Return the force under static loads [N] of each axle per m/s² of a_y, (2,) or (n, 2)."""
-    return np.array(car.axle_loads) / (GRAVITY * car.load_ratio(v_x))
+    return car.axle_loads / (GRAVITY * car.load_ratio(v_x))
 
 
 def slips(curve: Array, force: Array) -> Array:

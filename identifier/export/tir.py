@@ -55,8 +55,7 @@ def magic_curve(model: TireModel, axle: Axle, drawn: Sequence[TireModel] = ()) -
 
     def errors(z: Array, power: float = 1.0, size: float = 1.0) -> Array:
         e = weight * (formula(slip, z) - phi) / (size * peak)
-        signed: Array = np.sign(e) * np.abs(e) ** power
-        return signed
+        return np.sign(e) * np.abs(e) ** power
 
     stiff, most = math.log(max(phi[0] / slip[0], 1.1)), math.log(max(float(phi.max()), 0.05))
     squares = [_solved(errors, (stiff, most, 1.35, E)) for E in (0.0, -1.5)]
@@ -80,8 +79,7 @@ def formula(slip: Array, z: Array) -> Array:
     """Return φ of the Magic Formula at slips (k,) [rad].   z : ln K, ln μ, C, E (4,)."""
     K, mu, C, E = math.exp(z[0]), math.exp(z[1]), z[2], z[3]
     Bx = K / (C * mu) * slip
-    phi: Array = mu * np.sin(C * np.arctan(Bx - E * (Bx - np.arctan(Bx))))
-    return phi
+    return mu * np.sin(C * np.arctan(Bx - E * (Bx - np.arctan(Bx))))
 
 
 def _solved(errors: Callable[..., Array], begin: Sequence[float] | Array, *of: float) -> Array:

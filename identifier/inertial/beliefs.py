@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
-from models.rules import require_positive_fields
+from models.rules import Positive
 from models.vehicle import Vehicle
 
 TOLD_ROLL = 0.25  # standard deviation of the roll that a chassis tells, as a share of it
@@ -49,7 +49,7 @@ class Body(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Beliefs:
+class Beliefs(Positive):
     """Means and standard deviations of what is learnt beside the curves, before the first sample.
     bias : of the accelerometer [g].
     roll, sd_roll : of the body, outwards, as the accelerometer feels it [rad per g]; 0 and nearly 0
@@ -66,12 +66,9 @@ class Beliefs:
     gyro: float = 0.002
     grip: float = 0.02
 
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Trust:
+class Trust(Positive):
     """How far motion, road and sensors are trusted; sensors as of a car with a wheelbase of 2.7 m.
     v_y : of v_y at the first sample and below the lowest speed of learning [sqrt(g L)].
     r : of the yaw rate then [rad/s].
@@ -115,9 +112,6 @@ class Trust:
     step_time: float = 0.3
     surge: float = 98.0
     observable: float = 0.01
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
 
     def at(self, dt: float, wheelbase: float, froude_time: float) -> "TrustNumbers":
         """Return the numbers of a step.

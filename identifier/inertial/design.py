@@ -194,6 +194,18 @@ class InertialIdentifier(Method):
         trust = self.trust.at(self.dt, vehicle.wheelbase, vehicle.froude_time)
         curves = self._directions(W)
         known = self._known(vehicle, P, curves, compliance)
+        omega, (ahead, aside) = self._sway(vehicle).frequency, self.sensor_position
+        laws = Laws(
+            forgets=math.exp(-self.dt / self.trust.correlation_time),
+            bank=math.exp(-self.dt / self.trust.bank_time),
+            roll_stiffness=omega**2,
+            roll_damping=2.0 * self.roll_damping * omega,
+            sway=self.prior.sway_share * omega**-2,
+            ahead=ahead,
+            aside=aside,
+            late=self.a_y_late,
+            steering_gain=self.sensors.steering_gain,
+        )
         pressed = vehicle.has_downforce
         scan = _scan(doublings(self.ladder), tires=not self.held, pressed=pressed)
         return Setup(
@@ -211,7 +223,7 @@ class InertialIdentifier(Method):
             },
             constants={
                 **self.plausibility.constants(vehicle, self.ladder, self.dt),
-                "laws": np.array(self._laws(vehicle)),
+                "laws": np.array(laws),
                 "trust": np.array(trust),
                 "learning_speed": np.array(self.plausibility.learning_speed),
                 "limits": np.array(self._limits()),
@@ -230,21 +242,6 @@ class InertialIdentifier(Method):
         frequency = self._sway(vehicle).frequency
         believed = Body(frequency, self.roll_damping, self.beliefs.roll, self.beliefs.sd_roll)
         return Body.of_chassis(vehicle) or believed
-
-    def _laws(self, vehicle: Vehicle) -> Laws:
-        omega = self._sway(vehicle).frequency
-        ahead, aside = self.sensor_position
-        return Laws(
-            forgets=math.exp(-self.dt / self.trust.correlation_time),
-            bank=math.exp(-self.dt / self.trust.bank_time),
-            roll_stiffness=omega**2,
-            roll_damping=2.0 * self.roll_damping * omega,
-            sway=self.prior.sway_share * omega**-2,
-            ahead=ahead,
-            aside=aside,
-            late=self.a_y_late,
-            steering_gain=self.sensors.steering_gain,
-        )
 
     def _sway(self, vehicle: Vehicle) -> Sway:
         """Return the roll of a body of this size."""
@@ -274,7 +271,7 @@ class InertialIdentifier(Method):
         damped = np.vstack([T, 1e-3 * np.eye(n)])
         wanted = np.hstack([T @ W.T - stiffer, stiffer])
         found = np.linalg.lstsq(damped, np.vstack([wanted, np.zeros((n, 4))]), rcond=None)[0]
-        return np.asarray(found.T, np.float64)
+        return found.T
 
     def _into(self, curves: Array, compliance: Array) -> Array:
         """Return what steps of what is learnt move of each axle's numbers, (2, n + 3, k)."""
@@ -323,8 +320,7 @@ class InertialIdentifier(Method):
         sensors = state["sensors"].reshape(-1, len(SENSORS))[1:]
         tilt = state["body"].reshape(-1, 2)[1:, 0]
         bias, roll = (sensors[:, SENSORS.index(name)] for name in ("bias", "roll"))
-        beside: Array = bias + roll * tilt / GRAVITY
-        return beside
+        return bias + roll * tilt / GRAVITY
 
     def frozen(self, vehicle: Vehicle, state: Mapping[str, Array]) -> AxleModel:
         """Return the model with the carried weights: where tires are held, as sure as typical ones.

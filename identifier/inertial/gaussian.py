@@ -63,7 +63,7 @@ def propagated(factors: Factors, F: Any, Q: list[Any]) -> Factors:
     after = {
         (i, k): moved[k][i] if i < m else U[i, k] for i in range(q) for k in range(max(i + 1, m), q)
     }
-    diagonal: list[Any] = [*D]
+    diagonal = [*D]
     for j in reversed(range(m)):
         weighted = [a * d for a, d in zip(rows[j], weights, strict=True)]
         diagonal[j] = sum(a * b for a, b in zip(rows[j], weighted, strict=True))

@@ -204,7 +204,7 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     )
     car, laws, trust, dt, slowest = s.car, s.laws, s.trust, s.dt, s.learning_speed
     into = learnt.into(n, s.curves, s.compliance)
-    load: Load = partial(load_ratio, s.downforce) if pressed else static_load
+    load = partial(load_ratio, s.downforce) if pressed else static_load
     seen = ca.vertcat(0, s.x[1])  # a missing v_y speaks against no sample
     gated = gate(s.plausibility, dt, s.gate, seen, s.u, s.v_x)
     runs = ca.logic_and(gated.on, gated.v_x >= slowest)
@@ -228,7 +228,8 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     # v_y and r on the way, the others
     for i in (-MOVING - 4, -MOVING - 3, *range(2 - MOVING, 0)):
         F[i, :] *= goes_on  # a filter that begins anew knows of no dependence
-    factors = propagated(factors, F, _process_noise(trust, ahead))
+    added = ca.vertsplit(_force_deviation(trust, ahead) ** 2 * trust.renewed)
+    factors = propagated(factors, F, [None, trust.r_walk, None, None, *added, trust.bank_walk])
     ahead_z = ca.vertcat(ahead.moving, z[MOVING:])
     noise = _noise(s, gated, goes_on)
     step, factors, left = _corrected(s, ahead, ahead_z, into, factors, noise, now, steps, load)
@@ -238,7 +239,9 @@ def build_step(steps: tuple[int, ...], *, tires: bool = True, pressed: bool = Fa
     fast = s.running.force_error
     fast = fast + trust.alarm_gain * ((squares[0] + squares[1]) / 2 - fast)
     alarm = goes_on * gated.learns * within(fast * trust.per_alarm - 1, 0, 1)
-    factors = _loosened(factors, learnt, alarm * trust.inflation)
+    more = alarm * trust.inflation  # on another road the grip of both curves may change
+    grip = [i for i, name in enumerate(learnt.names, start=MOVING) if name.startswith("grip")]
+    factors = Factors(factors.U, [d + more if i in grip else d for i, d in enumerate(factors.D)])
     corrected = _bounded(s, corrected, learnt)
 
     # Else it begins anew, a sample later.
@@ -342,12 +345,6 @@ def _force_deviation(trust: TrustNumbers, ahead: Predicted) -> Any:
     return trust.error + trust.relative_error * ca.fabs(ahead.curve.force)
 
 
-def _process_noise(trust: TrustNumbers, ahead: Predicted) -> list[Any]:
-    """Return what a step adds to the variances of what moves, None where nothing."""
-    e_f, e_r = ca.vertsplit(_force_deviation(trust, ahead) ** 2 * trust.renewed)
-    return [None, trust.r_walk, None, None, e_f, e_r, trust.bank_walk]
-
-
 def _corrected(
     s: SimpleNamespace,
     ahead: Predicted,
@@ -401,13 +398,6 @@ def _corrected(
 def _is_good(gated: Gate) -> Any:
     """Return whether the gate goes on with this sample, and not with one before."""
     return gated.state[GateState._fields.index("bad")] == 0
-
-
-def _loosened(factors: Factors, learnt: Learnt, amount: Any) -> Factors:
-    """Return the factors where the road may be another one: the grip of both curves may change."""
-    U, D = factors
-    grip = [i for i, name in enumerate(learnt.names, start=MOVING) if name.startswith("grip")]
-    return Factors(U, [d + amount if i in grip else d for i, d in enumerate(D)])
 
 
 def _bounded(s: SimpleNamespace, z: list[Any], learnt: Learnt) -> list[Any]:

@@ -75,7 +75,10 @@ def node_scan(columns: Columns = ()) -> Scan:
         _Instant(s.z_next, s.given_next, by_name, s.car),
     )
     moves = ca.vertcat(*_moves(now, then, by_name, s.times, s.dt))
-    shows = ca.vertcat(*_shows(now, by_name))
+    a, turns = now.accelerations
+    felt = a + by_name["a_y_lever"] * turns + by_name["roll"] * now.given["rho"]
+    felt += GRAVITY * by_name["a_y_bias"]
+    shows = ca.vertcat(now.r + by_name["r_bias"], felt - by_name["a_y_delay"] * now.given["jerk"])
     begins = ca.vertcat(z[0], 0, z[2:4] - ca.vertcat(*now.alpha), z[4:])
     carry: tuple[str, ...] = ()
     force = ca.vertcat(*now.force) - z[4:6]
@@ -159,17 +162,6 @@ class _Instant:
         across = GRAVITY * (l_r * front + l_f * rear) / self.L
         J = self.car.inertia * ca.exp(self.p["ln_inertia"])
         return across, l_f * l_r / (self.L * J) * (front - rear)
-
-
-def _shows(now: _Instant, p: dict[str, Any]) -> list[Any]:
-    """Return what sensors of r and a_y show."""
-    a, turns = now.accelerations
-    given = now.given
-    felt = a + p["a_y_lever"] * turns + p["roll"] * given["rho"] + GRAVITY * p["a_y_bias"]
-    return [
-        now.r + p["r_bias"],
-        felt - p["a_y_delay"] * given["jerk"],
-    ]
 
 
 def _moves(now: _Instant, then: _Instant, p: dict[str, Any], times: Any, dt: Any) -> list[Any]:

@@ -154,7 +154,8 @@ class PaperIdentifier(Method):
             network=network or natural_network(vehicle),
             law=gains_of,
             dt=dt,
-            force_unit=_natural_force_unit(vehicle.mass),
+            # Gains are well scaled where forces are of order one: 1 kN for a car, 1 N for a 1:10.
+            force_unit=float(10.0 ** round(np.log10(vehicle.mass * GRAVITY / 15))),
             min_speed=vehicle.lowest_speed,
             seed=seed,
             driving=driving,
@@ -175,12 +176,31 @@ class PaperIdentifier(Method):
     def operation(self, vehicle: Vehicle, driving: Driving | None = None) -> Operation:
         """Return what its certificate must know.
 
+        The V layer is judged up to twice the smallest weights that hold the expected residual with
+        every unit saturated: units half open.
+
         Parameters
         ----------
         driving : how hard it is driven; None takes what it was designed for, else
             `natural_driving`.
         """
-        return _operation(self, vehicle, driving or self.driving or natural_driving(vehicle))
+        driving = driving or self.driving or natural_driving(vehicle)
+        found = disturbance(vehicle, driving, dt=self.dt, unit=self.force_unit)
+        expected = expected_residual(vehicle, slip=driving.slip, friction=driving.friction)
+        feedback = estimated_input_feedback(vehicle.bicycle, (1.0 - SPEED_SPREAD) * driving.v_x)
+        estimated = self.input_source == "estimated"
+        return Operation(
+            n_h=self.network.hidden,
+            dt=self.dt,
+            bandwidth=driving.bandwidth,
+            disturbance=found,
+            needed_force=expected / self.force_unit,
+            x_bar_max=_largest_input(self, vehicle, driving),
+            V_start=2.0 * math.sqrt(self.network.hidden * len(self.network.inputs)),
+            input_feedback=feedback if estimated else None,
+            input_per_error=_input_per_error(self, vehicle, driving) if estimated else 0.0,
+            W_large=2.0 * expected / self.force_unit / math.sqrt(self.network.hidden),
+        )
 
     def certify(self, vehicle: Vehicle, driving: Driving | None = None) -> Certificate:
         """Return what is proven of its gains."""
@@ -264,16 +284,6 @@ def _K_inv(parameters: BicycleParameters) -> Array:
     return np.array(ca.DM(bicycle(parameters, 1.0).K_inv))  # K does not depend on v_x
 
 
-def _natural_force_unit(mass: float) -> float:
-    """Return the power of ten [N] nearest to a fifteenth of a car's weight.
-
-    The gains are well scaled where forces are of order one: 1 kN for a passenger car, 1 N for a
-    1:10 model.
-    mass : mass of the car [kg].
-    """
-    return float(10.0 ** round(np.log10(mass * GRAVITY / 15)))
-
-
 # What the certificate of a design must know.
 
 
@@ -303,30 +313,6 @@ def _input_per_error(design: PaperIdentifier, vehicle: Vehicle, driving: Driving
     K = bicycle(vehicle.bicycle, slowest).K
     per_error = ca.jacobian(x_bar, x) @ ca.DM(K) * design.force_unit
     return float(np.linalg.norm(np.array(ca.evalf(ca.densify(per_error))), 2))
-
-
-def _operation(design: PaperIdentifier, vehicle: Vehicle, driving: Driving) -> Operation:
-    """Return what the certificate of a design needs.
-
-    The V layer is judged up to twice the smallest weights that hold the expected residual with
-    every unit saturated: units half open.
-    """
-    found = disturbance(vehicle, driving, dt=design.dt, unit=design.force_unit)
-    expected = expected_residual(vehicle, slip=driving.slip, friction=driving.friction)
-    feedback = estimated_input_feedback(vehicle.bicycle, (1.0 - SPEED_SPREAD) * driving.v_x)
-    estimated = design.input_source == "estimated"
-    return Operation(
-        n_h=design.network.hidden,
-        dt=design.dt,
-        bandwidth=driving.bandwidth,
-        disturbance=found,
-        needed_force=expected / design.force_unit,
-        x_bar_max=_largest_input(design, vehicle, driving),
-        V_start=2.0 * math.sqrt(design.network.hidden * len(design.network.inputs)),
-        input_feedback=feedback if estimated else None,
-        input_per_error=_input_per_error(design, vehicle, driving) if estimated else 0.0,
-        W_large=2.0 * expected / design.force_unit / math.sqrt(design.network.hidden),
-    )
 
 
 # A design as a TOML file: design.toml, read strictly and written with its units.

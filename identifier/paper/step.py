@@ -8,7 +8,7 @@ Outputs: the next carried values; f_hat (2,) [U], the network's force; axle_forc
 tire and network together; xi_tilde (2,) [U s].
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -52,21 +52,6 @@ class Structure(NamedTuple):
     network: Network
     law: str
     input_source: str
-
-
-def _plausible(parameters: BicycleParameters, v_x: Any, x: Any, u: Any) -> Any:
-    """Return whether a car can be in this state: its axles slide less than 63°, its wheels turn.
-
-    A sample that is not (a spike, a dropout of a sensor) is not learnt from, and no force is given:
-    one of 1000 m/s would carry the weights beyond any number.
-    v_x : longitudinal speed, at least the minimum speed [m/s].   x : [v_y, r] (2,).
-    u : [δ_f, δ_r] (2,).
-    """
-    most = 2 * v_x  # tan 63°
-    front, rear = x[0] + parameters.l_f * x[1], x[0] - parameters.l_r * x[1]
-    inside = ca.logic_and(ca.fabs(front) <= most, ca.fabs(rear) <= most)
-    steering = ca.logic_and(ca.fabs(u[0]) <= _LARGEST_ANGLE, ca.fabs(u[1]) <= _LARGEST_ANGLE)
-    return ca.logic_and(inside, steering)
 
 
 def build_step(structure: Structure) -> ca.Function:
@@ -117,7 +102,14 @@ def build_step(structure: Structure) -> ca.Function:
     xi_hat_dot = observer_rate(A_d, model.A_xi, model.B_xi / unit, xi, xi_hat, u, W @ sigma)
 
     moving = v_x >= min_speed
-    plausible_sample = ca.logic_and(_plausible(parameters, speed, x, u), v_x <= _LARGEST_SPEED)
+    # Where no car can be (a spike, a dropout of a sensor: an axle slides more than 63°) nothing is
+    # learnt, and no force given: 1000 m/s would carry the weights beyond any number.
+    sideways = x[0] + parameters.l_f * x[1], x[0] - parameters.l_r * x[1]
+    inside = [ca.fabs(one) <= 2 * speed for one in sideways]
+    inside += [ca.fabs(u[i]) <= _LARGEST_ANGLE for i in (0, 1)]
+    plausible_sample = ca.logic_and(
+        ca.logic_and(ca.logic_and(*inside[:2]), ca.logic_and(*inside[2:])), v_x <= _LARGEST_SPEED
+    )
     used = ca.logic_and(moving, plausible_sample)
     f_hat = ca.if_else(used, W @ sigma, 0)
     linear = ca.if_else(used, linear_axle_force(parameters, speed, x, u), 0)

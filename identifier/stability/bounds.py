@@ -38,8 +38,7 @@ def small_gain(
     direction : (2, 2) D [s].
     """
     peak, size = error_gains(A_d, dt).force, float(np.linalg.norm(direction, 2))
-    gain: float = law.z * peak * eta_W * size * n_h / forgetting**2
-    return gain
+    return law.z * peak * eta_W * size * n_h / forgetting**2
 
 
 def steady_capacity(
@@ -60,5 +59,4 @@ def steady_capacity(
     """
     c_z, c_xi = law
     size = float(np.linalg.norm(direction, 2))
-    capacity: float = n_h * eta_W * size * (c_z / forgetting + c_xi) / rho_W
-    return capacity
+    return n_h * eta_W * size * (c_z / forgetting + c_xi) / rho_W

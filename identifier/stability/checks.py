@@ -221,7 +221,12 @@ def bound_checks(
     ]
     if gains.rho_W > 0.0:
         capacity = steady_capacity(rho_W=gains.rho_W, **known)
-        entries.append(_capacity(capacity, gains.rho_W, operation.needed_force))
+        need = operation.needed_force
+        advice = f"rho_W below {gains.rho_W * capacity / need:.3g}" if capacity < need else ""
+        title = "largest steady force of the network with this leakage"
+        entries.append(
+            Property.judged("capacity", title, capacity, "U", limit=need, least=True, advice=advice)
+        )
         entries += printed_bounds(gains, law, operation, trivial)
     return entries
 
@@ -254,10 +259,3 @@ def _leakage(name: str, layer: str, step: float, rho: float) -> Property:
     title = f"largest share of {layer} that leaks in one sample"
     advice = "" if step <= 1.0 else f"rho_{layer} below {rho / step:.3g}, or sample faster"
     return Property.judged(name, title, step, "-", limit=1.0, bad=2.0, advice=advice)
-
-
-def _capacity(capacity: float, rho_W: float, need: float) -> Property:
-    """Judge the force that leakage lets W hold."""
-    advice = f"rho_W below {rho_W * capacity / need:.3g}" if capacity < need else ""
-    title = "largest steady force of the network with this leakage"
-    return Property.judged("capacity", title, capacity, "U", limit=need, least=True, advice=advice)

@@ -33,8 +33,7 @@ def direction_matrix(law: Law, A_d: ArrayLike) -> Array:
     """Return D of the law, (2, 2) [s]: -A_d⁻ᵀ as printed, P for the PI-lead law.
     law : of `identifier.paper.laws.LAWS`.   A_d : (2, 2) Hurwitz error dynamics [1/s].
     """
-    found: Array = -np.array(ca.DM(law.direction(ca.DM(np.asarray(A_d)), ca.DM.eye(2))))
-    return found
+    return -np.array(ca.DM(law.direction(ca.DM(np.asarray(A_d)), ca.DM.eye(2))))
 
 
 class Loop(NamedTuple):

@@ -122,28 +122,6 @@ def _rate(loop: Loop) -> float:
 # Re H ∝ (a λ - ω²): it drifts where the maneuver is faster than sqrt(a λ).
 
 
-def _passivity(
-    frequency: ArrayLike,
-    *,
-    A_d: ArrayLike,
-    forgetting: float,
-    law: DrivingError,
-    direction: Array | None = None,
-) -> Array:
-    """λ_min of the Hermitian part of H(jω), (n,): negative where a regressor drifts.
-    frequency : (n,) ω [rad/s].
-    """
-    dynamics = np.asarray(A_d)
-    c_z, c_xi = law
-    s = 1j * np.atleast_1d(np.asarray(frequency, dtype=np.float64))
-    D = -np.linalg.inv(dynamics).T if direction is None else direction
-    resolvent = np.linalg.inv(s[:, None, None] * np.eye(2) - dynamics)
-    scalar = c_xi + c_z / (s + forgetting)
-    H = np.asarray(scalar[:, None, None] * (D @ resolvent), dtype=np.complex128)
-    hermitian = (H + H.conj().transpose(0, 2, 1)) / 2.0
-    return np.asarray(np.linalg.eigvalsh(hermitian)[:, 0], dtype=np.float64)
-
-
 def drift_frequency(
     *, A_d: ArrayLike, forgetting: float, law: DrivingError, direction: Array | None = None
 ) -> float:
@@ -152,11 +130,16 @@ def drift_frequency(
     For A_d = -a I: sqrt(a λ) for the integral law, inf for the instantaneous law and for the
     PI-lead law with τ >= 1/a.
     """
+    A_d, (c_z, c_xi) = np.asarray(A_d), law
+    D = -np.linalg.inv(A_d).T if direction is None else direction
 
     def relative(frequency: ArrayLike) -> Array:
         """λ_min He H with the decay of H taken out, so that round-off is no sign."""
-        lowest = _passivity(frequency, A_d=A_d, forgetting=forgetting, law=law, direction=direction)
-        return lowest * (size + np.atleast_1d(np.asarray(frequency))) / reference
+        s = 1j * np.atleast_1d(frequency)
+        resolvent = np.linalg.inv(s[:, None, None] * np.eye(2) - A_d)
+        H = (c_xi + c_z / (s + forgetting))[:, None, None] * (D @ resolvent)
+        hermitian = (H + H.conj().transpose(0, 2, 1)) / 2.0
+        return np.linalg.eigvalsh(hermitian)[:, 0] * (size + s.imag) / reference
 
     size = float(np.linalg.norm(A_d, 2)) + forgetting
     reference = 1.0

@@ -147,8 +147,7 @@ def estimated_input_feedback(lost: BicycleParameters, v_x: float) -> Array:
     m, I_z, l_f, l_r, *stiffness = lost
     K = np.array([[1.0 / m, 1.0 / m], [l_f / I_z, -l_r / I_z]])  # (6) prints a transpose
     slip = np.array([[1.0, l_f], [1.0, -l_r]])
-    feedback: Array = np.diag(stiffness) @ (slip @ K) / v_x
-    return feedback
+    return np.diag(stiffness) @ (slip @ K) / v_x
 
 
 # From a car and how hard it is driven to what a certificate must know: signals and disturbances.
@@ -185,12 +184,6 @@ def declared_signals(vehicle: Vehicle, driving: Driving) -> dict[str, float]:
     return {name: max(slow[name], fast[name]) for name in slow}
 
 
-def largest_steering_rate(vehicle: Vehicle, driving: Driving) -> tuple[float, float]:
-    """Bound of |δ_f'| and |δ_r'|: 2 π bandwidth times the largest angle [rad/s]."""
-    signals, omega = declared_signals(vehicle, driving), 2.0 * math.pi * driving.bandwidth
-    return omega * signals["delta_f"], omega * signals["delta_r"]
-
-
 def _residual_bound(vehicle: Vehicle, *, slip: float) -> float:
     """Force that the linear tire can miss at most at any instant, |f| <= hypot(C_f, C_r) slip [N].
     vehicle : the car; its stiffness is at least half that of the tires.
@@ -222,7 +215,9 @@ def disturbance(vehicle: Vehicle, driving: Driving, *, dt: float, unit: float) -
     spin = float(lever @ push) / vehicle.yaw_inertia  # |r'|
 
     # |f| as the samples show it: C α and v_x r are held over T_s, with v_x' up to the grip
-    slip_rate = np.array(largest_steering_rate(vehicle, driving))
+    slip_rate = (
+        2.0 * math.pi * driving.bandwidth * np.array([signals["delta_f"], signals["delta_r"]])
+    )
     slip_rate = slip_rate + (grip + fast * r + lever * spin) / slow + sway * grip / slow**2
     turn_rate = K_inv[:, 0] * (fast * spin + grip * r)
     between = dt / 2.0 * float(np.linalg.norm(C * slip_rate + turn_rate))

@@ -59,11 +59,10 @@ def within_band(model: TireModel, recording: Recording, level: float = LEVEL) ->
     found = evidence(model, part.recording)
     if found is None or model.band is None:
         return None
-    half = model.band.of_curves(part.recording, level) / np.array(model.vehicle.axle_loads)
+    half = model.band.of_curves(part.recording, level) / model.vehicle.axle_loads
     noise = normal_quantile(level) ** 2 * found.noise
     wide = np.sqrt(found.windows.mean(half) ** 2 + noise)
-    share: Array = np.mean(np.abs(found.measured - found.modelled) <= wide, axis=0)
-    return share
+    return np.mean(np.abs(found.measured - found.modelled) <= wide, axis=0)
 
 
 class ModelErrors(NamedTuple):
@@ -240,7 +239,7 @@ def color_of(error: Array, windows: Windows) -> float:
     place = np.round(windows.starts / step).astype(np.intp)
     series = np.full(int(place.max()) + 1, np.nan)
     series[place] = error
-    known: NDArray[np.bool_] = np.isfinite(series)
+    known = np.isfinite(series)
     value = np.where(known, series, 0.0)
     power, total = float(np.mean(value[known] ** 2)), 1.0
     for lag in range(2, len(series) // 4, 2):

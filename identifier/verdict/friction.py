@@ -18,7 +18,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from codegen.arrays import Array
 from identifier.band import LEVEL, normal_quantile
@@ -133,7 +132,7 @@ def road_friction(
         assert tires.band is not None
         away[k] = found.measured - modelled_force(tires, part.recording, windows)
         slope[k] = windows.mean(tires.band.slope_over(part.recording))
-    half = band.of_curves(part.recording) / np.array(model.vehicle.axle_loads)
+    half = band.of_curves(part.recording) / model.vehicle.axle_loads
     sd = windows.mean(half) / normal_quantile(LEVEL)
     beside = _BESIDE if recording.logged_v_y is not None else math.hypot(_BESIDE, _OF_ESTIMATE)
     variance = sd**2 + found.noise + beside**2 + (_OF_FORCE * found.measured) ** 2
@@ -170,7 +169,11 @@ def filtered(t: Array, grid: Array, away: Array, slope: Array, variance: Array) 
         p[k] = now
         gain = doubt * slope[:, k] / (wide + (1.0 / _OVERLAP - 1.0) * variance[k])
         zero, doubt = zero + gain * off, doubt * (1.0 - gain * slope[:, k])
-    return _of(t, grid, p)
+    of_friction = p[:, :-1] / np.maximum(1.0 - p[:, -1:], 1e-12)
+    mean, cell = of_friction @ grid, float(np.diff(grid).max()) / math.sqrt(12.0)
+    spread = np.sqrt(np.maximum(of_friction @ grid**2 - mean**2, 0.0))
+    another = p[:, :-1] @ (np.abs(grid) > _ANOTHER)
+    return RoadFriction(t, np.exp(mean), np.hypot(spread, cell), another, p[:, -1])
 
 
 def _mixed(p: Array, zero: Array, doubt: Array, stays: Array) -> tuple[Array, Array]:
@@ -184,12 +187,3 @@ def _mixed(p: Array, zero: Array, doubt: Array, stays: Array) -> tuple[Array, Ar
     new = stays * zero + (1.0 - stays) * mean
     wide = stays * (doubt + (zero - new) ** 2) + (1.0 - stays) * (spread + (mean - new) ** 2)
     return new, wide
-
-
-def _of(t: Array, grid: Array, p: NDArray[np.float64]) -> RoadFriction:
-    """Return means and probabilities of what is left after each window (m, k + 1)."""
-    of_friction = p[:, :-1] / np.maximum(1.0 - p[:, -1:], 1e-12)
-    mean, cell = of_friction @ grid, float(np.diff(grid).max()) / math.sqrt(12.0)
-    spread = np.sqrt(np.maximum(of_friction @ grid**2 - mean**2, 0.0))
-    another = p[:, :-1] @ (np.abs(grid) > _ANOTHER)
-    return RoadFriction(t, np.exp(mean), np.hypot(spread, cell), another, p[:, -1])

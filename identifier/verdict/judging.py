@@ -144,16 +144,11 @@ def judge_prediction(model: TireModel, recording: Recording) -> Verdict:
     evaluated = _evaluated(model, recording, taught=False)
     if evaluated is None:
         return _too_short(model, FEWEST, taught=False)
-    friction = friction_of(model, recording) if _misses_some(evaluated) else None
+    worst = evaluated.found.worst(_PART)[~np.array(evaluated.forceless)].max(initial=0.0)
+    missed = evaluated.left_out is not None or worst > _MISSED  # as on another road
+    friction = friction_of(model, recording) if missed else None
     verdict = _verdict(evaluated, [*_findings(evaluated), *_roads(friction)], recording)
     return replace(verdict, friction=friction)
-
-
-def _misses_some(evaluated: _Evaluated) -> bool:
-    """Return whether a part of the drive is not explained, as on a road of another friction."""
-    force = ~np.array(evaluated.forceless)
-    worst = evaluated.found.worst(_PART)[force].max(initial=0.0)
-    return evaluated.left_out is not None or bool(worst > _MISSED)
 
 
 def friction_of(model: TireModel, recording: Recording) -> RoadFriction | None:
@@ -285,8 +280,9 @@ def _unsure(evaluated: _Evaluated) -> Iterator[Objection]:
 
 
 def _no_tire(evaluated: _Evaluated) -> Iterator[Objection]:
-    loads = np.array(evaluated.model.vehicle.axle_loads)
-    secant = evaluated.model.force(np.array([_SECANT]))[0] / _SECANT / loads
+    secant = (
+        evaluated.model.force(np.array([_SECANT]))[0] / _SECANT / evaluated.model.vehicle.axle_loads
+    )
     least, most = RULES.stiffness
     for axle, each in zip(AXLES, secant, strict=True):
         if not least <= each <= most:
@@ -380,7 +376,7 @@ def _verdict(evaluated: _Evaluated, listed: list[Objection], whole: Recording) -
     counted = recording.v_x >= model.min_speed
     motion = motion_error(found.predicted, recording, model.vehicle, counted)
     lateral, yaw = (None, None) if motion is None else motion.explained
-    measures: dict[str, tuple[float, ...] | float | None] = {
+    measures = {
         "force_missed": tuple(map(float, found.model_error)),
         "rms_force_static_loads": tuple(map(float, found.force)),
         "peak_force_static_loads": tuple(map(float, found.peak)),

@@ -59,15 +59,6 @@ def _wheels(vehicle: Vehicle) -> tuple[_Wheel, _Wheel, _Wheel, _Wheel]:
     )
 
 
-def _mounted(tire: Tire, wheel: _Wheel) -> Tire:
-    """Return the tire for the side of the wheel; only measured tires have sides.
-    tire : any of `models.tires`.
-    """
-    if isinstance(tire, MagicFormula):
-        return tire.mounted("left" if wheel.y > 0.0 else "right")
-    return tire
-
-
 def own_lengths(vehicle: Vehicle, tires: Sequence[Tire]) -> tuple[float, ...]:
     """Return the relaxation lengths that tires have in their files [m], 0 for none.
     tires : front and rear.
@@ -239,7 +230,9 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
         here = X + wheel.x * ca.cos(psi) - wheel.y * ca.sin(psi)
         grip = mu + place_change(places, here)
         camber = (c.roll_camber_front, c.roll_camber_rear)[axle] * roll
-        tire = _mounted(tires[axle], wheel)
+        tire = tires[axle]
+        if isinstance(tire, MagicFormula):  # only measured tires have sides
+            tire = tire.mounted("left" if wheel.y > 0.0 else "right")
         of_tire = _tire_force(tire, slip[k], camber, 0.5 * drive[axle], F_z[k], grip)
         F_x.append(of_tire[0])
         F_y.append(of_tire[1])

@@ -186,7 +186,7 @@ class Plant:
         self.vehicle = vehicle
         self.tire: Tire = tire_of(vehicle) if tire is None else tire
         self.rear_tire: Tire = self.tire if rear_tire is None else rear_tire
-        self.driver = driver if driver is not None else Driver()
+        self.driver = driver or Driver()
 
     def simulate(
         self,
@@ -229,7 +229,7 @@ class Plant:
                 raise ValueError(f"{label} must be finite and of shape {shape}")
         if not v_ref[0] > 0.0:
             raise ValueError(f"speed must be positive at the start, it is {v_ref[0]}")
-        road = friction if friction is not None else Friction()
+        road = friction or Friction()
         start = np.zeros(N_STATES)
         start[0] = v_ref[0]
         values = {"x": start, "command": command, "v_ref": v_ref}
@@ -291,7 +291,7 @@ class StepwisePlant:
         if not (dt > 0.0 and every >= 1 and abs(every * dt - period) < 1e-9 * period):
             raise ValueError(f"period {period} must be a multiple of dt {dt}")
         self.plant = plant
-        self.friction = friction if friction is not None else Friction()
+        self.friction = friction or Friction()
         self.period = period
         self.dt = dt
         self._every = every

@@ -5,9 +5,12 @@ of ISO 8855: F_y = +C α. κ = (ω R - V_x)/|V_x| > 0 when driving. γ > 0 turns
 the wheel leans to the right.
 """
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import casadi as ca
+
+from models.rules import Positive
 
 _ROLLING_FLOOR = 1e-3  # 1 + κ of a locked wheel: slides in the same direction, divides by no zero
 _COSINE_FLOOR = 1e-3  # |cos α| of a wheel that moves sideways
@@ -95,64 +98,56 @@ class Slips(NamedTuple):
     rolling: Expression
 
 
-def _slips(alpha: Expression, kappa: Expression, C_alpha: float, C_kappa: float) -> Slips:
-    """Slips weighed by their stiffnesses, safe for a locked wheel and for any angle.
-    alpha : slip angle, paper's sign [rad].
-    kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
-    C_alpha : cornering stiffness [N/rad].   C_kappa : longitudinal slip stiffness [N].
+# What tires share whose stiffness is the same at every load.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConstantStiffness(Positive):
+    """A tire with stiffnesses that do not depend on load.
+    C_alpha : cornering stiffness of one tire [N/rad].
+    C_kappa : longitudinal slip stiffness of one tire [N].
     """
-    tan_alpha = ca.sin(alpha) / ca.fmax(ca.fabs(ca.cos(alpha)), _COSINE_FLOOR)
-    p_x = C_kappa * kappa
-    p_y = C_alpha * tan_alpha
-    size = ca.sqrt(p_x**2 + p_y**2 + NO_FORCE**2)
-    return Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, _ROLLING_FLOOR))
+
+    C_alpha: float
+    C_kappa: float
+
+    def slip_stiffness(self, F_z: Expression) -> Expression:
+        """∂F_x/∂κ at zero slip [N]: C_κ, and 0 in the air.   F_z : wheel load [N]."""
+        return self.C_kappa * (F_z > 0)
+
+    def cornering_stiffness(self, F_z: Expression) -> Expression:
+        """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.   F_z : wheel load [N]."""
+        return self.C_alpha * (F_z > 0)
 
 
-# What tires share whose stiffness is the same at every load: methods of such tires.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BrushTire(ConstantStiffness):
+    """A tire of constant stiffness whose force points along the demand of its tread.
+    friction : friction coefficient of the tire as measured [-].
+    """
 
-
-class _ConstantStiffness(Protocol):
-    """A tire with stiffnesses that do not depend on load."""
-
-    @property
-    def C_alpha(self) -> float:
-        """Cornering stiffness of one tire [N/rad]."""
-
-    @property
-    def C_kappa(self) -> float:
-        """Longitudinal slip stiffness of one tire [N]."""
-
-
-def slip_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
-    """∂F_x/∂κ at zero slip [N]: C_κ, and 0 in the air.   F_z : wheel load [N]."""
-    return self.C_kappa * (F_z > 0)
-
-
-def cornering_stiffness(self: _ConstantStiffness, F_z: Expression) -> Expression:
-    """∂F_y/∂α at zero slip [N/rad]: C_α, and 0 in the air.   F_z : wheel load [N]."""
-    return self.C_alpha * (F_z > 0)
-
-
-class _BrushTire(_ConstantStiffness, Protocol):
-    """A tire of constant stiffness whose force points along the demand of its tread."""
+    friction: float
 
     def per_demand(self, s: Slips, F_z: Expression, mu: Expression) -> Expression:
         """Force over the demand of a tread that never slides [-]."""
+        raise NotImplementedError
 
-
-def brush_forces(
-    self: _BrushTire,
-    alpha: Expression,
-    kappa: Expression,
-    gamma: Expression,
-    F_z: Expression,
-    mu: Expression = 1.0,
-) -> TireForces:
-    """Longitudinal and lateral force in the wheel frame [N].
-    kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
-    gamma : camber [rad]; without effect.
-    """
-    del gamma
-    s = _slips(alpha, kappa, self.C_alpha, self.C_kappa)
-    per_demand = self.per_demand(s, F_z, mu)
-    return TireForces(s.p_x * per_demand, s.p_y * per_demand)
+    def forces(
+        self,
+        alpha: Expression,
+        kappa: Expression,
+        gamma: Expression,
+        F_z: Expression,
+        mu: Expression = 1.0,
+    ) -> TireForces:
+        """Longitudinal and lateral force in the wheel frame [N].
+        kappa : longitudinal slip [-]; below -1 the wheel counts as locked.
+        gamma : camber [rad]; without effect.
+        """
+        del gamma
+        p_x = self.C_kappa * kappa
+        p_y = self.C_alpha * (ca.sin(alpha) / ca.fmax(ca.fabs(ca.cos(alpha)), _COSINE_FLOOR))
+        size = ca.sqrt(p_x**2 + p_y**2 + NO_FORCE**2)
+        s = Slips(p_x, p_y, size, ca.fmax(1.0 + kappa, _ROLLING_FLOOR))
+        per_demand = self.per_demand(s, F_z, mu)
+        return TireForces(s.p_x * per_demand, s.p_y * per_demand)

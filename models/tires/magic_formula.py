@@ -137,13 +137,6 @@ def _combined_lateral(
     return G_yk * _pure_lateral(c, alpha, gamma, F_z, mu) + S_Vyk  # (4.E58)
 
 
-def _lateral_slope(c: Coefficients, F_z: Expression) -> Expression:
-    """∂F_y/∂α at α = κ = γ = 0, μ = 1, ISO sign: negative [N/rad]; equals K_y where S_Hy = 0."""
-    B_y, C_y, D_y, S_Hy, _ = _lateral_shape(c, 0.0, F_z, 1.0)
-    E_y = _lateral_curvature(c, S_Hy, 0.0, F_z)
-    return _magic_slope(S_Hy, B_y, C_y, D_y, E_y)
-
-
 # Longitudinal force of the Magic Formula 5.2 (PAC2002), pure and combined slip.
 #
 # α, γ, κ, F_z in the axes of the tire file (ISO: α of the opposite sign to the paper's); F_z >= 0.
@@ -175,16 +168,6 @@ def _longitudinal_curvature(c: Coefficients, kappa_x: Expression, F_z: Expressio
     return ca.fmin(E_0 * (1.0 - c.PEX4 * ca.sign(kappa_x)) * c.LEX, 1.0)  # (4.E14)
 
 
-def _pure_longitudinal(
-    c: Coefficients, kappa: Expression, gamma: Expression, F_z: Expression, mu: Expression
-) -> Expression:
-    """F_x0 [N] of a wheel that runs straight, (4.E9)."""
-    B_x, C_x, D_x, S_Hx, S_Vx = _longitudinal_shape(c, gamma, F_z, mu)
-    kappa_x = kappa + S_Hx  # (4.E10)
-    E_x = _longitudinal_curvature(c, kappa_x, F_z)
-    return _magic_curve(kappa_x, B_x, C_x, D_x, E_x) + S_Vx  # (4.E9)
-
-
 def _combined_longitudinal(
     c: Coefficients,
     alpha: Expression,
@@ -200,14 +183,11 @@ def _combined_longitudinal(
     E_xa = ca.fmin(c.REX1 + c.REX2 * df_z, 1.0)  # (4.E56)
     S_Hxa = c.RHX1  # (4.E57)
     G_xa = _weight(alpha, S_Hxa, B_xa, C_xa, E_xa)  # (4.E51)-(4.E53)
-    return G_xa * _pure_longitudinal(c, kappa, gamma, F_z, mu)  # (4.E50)
-
-
-def _longitudinal_slope(c: Coefficients, F_z: Expression) -> Expression:
-    """∂F_x/∂κ at κ = α = γ = 0, μ = 1 [N]; equals K_x where S_Hx = 0."""
-    B_x, C_x, D_x, S_Hx, _ = _longitudinal_shape(c, 0.0, F_z, 1.0)
-    E_x = _longitudinal_curvature(c, S_Hx, F_z)
-    return _magic_slope(S_Hx, B_x, C_x, D_x, E_x)
+    B_x, C_x, D_x, S_Hx, S_Vx = _longitudinal_shape(c, gamma, F_z, mu)
+    kappa_x = kappa + S_Hx  # (4.E10)
+    E_x = _longitudinal_curvature(c, kappa_x, F_z)
+    F_x0 = _magic_curve(kappa_x, B_x, C_x, D_x, E_x) + S_Vx  # (4.E9), of a wheel that runs straight
+    return G_xa * F_x0  # (4.E50)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -255,11 +235,16 @@ class MagicFormula:
 
     def slip_stiffness(self, F_z: Expression) -> Expression:
         """∂F_x/∂κ at zero slip and camber [N]; 0 in the air."""
-        return _longitudinal_slope(self.coefficients, positive(F_z))
+        c, load = self.coefficients, positive(F_z)
+        B_x, C_x, D_x, S_Hx, _ = _longitudinal_shape(c, 0.0, load, 1.0)
+        E_x = _longitudinal_curvature(c, S_Hx, load)
+        return _magic_slope(S_Hx, B_x, C_x, D_x, E_x)
 
     def cornering_stiffness(self, F_z: Expression) -> Expression:
         """∂F_y/∂α at zero slip and camber, paper's sign: positive [N/rad]; 0 in the air."""
-        return -_lateral_slope(self.coefficients, positive(F_z))
+        c, load = self.coefficients, positive(F_z)
+        B_y, C_y, D_y, S_Hy, _ = _lateral_shape(c, 0.0, load, 1.0)
+        return -_magic_slope(S_Hy, B_y, C_y, D_y, _lateral_curvature(c, S_Hy, 0.0, load))
 
     def relaxation_length(self, F_z: Expression) -> Expression:
         """Relaxation length of F_y without camber [m]; 0 where the file has none.

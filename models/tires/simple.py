@@ -1,14 +1,18 @@
 """Tires of few numbers: the linear one, Fiala's brush, Dugoff's hyperbola."""
 
-from dataclasses import dataclass
+from models.tires.forces import (
+    NO_FORCE,
+    BrushTire,
+    ConstantStiffness,
+    Expression,
+    Slips,
+    TireForces,
+    positive,
+    smaller,
+)
 
-from models.rules import require_positive_fields
-from models.tires import forces as constant_stiffness
-from models.tires.forces import NO_FORCE, Expression, Slips, TireForces, positive, smaller
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LinearTire:
+class LinearTire(ConstantStiffness):
     """F_x = C_κ κ, F_y = C_α α while the wheel touches the ground.
 
     Load only decides about contact; friction and camber do nothing: no limit, by definition.
@@ -16,11 +20,7 @@ class LinearTire:
     C_kappa : longitudinal slip stiffness of one tire [N], > 0.
     """
 
-    C_alpha: float
-    C_kappa: float
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
+    __slots__ = ()
 
     def forces(
         self,
@@ -37,9 +37,6 @@ class LinearTire:
         del gamma, mu
         return TireForces(self.slip_stiffness(F_z) * kappa, self.cornering_stiffness(F_z) * alpha)
 
-    slip_stiffness = constant_stiffness.slip_stiffness
-    cornering_stiffness = constant_stiffness.cornering_stiffness
-
 
 # Fiala's brush tire in combined slip: parabolic pressure, one friction coefficient.
 #
@@ -50,20 +47,14 @@ class LinearTire:
 # Source: Pacejka, Tyre and Vehicle Dynamics, ch. 3.2-3.3; Fiala, VDI-Z 96 (1954).
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FialaTire:
+class FialaTire(BrushTire):
     """Brush tire: |F| <= μ F_z exactly, smooth into full sliding; camber does nothing.
     C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
     C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
     friction : friction coefficient of the tire as measured [-], > 0.
     """
 
-    C_alpha: float
-    C_kappa: float
-    friction: float
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
+    __slots__ = ()
 
     def per_demand(self, s: Slips, F_z: Expression, mu: Expression) -> Expression:
         """Force over the demand of a tread that never slides [-]."""
@@ -71,10 +62,6 @@ class FialaTire:
         demand = s.size / s.rolling
         x = smaller(demand / (sliding + NO_FORCE), 1.0)
         return (1.0 - x + x**2 / 3.0) * smaller(1.0 / s.rolling, sliding / s.size)
-
-    forces = constant_stiffness.brush_forces
-    slip_stiffness = constant_stiffness.slip_stiffness
-    cornering_stiffness = constant_stiffness.cornering_stiffness
 
 
 # Dugoff's tire: linear until half the friction is used, then a hyperbola; combined slip for free.
@@ -84,27 +71,17 @@ class FialaTire:
 # 700377 (1970), constant friction coefficient.
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DugoffTire:
+class DugoffTire(BrushTire):
     """Friction-limited linear tire: |F| < μ F_z, reached only in the limit; camber does nothing.
     C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
     C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
     friction : friction coefficient of the tire as measured [-], > 0.
     """
 
-    C_alpha: float
-    C_kappa: float
-    friction: float
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
+    __slots__ = ()
 
     def per_demand(self, s: Slips, F_z: Expression, mu: Expression) -> Expression:
         """Force over the demand of a tread that never slides [-]."""
         half = mu * self.friction * positive(F_z) / (2.0 * s.size)  # λ/(1 + κ)
         lam = smaller(half * s.rolling, 1.0)
         return smaller(half, 1.0 / s.rolling) * (2.0 - lam)  # f(λ)/(1 + κ), no 0/0 at lock
-
-    forces = constant_stiffness.brush_forces
-    slip_stiffness = constant_stiffness.slip_stiffness
-    cornering_stiffness = constant_stiffness.cornering_stiffness

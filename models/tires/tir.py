@@ -270,9 +270,14 @@ def read_magic_formula(path: str | PathLike[str]) -> _MagicFormulaFile:
         raise tir.error(f"TYRESIDE must be LEFT, RIGHT or SYMMETRIC, it is {side!r}")
     if side == "SYMMETRIC":
         c = c.symmetric()
-    return _MagicFormulaFile(
-        c, "right" if side == "RIGHT" else "left", _valid_range(tir), tir.path.stem
+    alpha = _limits(tir, "ALPMIN", "ALPMAX")
+    valid = ValidRange(
+        alpha=(-alpha[1], -alpha[0]),
+        kappa=_limits(tir, "KPUMIN", "KPUMAX"),
+        gamma=_limits(tir, "CAMMIN", "CAMMAX"),
+        F_z=_limits(tir, "FZMIN", "FZMAX"),
     )
+    return _MagicFormulaFile(c, "right" if side == "RIGHT" else "left", valid, tir.path.stem)
 
 
 def _require_mf52(tir: TirFile) -> None:
@@ -348,16 +353,6 @@ def _inflated(c: Coefficients, tir: TirFile) -> Coefficients:
         )  # fmt: skip
     except ValueError as error:
         raise tir.error(f"at its inflation pressure {error}") from None
-
-
-def _valid_range(tir: TirFile) -> ValidRange:
-    alpha = _limits(tir, "ALPMIN", "ALPMAX")
-    return ValidRange(
-        alpha=(-alpha[1], -alpha[0]),
-        kappa=_limits(tir, "KPUMIN", "KPUMAX"),
-        gamma=_limits(tir, "CAMMIN", "CAMMAX"),
-        F_z=_limits(tir, "FZMIN", "FZMAX"),
-    )
 
 
 def _limits(tir: TirFile, least: str, greatest: str) -> tuple[float, float]:

@@ -129,7 +129,7 @@ class _Car:
 
 def _road(n: int, period: float) -> Array:
     """Return a lane change and its way back, bent by cubics, (n, 2)."""
-    t = period * np.arange(n, dtype=np.float64)
+    t = period * np.arange(n)
     kappa = np.zeros(n)
     for begin, sign in ((0.4, 1.0), (0.4 + _LANE_CHANGE, -1.0)):
         z = np.clip((t - begin) / _LANE_CHANGE, 0.0, 1.0)
@@ -200,9 +200,17 @@ def build_mpc_package(
     """
     packaging.check_name(name, "_mpc")
     tracker = Tracker(tire, problem, period=period, delay=delay, caution=caution)
-    params: _Params = tracker.params
+    params = tracker.params
     content = _ingredients(tracker, name, single=single)
-    about = _summary(tracker, content)
+    about: dict[str, str | Words] = {
+        **packaging.about_package(content, f"Path tracking of the car {tire.vehicle.name}"),
+        "tire": content["tire"]["kind"],
+        "horizon": str(tracker.problem.horizon),
+        "dt": f"{tracker.problem.dt:g}",
+        "period": f"{period:g}",
+        "delay": f"{delay:g}",
+        "first_stage": f"{tracker.times[1]:g}",
+    }
     files = c_sources(
         tire.structure, horizon=tracker.problem.horizon, name=name, single=single, about=about
     )
@@ -222,7 +230,9 @@ def build_mpc_package(
 def mpc_readme(package: MpcPackage, about_figures: str) -> str:
     p = _plain_params(package.params)
     rows = "".join(
-        f"| `{name}` | {_in_words(value)} |\n" for name, value in p.items() if name not in UNTOLD
+        f"| `{name}` | {', '.join(f'{one:.6g}' for one in np.ravel(value))} |\n"
+        for name, value in p.items()
+        if name not in UNTOLD
     )
     return filled(
         C / "README.md",
@@ -241,11 +251,6 @@ def mpc_readme(package: MpcPackage, about_figures: str) -> str:
     )
 
 
-def _in_words(value: Any) -> str:
-    values = value if isinstance(value, list) else [value]
-    return ", ".join(f"{number:.6g}" for number in values)
-
-
 def _ingredients(tracker: Tracker, name: str, *, single: bool) -> dict[str, Any]:
     structure = tracker.tire.structure
     numbers = (
@@ -262,19 +267,6 @@ def _ingredients(tracker: Tracker, name: str, *, single: bool) -> dict[str, Any]
         "delay_s": tracker.delay,
         "params": packaging.plain(_plain_params(tracker.params)),
         "statuses": {status.name: int(status) for status in Status},
-    }
-
-
-def _summary(tracker: Tracker, content: Mapping[str, Any]) -> dict[str, str | Words]:
-    times = tracker.times
-    return {
-        **packaging.about_package(content, f"Path tracking of the car {tracker.tire.vehicle.name}"),
-        "tire": content["tire"]["kind"],
-        "horizon": str(tracker.problem.horizon),
-        "dt": f"{tracker.problem.dt:g}",
-        "period": f"{tracker.period:g}",
-        "delay": f"{tracker.delay:g}",
-        "first_stage": f"{times[1]:g}",
     }
 
 

@@ -48,37 +48,12 @@ def frozen_start(package: Package) -> TireModel:
     return model
 
 
-def _handover_sources(identifier: Package, tracker: MpcPackage) -> dict[str, str]:
-    """Return header and source by path.
-    tracker : package of the tracker, `<name>_mpc`, for the tire of `frozen_start`.
-    """
-    specialized, model = identifier.specialized, frozen_start(identifier)
-    name = specialized.name
-    force = {"MAX_FORCE": (repr(round(specialized.limits.force, 1)), "of an axle [N]")}
-    numbers, arrays = _HANDOVERS[model.kind](model, tracker)
-    text = header(
-        f"{name}_handover_tables.h",
-        f"Numbers of the handover.\n\n{generated(identifier.about)}",
-        [
-            f'#include "{name}_mpc.h"\n',
-            defines(f"{name}_handover", {**numbers, **force}),
-            "".join(
-                f"static const {name}_mpc_real {array}[{len(values)}] = {{ "
-                f"{', '.join(f'({name}_mpc_real){float(value)!r}' for value in values)} }}; "
-                f"/* {words} */\n"
-                for array, (values, words) in arrays.items()
-            ),
-        ],
-    )
-    return {**c_files(C, _HANDOVER, {PREFIX: name}), f"src/{name}_handover_tables.h": text}
-
-
 Numbers = dict[str, tuple[object, str]]
 Arrays = dict[str, tuple[Sequence[float], str]]
 
 
 def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
-    numbers: Numbers = {
+    numbers = {
         "CURVES": (1, "identified are curves over slip; else a network"),
         "UNITS": (f"{len(model.ladder)}U", "of a curve"),
         "SWAY": (repr(GRAVITY / model.sway.frequency**2), "g over the roll's frequency^2 [m]"),
@@ -95,7 +70,7 @@ def _of_curves(model: AxleModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
 def _of_network(model: NetworkModel, tracker: MpcPackage) -> tuple[Numbers, Arrays]:
     del tracker
     assert model.network.scale is not None, "an identified network has scales"
-    numbers: Numbers = {
+    numbers = {
         "CURVES": (0, "identified is a network; else curves over slip"),
         "UNITS": (f"{model.network.hidden}U", "of the hidden layer"),
         "INPUTS": (f"{len(model.network.inputs)}U", "of the network"),
@@ -130,27 +105,45 @@ def build_pair(
     single : whether float is the default precision of the tracker.
     caution : of the tracker, from 0 to 1; a number of the parameters.
     """
-    specialized = identifier.specialized
+    specialized, model = identifier.specialized, frozen_start(identifier)
+    name = specialized.name
     tracker = build_mpc_package(
-        prediction_tire(frozen_start(identifier)),
+        prediction_tire(model),
         problem,
         period=specialized.dt,
         delay=DELAY,
-        name=f"{specialized.name}_mpc",
+        name=f"{name}_mpc",
         single=single,
         caution=caution,
     )
-    values: dict[str, str | Words] = {
-        "name": specialized.name,
-        "NAME": specialized.name.upper(),
+    values = {
+        "name": name,
+        "NAME": name.upper(),
         "version": identifier.about["version"],
         "vehicle": Words(specialized.vehicle.name),
         "identifier_hash": identifier.about["hash"],
         "mpc_hash": tracker.about["hash"],
     }
     files = {path: filled(C / path, values) for path in ("CMakeLists.txt", "README.md")}
-    files |= c_files(C, EXAMPLES, {PREFIX: specialized.name})
-    return Pair(identifier, tracker, files | _handover_sources(identifier, tracker))
+    files |= c_files(C, EXAMPLES, {PREFIX: name})
+    force = {"MAX_FORCE": (repr(round(specialized.limits.force, 1)), "of an axle [N]")}
+    numbers, arrays = _HANDOVERS[model.kind](model, tracker)
+    files |= c_files(C, _HANDOVER, {PREFIX: name})
+    files[f"src/{name}_handover_tables.h"] = header(
+        f"{name}_handover_tables.h",
+        f"Numbers of the handover.\n\n{generated(identifier.about)}",
+        [
+            f'#include "{name}_mpc.h"\n',
+            defines(f"{name}_handover", {**numbers, **force}),
+            "".join(
+                f"static const {name}_mpc_real {array}[{len(given)}] = {{ "
+                f"{', '.join(f'({name}_mpc_real){float(value)!r}' for value in given)} }}; "
+                f"/* {words} */\n"
+                for array, (given, words) in arrays.items()
+            ),
+        ],
+    )
+    return Pair(identifier, tracker, files)
 
 
 _HANDOVERS: Mapping[str, Callable[[Any, MpcPackage], tuple[Numbers, Arrays]]] = {

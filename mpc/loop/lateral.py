@@ -19,7 +19,7 @@ import numpy as np
 from codegen.arrays import Array
 from identifier.inertial.beliefs import Body
 from identifier.run import OnlineIdentifier
-from models.rules import require_positive_fields
+from models.rules import Positive
 from models.sensors import is_measured
 from mpc.loop.sensing import Measured
 
@@ -49,7 +49,7 @@ class LateralEstimate(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Localization:
+class Localization(Positive):
     """How far position, heading and acceleration are trusted.
     position : standard deviation [m].
     heading : standard deviation [rad].
@@ -71,9 +71,6 @@ class Localization:
     clip: float = 3.0
     lost: float = 5.0
     observable: float = 0.01
-
-    def __post_init__(self) -> None:
-        require_positive_fields(self)
 
 
 class LateralVelocity:

@@ -143,16 +143,11 @@ def handling_course() -> Path:
     ]
     line = line_along(sections)
     path = Path.from_line(line, name="handling course", closed=True)
-    return Path.from_line(line, name=path.name, closed=True, cones=_pairs_beside(path))
-
-
-def _pairs_beside(path: Path) -> Array:
-    """Return pairs of cones, 2.5 m beside a path and about every 8 m, X and Y [m], (k, 2)."""
-    s = np.linspace(0.0, path.length, round(path.length / 8.0), endpoint=not path.closed)
-    X, Y, psi = path.pose(s)
+    X, Y, psi = path.pose(np.linspace(0.0, path.length, round(path.length / 8.0), endpoint=False))
     across = 2.5 * np.column_stack((-np.sin(psi), np.cos(psi)))
     middle = np.column_stack((X, Y))
-    return np.vstack((middle + across, middle - across))
+    cones = np.vstack((middle + across, middle - across))  # in pairs, about every 8 m
+    return Path.from_line(line, name=path.name, closed=True, cones=cones)
 
 
 BUILT_IN: Mapping[str, Callable[[], Path]] = MappingProxyType(

@@ -90,8 +90,11 @@ def line_through_gates(
     x = np.linspace(inner[0], inner[-1], _PER_INTERVAL * (inner.size - 1) + 1)
     x = np.unique(np.concatenate((x, edges[(edges > x[0]) & (edges < x[-1])])))
     c, k = ca.MX.sym("c", n), ca.MX.sym("k")
-    basis = [_basis(t, x, order) for order in range(4)]
-    y, dy, ddy, dddy = (ca.mtimes(matrix, c) for matrix in basis)
+    basis = (BSpline(t, np.eye(n), _DEGREE)(x, nu=order) for order in range(4))
+    y, dy, ddy, dddy = (
+        ca.mtimes(ca.sparsify(ca.DM(np.where(np.abs(matrix) < 1e-12, 0.0, matrix))), c)
+        for matrix in basis
+    )
     stretch = 1.0 + dy**2  # (ds/dx)²
     kappa = ddy / stretch**1.5
     kappa_ds = (dddy * stretch - 3.0 * dy * ddy**2) / stretch**3
@@ -109,7 +112,7 @@ def line_through_gates(
     lower = np.concatenate((low, np.zeros(4), np.full(4 * x.size, -np.inf)))
     cost = k + _GENTLY * ca.sum1(np.gradient(x) * ca.sqrt(stretch) * kappa_ds**2)
     problem = {"x": ca.vertcat(c, k), "f": cost, "g": rows}
-    solver: Any = ca.nlpsol("line", "ipopt", problem, _OPTIONS)
+    solver = ca.nlpsol("line", "ipopt", problem, _OPTIONS)
     guess = np.append(np.linspace(start[1], end[1], n), 0.05)
     solution = solver(x0=guess, lbg=lower, ubg=upper)
     if not solver.stats()["success"]:
@@ -118,13 +121,6 @@ def line_through_gates(
     found = np.asarray(solution["x"]).ravel()[:n]
     spline = BSpline(t, np.column_stack((greville, found)), _DEGREE)
     return sample(spline, inner, SPACING, "gates")
-
-
-def _basis(t: Array, x: Array, order: int) -> Any:
-    """Return the sparse matrix from the coefficients to a derivative at x."""
-    n = t.size - _DEGREE - 1
-    matrix = BSpline(t, np.eye(n), _DEGREE)(x, nu=order)
-    return ca.sparsify(ca.DM(np.where(np.abs(matrix) < 1e-12, 0.0, matrix)))
 
 
 # The lane changes of ISO 3888: a double lane change (part 1) and obstacle avoidance (part 2).

@@ -90,16 +90,10 @@ def check_line(line: Line, name: str, closed: bool) -> None:
             f"{name}: X, Y, psi and kappa must be one curve over s, at s = {s[worst]:.4g} m they "
             f"disagree by {wrong[worst]:.2g} of a step"
         )
-    if closed:
-        _check_ends(line, name, h)
-
-
-def _check_ends(line: Line, name: str, h: float) -> None:
-    """Refuse a closed path that does not close."""
-    gap = math.hypot(line.X[-1] - line.X[0], line.Y[-1] - line.Y[0])
-    bend = math.remainder(line.psi[-1] - line.psi[0], 2.0 * math.pi)
-    kink = float(line.kappa[-1] - line.kappa[0])
-    if gap > 1e-3 * h or abs(bend) > 1e-3 * h or abs(kink) * h > 1e-3:
+    gap = math.hypot(X[-1] - X[0], Y[-1] - Y[0])
+    bend = math.remainder(psi[-1] - psi[0], 2.0 * math.pi)
+    kink = float(kappa[-1] - kappa[0])
+    if closed and (gap > 1e-3 * h or abs(bend) > 1e-3 * h or abs(kink) * h > 1e-3):
         raise PathError(
             f"{name}: a closed path must end as it starts, its ends differ by {gap:.3g} m, "
             f"{bend:.3g} rad and {kink:.3g} 1/m"

@@ -78,7 +78,7 @@ class SpeedProfile:
         self.path, self.planned = path, planned
         self.limited_by, self.axle = np.asarray(limited_by, str), np.asarray(axle, str)
         pace = 0.5 * (1.0 / self.v[1:] + 1.0 / self.v[:-1])
-        self._t = np.concatenate([[0.0], np.cumsum(pace * np.diff(path.s))])
+        self._t = np.append(0.0, np.cumsum(pace * np.diff(path.s)))
         self._acceleration = self.v * np.gradient(self.v, path.s)
 
     def __repr__(self) -> str:
@@ -117,7 +117,7 @@ class SpeedProfile:
             y, x = np.append(-brake, push[::-1]), np.append(turn, turn[::-1])
             reach.append(np.interp(np.arctan2(f, a_y), np.arctan2(y, x), np.hypot(y, x)))
         edge = [np.interp(v, limits.v, r) for v, r in zip(self.v, np.array(reach).T, strict=True)]
-        return np.asarray(np.hypot(f, a_y) / edge)
+        return np.hypot(f, a_y) / edge
 
     def to_csv(self, file: str | PathLike[str], *, tum: bool = False) -> None:
         """Write the speeds and what they ask of the tires, a row for each sample.
@@ -207,10 +207,10 @@ class SpeedProfile:
         if self.path.closed:
             laps = np.floor(t / self.lap_time)
             within = np.interp(t - laps * self.lap_time, self._t, self.path.s)
-            return np.asarray(laps * self.path.length + within)
+            return laps * self.path.length + within
         before, after = np.minimum(t, 0.0), np.maximum(t - self.lap_time, 0.0)
         there = np.interp(t, self._t, self.path.s)
-        return np.asarray(there + before * self.v[0] + after * self.v[-1])
+        return there + before * self.v[0] + after * self.v[-1]
 
 
 class _Lead(SpeedProfile):
@@ -238,7 +238,7 @@ class _Lead(SpeedProfile):
             planned=profile.planned,
         )
         pace = 0.5 * (1.0 / v[1:] + 1.0 / v[:-1])
-        self._lead_t = np.concatenate([[0.0], np.cumsum(pace * np.diff(s))])
+        self._lead_t = np.append(0.0, np.cumsum(pace * np.diff(s)))
         self._lead_a = v * np.gradient(v, s)
         self._after = profile.time_at(float(s[-1])) - float(self._lead_t[-1])
 
@@ -468,16 +468,14 @@ def _engine(engine: Engine) -> Callable[[float], float]:
     return lambda _: given
 
 
-def steady_speed(path: Path, *, a_y_max: float, share: float = 1.0) -> float:
-    """Return the constant speed [m/s] at which the tightest place takes share a_y_max.
+def steady_speed(path: Path, *, a_y_max: float) -> float:
+    """Return the constant speed [m/s] at which the tightest place takes a_y_max.
 
     Parameters
     ----------
-    a_y_max : lateral acceleration at the limit of grip [m/s²].
-    share : of a_y_max [-].
+    a_y_max : lateral acceleration at the limit of grip, or less [m/s²].
     """
-    named = {f"{path.name}: {name}": x for name, x in (("a_y_max", a_y_max), ("share", share))}
-    require_positive(PathError, **named)
+    require_positive(PathError, **{f"{path.name}: a_y_max": a_y_max})
     if path.peak_curvature * path.length < 1e-6:
         raise PathError(f"{path.name}: has no turn that limits the speed, choose one")
-    return math.sqrt(share * a_y_max / path.peak_curvature)
+    return math.sqrt(a_y_max / path.peak_curvature)

@@ -73,7 +73,10 @@ def line_through(
     if not minimum_radius > 0.0:
         raise PathError(f"{name}: minimum_radius must be positive, it is {minimum_radius}")
     points = _checked(X, Y, closed, name)
-    spline = _fit(points, closed)
+    t = np.append(0.0, np.cumsum(_norm(np.diff(points, axis=0))))
+    for _ in range(_FITS):  # a C2 spline over its own arc length
+        spline = CubicSpline(t, points, bc_type="periodic" if closed else "natural")
+        t = np.append(0.0, np.cumsum(_lengths(spline.derivative(), t[:-1], t[1:])))
     line = sample(spline, spline.x, spacing, name)
     # A spike between two samples shows in the heading alone.
     step = line.s[-1] / (line.s.size - 1)
@@ -121,18 +124,18 @@ def _times(velocity: Any, t: Array, length_at_t: Array, s: Array) -> Array:
         at = np.clip(at - error / _norm(velocity(at)), t[i], t[i + 1])
         if np.abs(error).max() < 1e-12 * s[-1]:
             break
-    return np.asarray(at)
+    return at
 
 
 def _lengths(velocity: Any, start: Array, end: Array) -> Array:
     """Return the arc lengths from each start to its end, by quadrature."""
     half = 0.5 * (end - start)
     nodes = start[:, None] + half[:, None] * (1.0 + _LOBES)
-    return np.asarray(half * (_norm(velocity(nodes)) @ _SHARES))
+    return half * (_norm(velocity(nodes)) @ _SHARES)
 
 
 def _norm(vectors: Array) -> Array:
-    return np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
+    return np.hypot(vectors[..., 0], vectors[..., 1])
 
 
 def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
@@ -172,15 +175,6 @@ def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
             f"{same[0] + 2} are both {points[same[0]].tolist()}"
         )
     return points
-
-
-def _fit(points: Array, closed: bool) -> Any:
-    """Interpolate by a C2 spline over its own arc length."""
-    t = np.append(0.0, np.cumsum(_norm(np.diff(points, axis=0))))
-    for _ in range(_FITS):
-        spline = CubicSpline(t, points, bc_type="periodic" if closed else "natural")
-        t = np.append(0.0, np.cumsum(_lengths(spline.derivative(), t[:-1], t[1:])))
-    return spline
 
 
 def read_waypoints(file: Path) -> _Waypoints:

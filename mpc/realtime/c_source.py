@@ -91,6 +91,10 @@ def c_sizes(structure: TireStructure, horizon: int) -> dict[str, tuple[int, str]
 
 def _equations(structure: TireStructure, name: str, sentence: str) -> str:
     real, params = f"{name}_real", f"const {name}_params *params"
+    rk4 = build_rk4(structure)  # whose step without an input is tuned as the stage is
+    ports = {port: ca.SX.sym(port, *rk4.size_in(port)) for port in rk4.name_in() if port != "u"}
+    x_next = ca.densify(rk4(*({**ports, "u": ca.SX(0)}[port] for port in rk4.name_in())))
+    free = ca.Function("predict", list(ports.values()), [x_next], list(ports), ["x_next"])
     bodies = {
         f"void {name}_linearize({params}, const {real} *q,\n    const {real} *x, {real} u, {real} "
         f"kappa, {real} v_x, {real} grip, {name}_stage *stage)": _body(
@@ -102,23 +106,13 @@ def _equations(structure: TireStructure, name: str, sentence: str) -> str:
         ),
         f"void {name}_predict({params}, const {real} *x, {real} kappa,\n    {real} v_x, {real} dt, "
         f"{real} grip, {real} *x_next)": _body(
-            _free_motion(structure), name, {**READ, "dt": "dt"}, "x_next[{1}]"
+            tuned(free, sampled=()).function, name, {**READ, "dt": "dt"}, "x_next[{1}]"
         ),
         f"void {name}_axles({params}, const {real} *x,\n    {real} v_x, {real} grip, {real} "
         "force[2], "
         f"{real} slip[2], {real} length[2])": _body(build_axles(structure), name, READ, "{}[{}]"),
     }
     return package.equations_file(name, f"The prediction and its derivatives. {sentence}", bodies)
-
-
-def _free_motion(structure: TireStructure) -> ca.Function:
-    """Return a step of the prediction without an input, tuned as the stage is."""
-    rk4 = build_rk4(structure)
-    names = [port for port in rk4.name_in() if port != "u"]
-    ports = {port: ca.SX.sym(port, *rk4.size_in(port)) for port in names}
-    x_next = rk4(*({**ports, "u": ca.SX(0)}[port] for port in rk4.name_in()))
-    function = ca.Function("predict", list(ports.values()), [ca.densify(x_next)], names, ["x_next"])
-    return tuned(function, sampled=()).function
 
 
 def _body(function: ca.Function, name: str, read: Mapping[str, str], write: str) -> Statements:

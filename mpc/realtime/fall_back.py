@@ -7,7 +7,7 @@ may be what the solver failed at, reaches it. The delay is a lag of its length.
 """
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -56,7 +56,9 @@ def fall_back(
         Q = np.diag([1.0 / e_y**2, 0.0, 0.0, 0.0, 0.0])
         R = np.array([[1.0 / _STEERING**2 + (per_steering / acceleration) ** 2]])
         rows.append([*feedback(A_d, B_d, Q, R).ravel(), turn, drift])
-    table = _FallBack(SPEEDS.copy(), np.array([[_rounded(x) for x in row] for row in rows]))
+    table = _FallBack(
+        SPEEDS.copy(), np.array([[float(f"{x:.{_DIGITS}g}") for x in row] for row in rows])
+    )
     for numbers in table:
         numbers.flags.writeable = False
     return table
@@ -108,7 +110,7 @@ def _riccati(A: Array, G: Array, Q: Array) -> Array:
     for _ in range(_DOUBLINGS):
         W = _solved(eye + G @ P, np.hstack([A, G]))
         A_1, G_1 = W[:, : len(A)], W[:, len(A) :]
-        step: Array = A.T @ P @ A_1
+        step = A.T @ P @ A_1
         A, G, P = A @ A_1, G + A @ G_1 @ A.T, P + 0.5 * (step + step.T)
         if np.abs(step).max() <= _ENOUGH * np.abs(P).max():
             break
@@ -121,7 +123,3 @@ def _sampled(A: Array, B: Array, period: float) -> tuple[Array, Array]:
     n, m = B.shape
     M = expm(period * np.vstack([np.hstack([A, B]), np.zeros((m, n + m))]))
     return M[:n, :n], M[:n, n:]
-
-
-def _rounded(x: Any) -> float:
-    return float(f"{x:.{_DIGITS}g}")

@@ -52,7 +52,7 @@ class Tracker:
         caution: float = 0.0,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        problem = Problem() if problem is None else problem
+        problem = problem or Problem()
         longest = (N_COMMANDS - 1) * period
         if not 0.0 < period <= problem.dt:
             raise ValueError(f"period must be positive and at most {problem.dt}, it is {period}")
@@ -90,8 +90,8 @@ class Tracker:
     @property
     def times(self) -> Array:
         """Times after a measurement at which to tell curvature and speed [s], (N + 1,)."""
-        middles = np.arange(self.problem.horizon, dtype=np.float64) + 0.5
-        return np.concatenate([[0.0], self._ahead + self.problem.dt * middles])
+        middles = np.arange(self.problem.horizon) + 0.5
+        return np.append(0.0, self._ahead + self.problem.dt * middles)
 
     @property
     def plan_times(self) -> Array:

@@ -32,8 +32,7 @@ def slip_grid(largest: float) -> Array:
     """Return slips from near 0 to the largest [rad], dense where the curve bends, (k,).
     largest : end of the grid [rad].
     """
-    grid: Array = largest * (np.arange(1, _SAMPLES + 1) / _SAMPLES) ** 2
-    return grid
+    return largest * (np.arange(1, _SAMPLES + 1) / _SAMPLES) ** 2
 
 
 def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
@@ -88,7 +87,7 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     """
     tire = tire_of(vehicle) if tire is None else tire
     alpha = slip_grid(_LARGEST_SLIP * min(mu, 1.0))
-    grid = np.concatenate([[0.0], alpha])
+    grid = np.append(0.0, alpha)
     force = np.stack([cornering_force(vehicle, tire, axle, grid, mu) for axle in (0, 1)])
     force = force[:, 1:] - force[:, :1]  # wheels that are not mirrored push at zero slip, too
     lengths = np.array(relaxation_lengths(vehicle, (tire, tire)))
@@ -129,8 +128,7 @@ def cornering_force(vehicle: Vehicle, tire: Tire, axle: int, alpha: Array, mu: f
         middle = 0.5 * (low + high)
         more = np.array(made(alpha[None], middle[None])).ravel() > middle
         low, high = np.where(more, middle, low), np.where(more, high, middle)
-    solution: Array = 0.5 * (low + high)
-    return solution
+    return 0.5 * (low + high)
 
 
 def _both_sides(tire: Tire, alpha: Any, camber: Any, loads: Any, mu: float) -> Any:

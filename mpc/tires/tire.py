@@ -163,7 +163,9 @@ def valid_slip(tire: PredictionTire, most: tuple[float, float]) -> ValidSlip:
     most : slip beyond which no curve is believed [rad], front and rear.
     """
     slopes = curve_slopes(tire)
-    slip = np.minimum(most, _useful(slopes))
+    flat = slopes < _FLAT * slopes[:, :1]
+    ends = np.where(flat.any(axis=1), SLIPS[flat.argmax(axis=1)], np.inf)
+    slip = np.minimum(most, np.where(slopes[:, 0] > 0.0, ends, np.inf))
     there = [np.interp(x, SLIPS, axle) for x, axle in zip(slip, slopes, strict=True)]
     return ValidSlip(slip, np.maximum(np.maximum(there, LEAST_RISE * slopes[:, 0]), 0.0))
 
@@ -215,12 +217,6 @@ def believed(
         curves += rise * (alpha - inside)
     force, lengths = ca.substitute([curves, lengths], [x], [inside])
     return grip * force, (lengths[0], lengths[1])
-
-
-def _useful(slopes: Array) -> Array:
-    flat = slopes < _FLAT * slopes[:, :1]
-    found = np.where(flat.any(axis=1), SLIPS[flat.argmax(axis=1)], np.inf)
-    return np.where(slopes[:, 0] > 0.0, found, np.inf)
 
 
 @cache

@@ -31,7 +31,7 @@ def test_a_sensor_that_fails_is_not_taken_for_ice(fault):
         path,
         DoubleTrackCar(car),
         Tracker(oracle_tire(car), delay=0.05, caution=1.0),
-        speed=steady_speed(path, a_y_max=cornering_limit(car, None, 1.0), share=0.85),
+        speed=steady_speed(path, a_y_max=0.85 * cornering_limit(car, None, 1.0)),
         sensors=FaultySensors(inertial_unit(), [broken]),
         delay=2,
         rng=np.random.default_rng(4),

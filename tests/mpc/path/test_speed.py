@@ -185,9 +185,9 @@ def test_what_is_no_profile_is_one_clear_line(given, said):
     assert "\n" not in str(caught.value)
 
 
-def test_the_steady_speed_takes_its_share_at_the_tightest_place(path):
-    v = steady_speed(path, a_y_max=9.0, share=0.97)
-    assert np.max(np.abs(path.kappa)) * v**2 == pytest.approx(0.97 * 9.0)
+def test_the_steady_speed_takes_its_acceleration_at_the_tightest_place(path):
+    v = steady_speed(path, a_y_max=8.73)
+    assert np.max(np.abs(path.kappa)) * v**2 == pytest.approx(8.73)
 
 
 def test_a_circle_is_a_turn_however_wide_it_is():
