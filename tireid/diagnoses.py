@@ -14,9 +14,19 @@ from identifier.verdict.verdict import Objection
 from models.recordings import LogMap, Recording, Repair
 from models.recordings.reader import repair_text
 from models.vehicle import Vehicle
-from tireid import report as page
 from tireid.output import text_table
-from tireid.reports.common import drawings, origin
+from tireid.report import (
+    Block,
+    Headline,
+    Report,
+    Section,
+    Table,
+    Tone,
+    drawings,
+    origin,
+    printed,
+    write_report,
+)
 
 _HEADER = ("found", "size", "confidence", "repair")
 NAMES = {  # of findings by their code, where the code is not the word
@@ -92,7 +102,7 @@ def diagnosis_text(diagnosis: Diagnosis, *, unobservable: bool = True) -> str:
     return "\n".join([f"doctor: {count} finding{'s' * (count > 1)}", table, *said])
 
 
-def _tone_of(diagnosis: Diagnosis) -> page.Tone:
+def _tone_of(diagnosis: Diagnosis) -> Tone:
     """Return what a diagnosis says of a log: good, in doubt, or bad where a finding matters."""
     if not diagnosis.healthy:
         return "bad"
@@ -100,24 +110,24 @@ def _tone_of(diagnosis: Diagnosis) -> page.Tone:
 
 
 def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
-    return [page.printed(f"the log: {one.text}") for one in diagnosis.findings]
+    return [printed(f"the log: {one.text}") for one in diagnosis.findings]
 
 
-def diagnosis_section(diagnosis: Diagnosis, heading: str = "Doctor") -> page.Section:
+def diagnosis_section(diagnosis: Diagnosis, heading: str = "Doctor") -> Section:
     rows = _finding_rows(diagnosis)
-    blocks: list[page.Block] = [
+    blocks: list[Block] = [
         (
             "Faults of the log, or of its declared car, from the log alone. ± is one "
             "standard deviation."
         )
     ]
     if rows:
-        blocks.append(page.Table("What was found.", _HEADER, rows))
-        blocks += [page.printed(one.text) for one in diagnosis.findings]
+        blocks.append(Table("What was found.", _HEADER, rows))
+        blocks += [printed(one.text) for one in diagnosis.findings]
     else:
         blocks.append("Nothing was found.")
-    blocks += [page.printed(f"Not observable: {line}") for line in diagnosis.unobservable]
-    return page.Section(heading, blocks)
+    blocks += [printed(f"Not observable: {line}") for line in diagnosis.unobservable]
+    return Section(heading, blocks)
 
 
 def doctor_text(diagnosis: Diagnosis, repair: Repair, path: Path | None) -> str:
@@ -168,7 +178,6 @@ def write_doctor_report(
     diagnosis: Diagnosis,
     after: Diagnosis | None,
     figure: bytes,
-    *,
     command: str,
 ) -> None:
     """Write the report of a diagnosis.
@@ -178,32 +187,30 @@ def write_doctor_report(
     caption = "Force over slip angle, as logged and repaired."
     sections = [
         diagnosis_section(diagnosis),
-        page.Section("Tire curves", drawings({"doctor": figure}, {"doctor": caption})),
+        Section("Tire curves", drawings({"doctor": figure}, {"doctor": caption})),
     ]
     if after is not None:
         sections.append(diagnosis_section(after, heading="After the repair"))
     count = len(diagnosis.findings)
     numbers = [
-        page.Headline(
+        Headline(
             str(count),
             f"finding{'s' * (count != 1)} in the log or the car's file",
             _tone_of(diagnosis),
         ),
-        page.Headline(
-            str(sum(one.sure for one in diagnosis.findings)), "of them sure, with a repair"
-        ),
+        Headline(str(sum(one.sure for one in diagnosis.findings)), "of them sure, with a repair"),
     ]
     if after is not None:
         left = str(len(after.findings))
-        numbers.append(page.Headline(left, "left after the repair", _tone_of(after)))
-    report = page.Report(
+        numbers.append(Headline(left, "left after the repair", _tone_of(after)))
+    report = Report(
         title=f"Diagnosis of {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {vehicle.name}.",
         numbers=numbers,
         warnings=diagnosis_warnings(diagnosis),
         sections=[*sections, origin(command, vehicle, [recording])],
     )
-    page.write_report(folder, report)
+    write_report(folder, report)
 
 
 def write_repair(path: Path, given: LogMap, diagnosis: Diagnosis) -> None:

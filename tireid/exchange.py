@@ -16,7 +16,7 @@ except ImportError:  # not on Windows
 
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # <fcntl.h> and <linux/fs.h>
 _CANNOT = {errno.ENOSYS, errno.EINVAL, errno.EOPNOTSUPP, errno.ENOTSUP}  # here, or on this disk
-_UNLOCKABLE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL}
+_UNLOCKABLE = {errno.ENOLCK, *_CANNOT}
 
 
 class ClaimedError(TireidError, OSError):

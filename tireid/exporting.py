@@ -141,9 +141,8 @@ def export(
         if mpc:
             frozen_start(package)  # likewise
         costs = measure(package, progress.begin(_COSTS))
-        place = scratch / _IDENTIFIER if mpc else scratch
         texts = {**package.files, "README.md": readme(package, figures_text(costs))}
-        _write_package(place, name, texts, costs)
+        _write_package(scratch / _IDENTIFIER if mpc else scratch, name, texts, costs)
         notes = []
         if mpc:
             progress.begin(_TRACKING)
@@ -171,9 +170,6 @@ def _write_texts(folder: Path, texts: Mapping[str, str]) -> None:
         write_file(folder / path, text)
 
 
-_TRACKER = "mpc"  # folder of the package; that of the identifier is `identifier`
-
-
 def write_tracker(folder: Path, package: Package, *, single: bool, caution: float) -> list[str]:
     """Write the tracker and what joins it with the identifier; return what to say about it.
 
@@ -187,7 +183,7 @@ def write_tracker(folder: Path, package: Package, *, single: bool, caution: floa
     costs, times = measure_mpc(tracker), time_here(tracker)
     texts = {**tracker.files, "README.md": mpc_readme(tracker, mpc_figures_text(costs, times))}
     _write_texts(folder, pair.files)
-    _write_package(folder / _TRACKER, tracker.name, texts, costs)
+    _write_package(folder / "mpc", tracker.name, texts, costs)
     return [
         *(f"{one.processor}, {one.precision}: {tracker.name} takes {one.words}" for one in costs),
         f"this machine: {tracker.name} takes {times.median:.0f} us a step, hash "

@@ -36,12 +36,14 @@ def complain(text: str) -> None:
         _write(sys.stderr, f"{text}\n")
 
 
-def tell(text: str) -> None:
+def tell(*texts: str) -> None:
     """Print results on standard output; `unwritten` remembers whether they could not be written.
+
+    texts : each from a new line on; what is empty is left out.
 
     A reader that went away, as `head` does, has seen enough: the rest is not printed.
     """
-    _write_out(f"{text}\n")
+    _write_out("\n".join(filter(None, texts)) + "\n")
 
 
 def flush_out() -> None:

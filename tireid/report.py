@@ -2,19 +2,29 @@
 
 Pictures are embedded; a figure fills the window when clicked on, by its own anchor. Styles are
 inline, without scripts or links to other files, so that it can be mailed, archived and printed.
+
+The order is always: headline numbers, what speaks against them, what was found with its figures and
+how to read each, and where it came from.
 """
 
 import math
+import platform
 import re
+import tomllib
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import Literal, NamedTuple
 
+from codegen.arrays import LONG, blocks
 from codegen.escape import html
-from models.files import write_atomically
+from identifier.frozen import vehicle_numbers
+from models.files import digest, digest_of_bytes, write_atomically
+from models.recordings import Recording
+from models.vehicle import Vehicle
+from tireid import __version__
 
 _SIGNATURES = {  # of files, by their kind
     b"\x89PNG\r\n\x1a\n": "png",
@@ -23,6 +33,8 @@ _SIGNATURES = {  # of files, by their kind
     b"<?xml": "svg+xml",
 }
 _STYLE = Path(__file__).with_suffix(".css").read_text(encoding="utf-8")
+with Path(__file__).with_name("read.toml").open("rb") as file:
+    READ: dict[str, str] = tomllib.load(file)  # how to read each figure, in one line
 
 # What something is worth. Of a headline: good (green), doubt (amber), bad (red). Of a number:
 # unknown (grey), of a refused answer refused (grey) or, where its own axle is, struck through.
@@ -289,3 +301,52 @@ def _text(cell: Cell) -> str:
     if cell is None or not math.isfinite(cell):
         return "\N{EN DASH}"
     return f"{cell:.4g}".replace("-", "\N{MINUS SIGN}")
+
+
+def drawings(figures: Images, captions: Mapping[str, str]) -> list[Picture]:
+    """Return the figures that there are of some, by their captions."""
+    return [
+        Picture(figures[name], text, READ[name])
+        for name, text in captions.items()
+        if name in figures
+    ]
+
+
+def _recording_digest(recording: Recording) -> str:
+    """Return twelve characters that stand for the signals of a recording and its true forces.
+
+    Of more than `LONG` samples bytes are counted, of fewer their decimals.
+    """
+    names = ("t", "v_x", "logged_v_y", "r", "delta_f", "delta_r", "a_y", "axle_force")
+    parts = [part for name in names if (part := getattr(recording, name)) is not None]
+    if len(recording) <= LONG:
+        return digest([part.tolist() for part in parts])
+    return digest_of_bytes(
+        signal[part].astype("<f8").tobytes() for signal in parts for part in blocks(len(signal))
+    )
+
+
+def origin(
+    command: str, vehicle: Vehicle, recordings: Iterable[Recording], **others: str
+) -> Section:
+    """Return what is needed to compute a report again."""
+    given = list(recordings)
+    rows = [
+        ["command", command],
+        ["tireid", __version__],
+        ["Python, machine", f"{platform.python_version()}, {platform.system()} on "
+         f"{platform.machine()}"],
+        ["car", f"{vehicle.name}, hash {digest(vehicle_numbers(vehicle))}"],
+        *(
+            [
+                "recording",
+                f"{one.name}: {len(one)} samples, {one.duration:.4g} s, hash "
+                f"{_recording_digest(one)}",
+            ]
+            for one in given
+        ),
+        *(["how it was read", f"{one.name}: {note}"] for one in given for note in one.notes),
+        *([name.replace("_", " "), value] for name, value in others.items()),
+    ]  # fmt: skip
+    caption = "What went in; equal hashes are equal numbers."
+    return Section("To compute it again", [Table(caption, ["what", "value"], rows, verbatim=True)])

@@ -96,7 +96,7 @@ def test_an_interruption_is_said_and_leaves_nothing(monkeypatch, capsys, tmp_pat
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("identifier.paper_study.run_study", interrupted)
+    monkeypatch.setattr("tireid.commands.paper.run_study", interrupted)
     assert typed("paper", "--out", tmp_path / "out") == 130
     assert "interrupted" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

@@ -15,7 +15,7 @@ from mpc.path import Path
 from mpc.tires import prediction_tire
 from mpc.tires.tire import curves_at
 from tests.tireid.test_drive_setup import COURSE
-from tireid.driving.known import Known
+from tireid.driving.runs import Known
 from tireid.figures import film
 from tireid.figures.drive import (
     car_shape,

@@ -15,7 +15,7 @@ from tireid.figures.forces import inputs_figure
 from tireid.figures.thinned import cloud, drawn_of_run, drawn_samples, drawn_times
 from tireid.learning import identify
 from tireid.output import write_csv, write_long_csv
-from tireid.reports.common import _recording_digest
+from tireid.report import _recording_digest
 
 N = 500_000
 
@@ -136,7 +136,7 @@ def test_curves_in_parts_are_the_bytes_of_one_table(tmp_path, rng):
 
 
 def test_the_hash_of_a_long_recording_tells_one_bit(drive, monkeypatch):
-    monkeypatch.setattr("tireid.reports.common.LONG", 100)
+    monkeypatch.setattr("tireid.report.LONG", 100)
     monkeypatch.setattr(arrays, "LONG", 100)
     r = np.array(drive.r)
     r[2999] = np.nextafter(r[2999], 1.0)

@@ -13,30 +13,27 @@ from importlib import import_module
 from importlib.abc import InspectLoader
 from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
-from types import MappingProxyType
 from typing import Any, cast
 
 from codegen.plugins import installed
 
-COMMANDS: Mapping[str, str] = MappingProxyType(
-    {
-        "demo": "demonstration on the built-in car, with a report",
-        "sample": "an example log, driven by the built-in car",
-        "init": "a commented vehicle file to fill in",
-        "channels": "channels of a log, with unit, rate and probable signal; writes a log.toml",
-        "doctor": "faults of a log or of its car's file, and a log.toml that repairs them",
-        "plan": "maneuvers ranked by what they tell of the tires",
-        "identify": "tire curves from a log, with error bars and a verdict",
-        "predict": "axle forces of another drive by stored tire curves, and their error",
-        "compare": "all methods on the same logs, side by side",
-        "check": "what is proven of an identifier: limits, margins, bounds; or its gains, designed",
-        "export": "C for a microcontroller, FMU and ONNX for simulators",
-        "emit": "a stored tire as other tools read it: .tir, g-g-v, slipx, understeer gradient",
-        "drive": "steer a car along a path at the limit of grip, on the identified tires",
-        "lap": "how fast identified tires let their car go along a path: speed, lap time, limits",
-        "paper": "Tables I and II of the paper (Hong and Choi) beside ours, over many seeds",
-    }
-)
+COMMANDS: Mapping[str, str] = {
+    "demo": "demonstration on the built-in car, with a report",
+    "sample": "an example log, driven by the built-in car",
+    "init": "a commented vehicle file to fill in",
+    "channels": "channels of a log, with unit, rate and probable signal; writes a log.toml",
+    "doctor": "faults of a log or of its car's file, and a log.toml that repairs them",
+    "plan": "maneuvers ranked by what they tell of the tires",
+    "identify": "tire curves from a log, with error bars and a verdict",
+    "predict": "axle forces of another drive by stored tire curves, and their error",
+    "compare": "all methods on the same logs, side by side",
+    "check": "what is proven of an identifier: limits, margins, bounds; or its gains, designed",
+    "export": "C for a microcontroller, FMU and ONNX for simulators",
+    "emit": "a stored tire as other tools read it: .tir, g-g-v, slipx, understeer gradient",
+    "drive": "steer a car along a path at the limit of grip, on the identified tires",
+    "lap": "how fast identified tires let their car go along a path: speed, lap time, limits",
+    "paper": "Tables I and II of the paper (Hong and Choi) beside ours, over many seeds",
+}
 
 GROUP = "tireid.commands"  # of entry points
 

@@ -56,10 +56,9 @@ def run(options: argparse.Namespace) -> int:
     wanted, runs = named or log_map.run, log.runs()
     chosen = one_run(log.path, runs if wanted else runs[:1], wanted or None)
     listed = log.listed()
-    names = [one.name for one in listed]
     headings, turned, world = choice.of_the_car(log, log.headings(), chosen)
     proposal = propose(log, headings, chosen)
-    by_map = choice.as_listed(log, log_map.signals, names)
+    by_map = choice.as_listed(log, log_map.signals, [one.name for one in listed])
     sure = {**choice.standard_signals(log, [one.name for one in headings]), **turned, **by_map}
     signals = choice.likely_signals(sure, proposal)
     signals = choice.with_wheels(signals, proposal)
@@ -72,12 +71,10 @@ def run(options: argparse.Namespace) -> int:
     ):
         del signals["delta_f"]  # declared without the ratio that it wants
     missing = choice.missing_signals(signals)
-    tell("\n".join(_head(log, chosen)))
+    tell(*_head(log, chosen))
     coded = {name: without_codes(one) for name, one in _seen(log, listed, signals, chosen).items()}
     seen = {name: one for name, (one, _) in coded.items()}
-    tell(_channels_text(listed, seen, signals, proposal, frozenset(sure)))
-    if world:
-        tell(world)
+    tell(_channels_text(listed, seen, signals, proposal, frozenset(sure)), world)
     for name, (_, codes) in coded.items():
         if codes:
             tell(f"{visible(name)} is {codes} where it has no value: left out")
@@ -180,8 +177,9 @@ def _meaning(listed: Listed, signals: _Signals, proposal: Proposal, known: froze
     for name, signal in signals.items():
         if channel in signal.channel:
             guess = proposal.guesses.get(name)
-            guessed = name not in known and guess is not None and guess.confidence < 1.0
-            remark = f" ({guess.confidence:.0%})" if guessed and guess is not None else ""
+            remark = ""
+            if guess is not None and name not in known and guess.confidence < 1.0:
+                remark = f" ({guess.confidence:.0%})"
             remark += ", its sign turned" if signal.factor < 0.0 and name not in known else ""
             remark += f", its sign in {visible(signal.sign)}" if signal.sign else ""
             among = f", with {len(signal.channel) - 1} more" if len(signal.channel) > 1 else ""
@@ -215,12 +213,9 @@ def _holes_text(seen: Mapping[str, Channel], signals: _Signals) -> str:
 def _missing_text(log: str, missing: Sequence[str], proposal: Proposal, signals: _Signals) -> str:
     if not missing:
         there = given_by(signals)
-        needed = [name for name in NEEDED if name in there]
-        if "v_y" not in there:
-            needed.append("a_y")
+        needed = [name for name in NEEDED if name in there] + ["a_y"] * ("v_y" not in there)
         return f"all that is needed is there: {', '.join(map(column_of, needed))}"
-    lines = []
-    words = []
+    lines, words = list[str](), list[str]()
     for name in missing:
         likely = choice.stand_ins(name, proposal)
         texts = " or ".join(choice.likely_text(one, proposal) for one in likely)

@@ -2,7 +2,6 @@
 
 import argparse
 import json
-import math
 from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from identifier.run import History, identify
 from identifier.stability.certificate import judged_loop
 from identifier.stability.loop import direction_matrix
 from identifier.stability.operation import Operation, proven_bounds
+from models.rules import require_not_negative, require_positive
 from models.vehicle import Vehicle
 from tireid.commands import DONE, FAILS
 from tireid.commands import options as shared
@@ -83,11 +83,10 @@ def declare(new: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command; return 0, or 1 where the design fails."""
-    _require_sense(options)
+    given = _overrides(options)
     vehicle = shared.read_vehicle(options)
     name, method = shared.chosen_method(options, vehicle, online=True)
     paper = method if isinstance(method, PaperIdentifier) else None
-    given = _overrides(options)
     for field in given if paper is None else ():
         if field not in _OF_ALL:
             raise ValueError(
@@ -102,9 +101,8 @@ def run(options: argparse.Namespace) -> int:
     if paper is None:
         text = method_text(name, certificate, vehicle, driving)
     else:
-        said = _said(options, paper, driving)
         text = (
-            f"{_conditions(paper, vehicle, driving, said)}\n"
+            f"{_conditions(paper, vehicle, driving, _said(options, paper, driving))}\n"
             f"{certificate_text(certificate, paper.force_unit)}"
         )
     conditions = asdict(driving)
@@ -135,18 +133,14 @@ def _option(field: str) -> str:
 
 def _overrides(options: argparse.Namespace) -> dict[str, float]:
     """Return the given conditions by their field."""
-    given = {f: getattr(options, _option(f)[2:].replace("-", "_")) for f in _CONDITIONS}
-    return {field: value for field, value in given.items() if value is not None}
-
-
-def _require_sense(options: argparse.Namespace) -> None:
-    for field, value in _overrides(options).items():
-        noise = field.startswith("noise")
-        if not (0.0 < value < math.inf or (noise and value == 0.0)):
-            rule = "not be negative" if noise else "be positive"
-            raise ValueError(f"{_option(field)} must {rule}, it is {value:g}")
-    if options.slip is not None and options.slip > 1.0:
+    every = {f: getattr(options, _option(f)[2:].replace("-", "_")) for f in _CONDITIONS}
+    given = {field: value for field, value in every.items() if value is not None}
+    for field, value in given.items():
+        require = require_not_negative if field.startswith("noise") else require_positive
+        require(ValueError, **{_option(field): value})
+    if given.get("slip", 0.0) > 1.0:
         raise ValueError(f"--slip must be in rad and below 1, it is {options.slip:g}")
+    return given
 
 
 def _said(options: argparse.Namespace, design: PaperIdentifier, driving: Driving) -> str:

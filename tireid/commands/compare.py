@@ -96,6 +96,6 @@ def run(options: argparse.Namespace) -> int:
         if len(comparison.names) ** 2 <= _FEW_PAIRS:
             tables.append(results.pair_tables(comparison))
     tables += [verdicts_text(verdicts, "default identified on")] if verdicts else []
-    tell("\n".join(tables))
+    tell(*tables)
     say(f"wrote {options.out}/ in {work.seconds:.0f} s")
     return max((shared.exit_code(verdict, options) for verdict in verdicts.values()), default=DONE)

@@ -31,8 +31,17 @@ from tireid.figures.side_slip import side_slip_figure
 from tireid.figures.style import save_figures
 from tireid.output import text_table, write_json
 from tireid.progress import say
-from tireid.report import Block, Headline, Images, Report, Section, Table, write_report
-from tireid.reports.common import drawings, origin
+from tireid.report import (
+    Block,
+    Headline,
+    Images,
+    Report,
+    Section,
+    Table,
+    drawings,
+    origin,
+    write_report,
+)
 from tireid.verdicts import Verdicts, verdicts_headline, verdicts_warnings
 
 
@@ -45,10 +54,11 @@ def summary_rows(comparison: Comparison) -> list[list[str]]:
         if name in comparison.step_times:
             time = f"{1e9 * comparison.step_times[name]:.0f} ns x{comparison.time_ratio(name):.2f}"
         pairs = same_and_other(trial.frozen or {})
-        means = [_mean(comparison, some) for some in ([*trial.online.items()], *pairs)]
+        cells = [_mean(comparison, some) for some in ([*trial.online.items()], *pairs)]
         if trial.diverged_at:
-            means = ["diverged"] * 3
-        cells = means if trial.frozen is not None else [means[0], "a signal, no model", ""]
+            cells = ["diverged"] * 3
+        if trial.frozen is None:
+            cells[1:] = "a signal, no model", ""
         errors = [one.rms for one in trial.side_slip.values() if one.rms is not None]
         shares = [one.within for one in trial.side_slip.values() if one.within is not None]
         cells.append(f"{np.mean(errors):.3f}" if errors else "-")
@@ -126,9 +136,8 @@ def write_comparison(folder: Path, comparison: Comparison, verdicts: Verdicts) -
 
     verdicts : on what the default learns, by recording.
     """
-    numbers = _comparison_numbers(comparison)
-    judged = {name: verdict.to_dict() for name, verdict in verdicts.items()}
-    write_json(folder / "compare.json", numbers | {"verdict": judged})
+    judged = {"verdict": {name: verdict.to_dict() for name, verdict in verdicts.items()}}
+    write_json(folder / "compare.json", _comparison_numbers(comparison) | judged)
     write_file(folder / "tables.txt", summary_table(comparison) + pair_tables(comparison))
     path = folder / "compare.csv"
     with naming(path), path.open("w", newline="", encoding="utf-8") as file:
@@ -180,9 +189,9 @@ def _comparison_numbers(comparison: Comparison) -> dict[str, Any]:
 
 
 _ERROR_COLUMNS = (
-    *("method", "kind", "identified_on", "replayed_on", "front_N", "rear_N"),
-    *("front_percent", "rear_percent", "both_percent"),
-)
+    "method", "kind", "identified_on", "replayed_on", "front_N", "rear_N",
+    "front_percent", "rear_percent", "both_percent",
+)  # fmt: skip
 
 
 def _error_rows(comparison: Comparison) -> Iterator[tuple[str | float, ...]]:
@@ -222,14 +231,16 @@ def write_compare_report(
         ),
         *drawings(figures, captions),
     ]
-    learnt = "recordings with a valid model of the default"
-    of_each = verdicts_warnings(verdicts, "The default identified on {}: ")
+    meaning = "recordings with a valid model of the default"
     report = Report(
         title=f"Methods compared on {course.vehicle.name}",
         summary="Each method is identified on each recording, frozen at its end and replayed on "
         "all.",
-        numbers=[*verdicts_headline(verdicts, learnt, "good"), *_compare_headlines(comparison)],
-        warnings=[*_compare_warnings(comparison), *of_each],
+        numbers=[*verdicts_headline(verdicts, meaning, "good"), *_compare_headlines(comparison)],
+        warnings=[
+            *_compare_warnings(comparison),
+            *verdicts_warnings(verdicts, "The default identified on {}: "),
+        ],
         sections=[
             Section("Errors of the methods", blocks),
             origin(command, course.vehicle, course.recordings, seed=str(comparison.seed)),

@@ -16,7 +16,6 @@ from identifier.tire_model import TireModel
 from identifier.verdict import Verdict
 from models.vehicle import GRAVITY
 from mpc.path import BUILT_IN
-from tireid import report as page
 from tireid.commands import certificate_table
 from tireid.commands import options as shared
 from tireid.commands.check import draw_check
@@ -36,7 +35,20 @@ from tireid.exporting import Exported, export, self_test
 from tireid.figures.film import FORMATS
 from tireid.figures.paper import SCHEME
 from tireid.progress import Progress, tell
-from tireid.reports.common import READ, drawings, origin
+from tireid.report import (
+    READ,
+    Block,
+    Headline,
+    Images,
+    Picture,
+    Report,
+    Section,
+    Table,
+    drawings,
+    origin,
+    printed,
+    write_report,
+)
 from tireid.reports.identify import (
     curve_drawing,
     identify_headlines,
@@ -76,7 +88,7 @@ class Driven(NamedTuple):
     """Drives along one path, and their figures."""
 
     drives: Drives
-    figures: page.Images
+    figures: Images
 
 
 _Cases = Mapping[str, Driven]
@@ -89,7 +101,7 @@ def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
     found: dict[str, Driven] = {}
     for name, (path, a_y, drops, labels, _) in _CASES.items() if find_compiler() else ():
         wish = SpeedWish(a_y=a_y * GRAVITY)
-        setup = Setup(path=BUILT_IN[path](), vehicle=story.car, mu=1.0, drops=drops, wish=wish)
+        setup = Setup(BUILT_IN[path](), story.car, 1.0, drops, wish)
         conditions = Conditions(setup=setup, delay=2, noise=True, seed=0, laps=1.0)
         source = "frozen ones identified on the slalom"
         drives = Drives.driven(conditions, labels, story.axle.model, source)
@@ -103,12 +115,12 @@ def drive_text(driven: _Cases) -> str:
     return "\n\n".join(["Driving on the identified tires:", *blocks]) if blocks else NOT_DRIVEN
 
 
-def drive_section(driven: _Cases, folder: Path) -> page.Section:
+def drive_section(driven: _Cases, folder: Path) -> Section:
     heading = "The car drives on the identified tires"
     if not driven:
-        return page.Section(heading, [NOT_DRIVEN])
+        return Section(heading, [NOT_DRIVEN])
     slippery = driven[_SLIPPERY]
-    blocks: list[page.Block] = [
+    blocks: list[Block] = [
         (
             "A model predictive tracker steers the car around the cones. It plans 2 s ahead, "
             "100 times a second, with noisy sensors and 20 ms of delay. In the middle of the "
@@ -117,7 +129,7 @@ def drive_section(driven: _Cases, folder: Path) -> page.Section:
             "recent innovations require it and the new one explains the last seconds better. The "
             "others keep the tires that were frozen before, or the linear ones."
         ),
-        page.Picture(
+        Picture(
             folder / _SLIPPERY / f"drive.{_FILM}",
             "The drive of the learning car; outlines are the others.",
             READ["film"],
@@ -131,23 +143,23 @@ def drive_section(driven: _Cases, folder: Path) -> page.Section:
         ),
         *_scores(driven[LANE_CHANGE], "Deviation and the rest along the lane change."),
     ]
-    return page.Section(heading, blocks)
+    return Section(heading, blocks)
 
 
-def _scores(one: Driven, caption: str) -> list[page.Block]:
+def _scores(one: Driven, caption: str) -> list[Block]:
     return [
-        page.Table(f"{headline(one.drives.conditions)}.", SCORES, score_rows(one.drives.runs)),
+        Table(f"{headline(one.drives.conditions)}.", SCORES, score_rows(one.drives.runs)),
         *drawings(one.figures, {"errors": caption}),
     ]
 
 
-def drive_numbers(driven: _Cases) -> list[page.Headline]:
+def drive_numbers(driven: _Cases) -> list[Headline]:
     numbers = []
     for name, one in driven.items():
         first, second = one.drives.runs[:2]
         off = f"{first.scores.rms_e_y_m:.3f} / {second.scores.rms_e_y_m:.3f} m"
         meaning = f"rms off the path {_CASES[name][-1]}, {first.label} / {second.label} tires"
-        numbers.append(page.Headline(off, meaning))
+        numbers.append(Headline(off, meaning))
     return numbers
 
 
@@ -191,7 +203,7 @@ def shipped_text(shipped: Shipped) -> str:
     return "\n".join(lines)
 
 
-def package_section(shipped: Shipped) -> page.Section:
+def package_section(shipped: Shipped) -> Section:
     name = shipped.exported.package.specialized.name
     intro = (
         "The axle identifier, beginning with the weights of this drive, is written as a C99 "
@@ -200,7 +212,7 @@ def package_section(shipped: Shipped) -> page.Section:
         "writes; here it is compiled, tested and run over the slalom, beside Python."
     )
     lines = (intro, *shipped_text(shipped).splitlines())
-    return page.Section("The identifier as C for a controller", lines)
+    return Section("The identifier as C for a controller", lines)
 
 
 _REFERENCE = (
@@ -214,15 +226,17 @@ def _demo_report(
     shipped: Shipped,
     study: Study,
     driven: _Cases,
-    figures: Mapping[str, page.Images],
+    figures: Mapping[str, Images],
     folder: Path,
     command: str,
-) -> page.Report:
+) -> Report:
     """Return the report: the product first, the paper's study folded."""
     model, runs, verdict = story.axle.model, story.axle.runs, story.axle.verdict
-    return page.Report(
-        title=_TITLE,
-        summary=_SUMMARY,
+    return Report(
+        title="tireid: lateral tire forces, identified while driving",
+        summary="tireid identifies the tire forces of a driven car from speed, lateral velocity, "
+        "yaw rate and steering. The frozen model then predicts validation drives and steers the "
+        "car.",
         numbers=[
             verdict_headline(verdict),
             *model_error_headline(verdict),
@@ -243,8 +257,8 @@ def _demo_report(
     )
 
 
-def _learn(figures: page.Images, model: TireModel, verdict: Verdict) -> page.Section:
-    return page.Section(
+def _learn(figures: Images, model: TireModel, verdict: Verdict) -> Section:
+    return Section(
         "Identified tires",
         [
             (
@@ -275,15 +289,15 @@ def _learn(figures: page.Images, model: TireModel, verdict: Verdict) -> page.Sec
     )
 
 
-def _predict(story: Story, figures: page.Images) -> page.Section:
+def _predict(story: Story, figures: Images) -> Section:
     columns = ["frozen", "of rms"]
-    blocks: list[page.Block] = [
+    blocks: list[Block] = [
         (
             "The same frozen weights predict two other maneuvers, not used for "
             "identification: beside them the paper's network and law, identified on the same "
             "slalom with gains from the phase margin of their loop."
         ),
-        page.Table(
+        Table(
             "RMSE of the axle force, both axles together [kN], and the frozen error as a "
             "share of the rms force.",
             ["drive", "axle, online", *columns, "paper, online", *columns],
@@ -292,11 +306,11 @@ def _predict(story: Story, figures: page.Images) -> page.Section:
     ]
     for name in list(STORY)[1:]:
         caption = f"The axle identifier, frozen after the slalom, on the {name.replace('_', ' ')}."
-        blocks.append(page.Picture(figures[f"replay_{name}"], caption, READ["replay"]))
-    return page.Section("Prediction of validation drives", blocks)
+        blocks.append(Picture(figures[f"replay_{name}"], caption, READ["replay"]))
+    return Section("Prediction of validation drives", blocks)
 
 
-def _paper_study(story: Story, study: Study, figures: page.Images) -> page.Section:
+def _paper_study(story: Story, study: Study, figures: Images) -> Section:
     seeds = len(study.errors["slalom"]["integral"])
     certified = certificate_table.verdict_line(story.certificate)
     captions = {
@@ -304,13 +318,13 @@ def _paper_study(story: Story, study: Study, figures: page.Images) -> page.Secti
         f"quartiles of {seeds} seeds.",
         "step_steer": "Table I of the paper beside ours, RMSE of the axle force [kN].",
     }
-    blocks: list[page.Block] = [
+    blocks: list[Block] = [
         (
             "The paper's network, its gains from the phase margin of their loop, beside the "
             "axle identifier above: figures, certificate and bounds are in the folder "
-            f"paper_network. {page.printed(certified).capitalize()}."
+            f"paper_network. {printed(certified).capitalize()}."
         ),
-        page.Picture(
+        Picture(
             SCHEME.with_suffix(".svg"),
             "The identifier, as Fig. 1 of the paper; orange is what the laws differ in, "
             "and where a freeze cuts.",
@@ -318,24 +332,19 @@ def _paper_study(story: Story, study: Study, figures: page.Images) -> page.Secti
         (
             f"{_REFERENCE} freezes the weights at an instant and replays the past with "
             "them: a law that follows the instant forgets earlier driving. "
-            f"{page.printed(MEASURES_MEAN)}"
+            f"{printed(MEASURES_MEAN)}"
         ),
     ]
     for maneuver, caption in captions.items():
         blocks.append(study_table(maneuver, study, caption))
         if f"{maneuver}_errors" in figures:  # a law that diverged on every seed has none
             what = "The table as a picture; hollow marks are the paper's values."
-            blocks.append(page.Picture(figures[f"{maneuver}_errors"], what))
+            blocks.append(Picture(figures[f"{maneuver}_errors"], what))
     said = (MEANING, settings(GAINS, NETWORK).splitlines()[0])
-    blocks += [page.printed(one) for one in said]
-    return page.Section("The paper's study", blocks, folded=True)
+    blocks += [printed(one) for one in said]
+    return Section("The paper's study", blocks, folded=True)
 
 
-_TITLE = "tireid: lateral tire forces, identified while driving"
-_SUMMARY = (
-    "tireid identifies the tire forces of a driven car from speed, lateral velocity, yaw rate "
-    "and steering. The frozen model then predicts validation drives and steers the car."
-)
 SEEDS = 20
 _LEARNING, _EXPORTING = "driving the sedan, learning, predicting", "as C, compiled and tested"
 _TESTING, _DRIVING = "the frozen-weight test of the paper", "driving on the identified tires"
@@ -363,24 +372,23 @@ def run(options: argparse.Namespace) -> None:
     with shared.folder_of(options) as folder:
         work = Progress("demo", _PARTS, long=True)
         story = run_story(partial(work.begin(_LEARNING).step, 2 * len(STORY)))
-        folders = {name: folder / name for name in ("identify", "paper_network", "paper")}
-        for one in folders.values():
-            one.mkdir()
-        figures: dict[str, page.Images] = {
-            "identify": story.axle.write(folders["identify"]),
-            "paper_network": story.paper.write(folders["paper_network"]),
+        for name in ("identify", "paper_network", "paper"):
+            (folder / name).mkdir()
+        figures: dict[str, Images] = {
+            "identify": story.axle.write(folder / "identify"),
+            "paper_network": story.paper.write(folder / "paper_network"),
         }
         operation = story.design.operation(story.car)
-        draw_check(folders["paper_network"], story.paper.runs[0], operation, story.certificate)
+        draw_check(folder / "paper_network", story.paper.runs[0], operation, story.certificate)
         work.begin(_EXPORTING)
         shipped = ship(story, folder / FOLDER)
         study = run_study(SEEDS, partial(work.begin(_TESTING).step, STEPS))
-        figures["paper"] = write_study(folders["paper"], study)
+        figures["paper"] = write_study(folder / "paper", study)
         work.begin(_DRIVING)
         driven = drive_story(story, folder)
         work.begin(_REPORTING)
         report = _demo_report(story, shipped, study, driven, figures, folder, options.words)
-        page.write_report(folder, report)
+        write_report(folder, report)
         columns = [
             *(table_text(maneuver, study) for maneuver in study.errors),
             f"{certificate_table.certificate_text(story.certificate, story.design.force_unit)}\n",
@@ -388,5 +396,5 @@ def run(options: argparse.Namespace) -> None:
             f"{shipped_text(shipped)}\n",
             drive_text(driven),
         ]
-    tell("\n".join(columns))
+    tell(*columns)
     tell(f"read {options.out / 'report.html'}  ({work.seconds:.0f} s)")

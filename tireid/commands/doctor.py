@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
             found = {**diagnosis.to_dict(), "applied": repair.tables(), "after": left}
             write_json(folder / "summary.json", {**found, "version": __version__})
             write_doctor_report(
-                folder, recording, vehicle, diagnosis, after, images["slip"], command=options.words
+                folder, recording, vehicle, diagnosis, after, images["slip"], options.words
             )
     tell(diagnosis_text(diagnosis))
     if options.repair is not None:
@@ -65,5 +65,4 @@ def run(options: argparse.Namespace) -> int:
         say(f"wrote {options.repair}; read the log with --log {options.repair}")
     if options.out is not None:
         say(f"wrote {options.out}/")
-    healthy = (after or diagnosis).healthy
-    return DONE if healthy or options.accept else NOT_VALID
+    return DONE if (after or diagnosis).healthy or options.accept else NOT_VALID

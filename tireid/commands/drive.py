@@ -261,7 +261,7 @@ def conditions_of(options: argparse.Namespace) -> driving.Conditions:
         if not path.closed and s >= path.length:
             raise ValueError(f"--mu-drop {s:g} is beyond the path, which is {path.length:.0f} m")
     return driving.Conditions(
-        setup=Setup(path=path, vehicle=vehicle, mu=options.mu, drops=drops, wish=wish),
+        setup=Setup(path, vehicle, options.mu, drops, wish),
         delay=driving.delay_periods(1e-3 * options.delay, "--delay"),
         noise=options.noise,
         seed=shared.seed_of(options),

@@ -217,8 +217,8 @@ def _merge(options: argparse.Namespace) -> int:
 
 def _watch(options: argparse.Namespace) -> int:
     """Say whose tires changed; return 1 where the last day of a car is an alarm."""
-    limits = {"baseline": options.baseline, "alarm": options.alarm}
-    days, short = watch(_used(options)(), _by(options), **limits)
+    rows, by = _used(options)(), _by(options)
+    days, short = watch(rows, by, baseline=options.baseline, alarm=options.alarm)
     with folder_of(options) as folder:
         write_json(folder / "days.json", [day._asdict() for day in days])
     last = {day.car: day for day in days}
@@ -226,6 +226,6 @@ def _watch(options: argparse.Namespace) -> int:
     lines.append(f"{len(last)} cars, {len(days)} days")
     if short:
         lines[-1] += f"; {len(short)} cars have no day after their reference yet"
-    tell("\n".join(lines))
+    tell(*lines)
     say(f"wrote {options.out}/")
     return FAILS if any(day.alarm for day in last.values()) else DONE

@@ -72,11 +72,12 @@ def run(options: argparse.Namespace) -> int:
         require_free(options.repair, force=options.force)
     logs = [_read(log, vehicle, design, options) for log in options.logs]
     others = [_read(log, vehicle, design, options) for log in options.replay]
-    _require_distinct([*logs, *others])
+    every = [*logs, *others]
+    _require_distinct(every)
     recording = joined(logs)
-    for one in (*logs, *others):
+    for one in every:
         check_recording(one, design)
-    if any(one.v_y is None for one in (*logs, *others)):
+    if any(one.v_y is None for one in every):
         say(f"a log has no lateral velocity: {law} learns, and estimates it")
     say("the doctor looks at the log")
     diagnosis = diagnose(recording, vehicle)
@@ -120,7 +121,7 @@ def run(options: argparse.Namespace) -> int:
         figures = found.write(folder, progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
         write_identify_report(folder, found, figures, diagnosis, options.words)
-        given = (
+        said = (
             found.table(),
             _closing_line(learnt, last, vehicle),
             doctor_text(diagnosis, repair, options.repair),
@@ -131,7 +132,7 @@ def run(options: argparse.Namespace) -> int:
     if repair:
         write_repair(options.repair, shared.given_map(options), diagnosis)
         say(f"wrote {options.repair}")
-    tell("\n".join(part for part in given if part))
+    tell(*said)
     say(f"wrote {options.out}/")
     return max(shared.exit_code(one, options) for one in (verdict, *replayed.values()))
 

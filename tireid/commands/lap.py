@@ -38,8 +38,7 @@ from tireid.figures.lap import lap_figure, lap_gg_figure
 from tireid.figures.style import save_figures
 from tireid.output import write_json
 from tireid.progress import say, tell
-from tireid.report import Headline, Report, Section, Table, write_report
-from tireid.reports.common import drawings, origin
+from tireid.report import Headline, Report, Section, Table, drawings, origin, write_report
 
 _NOT_COMPLETED = 1
 _BRAKING = INDEX["braking_f"]
@@ -233,9 +232,7 @@ def _write(
         "m/s²; {:.2f} of the limits"
     ).format(path.name, *facts.values())
     times = [(why, f"{100.0 * one:.0f} %") for why, one in limited.most_common()]
-    tell(f"{head}\nlimited by {'; '.join(map(': '.join, times))}")
-    for note in notes:
-        tell(f"note: {note}")
+    tell(head, f"limited by {'; '.join(map(': '.join, times))}", *(f"note: {n}" for n in notes))
     captions = {
         "lap": "Speed and accelerations along the path, and which axle limits them.",
         "lap_gg": "What the lap asks of the tires; limits at its least and its top speed.",

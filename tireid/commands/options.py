@@ -5,7 +5,7 @@ what learns, `--weights` what was learnt before, `--out` the folder that is writ
 what is there is replaced, `--seed` chance, `--jobs` processes.
 """
 
-import argparse
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import replace
@@ -53,14 +53,14 @@ def add_options(parser: Any, kind: type, table: Mapping[str, Any]) -> None:
 
 
 def add_vehicle(
-    parser: argparse.ArgumentParser, *, required: bool = False, default: str = "the sedan"
+    parser: ArgumentParser, *, required: bool = False, default: str = "the sedan"
 ) -> None:
     text = f"car as TOML, tireid init writes one ({'needed' if required else default})"
     parser.add_argument("--vehicle", required=required, type=Path, metavar="FILE", help=text)
 
 
 def read_vehicle(
-    options: argparse.Namespace, model: TireModel | None = None, source: Path | None = None
+    options: Namespace, model: TireModel | None = None, source: Path | None = None
 ) -> Vehicle:
     """Return the car of --vehicle, without it that of a model or the sedan, as --log repairs it.
 
@@ -87,7 +87,7 @@ def read_vehicle(
     return replace(vehicle, **numbers)
 
 
-def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
+def add_output(parser: ArgumentParser, command: str | None) -> None:
     """Add --out and --force: the folder of results.
 
     command : its name, which the folder bears by default; None writes a folder only where asked.
@@ -98,16 +98,16 @@ def add_output(parser: argparse.ArgumentParser, command: str | None) -> None:
     add_force(parser)
 
 
-def folder_of(options: argparse.Namespace) -> AbstractContextManager[Path]:
+def folder_of(options: Namespace) -> AbstractContextManager[Path]:
     """Return the folder of --out, as `output_folder` makes it."""
     return output_folder(options.out, force=options.force)
 
 
-def add_force(parser: argparse.ArgumentParser) -> None:
+def add_force(parser: ArgumentParser) -> None:
     add_options(parser, bool, {"--force": "replace what is there"})
 
 
-def add_accept(parser: argparse.ArgumentParser) -> None:
+def add_accept(parser: ArgumentParser) -> None:
     text = f"exit with 0 where the verdict is not valid, in place of {NOT_VALID}"
     add_options(parser, bool, {"--accept": text})
 
@@ -122,7 +122,7 @@ def stored_model(path: Path | None) -> TireModel | None:
     return model
 
 
-def add_day(parser: argparse.ArgumentParser) -> None:
+def add_day(parser: ArgumentParser) -> None:
     text = (
         "log with the sensors as they are today, whose zeros are found from it (those of the log "
         "that identified the tires)"
@@ -130,7 +130,7 @@ def add_day(parser: argparse.ArgumentParser) -> None:
     add_options(parser, str, {"--day LOG[:RUN]": text})
 
 
-def model_of_day(options: argparse.Namespace) -> TireModel | None:
+def model_of_day(options: Namespace) -> TireModel | None:
     """Return the model of --weights with the sensors of --day, None where no model is given."""
     model = stored_model(options.weights)
     if options.day is None:
@@ -154,20 +154,20 @@ def require_toml(path: Path) -> None:
         raise ValueError(f"{path}: the name must end in .toml")
 
 
-def exit_code(verdict: Verdict, options: argparse.Namespace) -> int:
+def exit_code(verdict: Verdict, options: Namespace) -> int:
     return NOT_VALID if verdict.judged and not (verdict.valid or options.accept) else DONE
 
 
-def add_weights(parser: argparse.ArgumentParser, what: str) -> None:
+def add_weights(parser: ArgumentParser, what: str) -> None:
     add_options(parser, Path, {"--weights FILE": f"stored model: {what}"})
 
 
-def add_seed(parser: argparse.ArgumentParser, what: str) -> None:
+def add_seed(parser: ArgumentParser, what: str) -> None:
     """Add --seed; None where it is not given."""
     add_options(parser, int, {"--seed N": f"of {what} (0)"})
 
 
-def seed_of(options: argparse.Namespace) -> int:
+def seed_of(options: Namespace) -> int:
     """Return --seed, 0 where it is not given."""
     seed = int(options.seed or 0)
     if seed < 0:
@@ -180,17 +180,17 @@ def method_name(text: str) -> str:
 
     Raises
     ------
-    argparse.ArgumentTypeError
+    ArgumentTypeError
         Where there is none of that name.
     """
     try:
         require_method(text)
     except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from error
+        raise ArgumentTypeError(str(error)) from error
     return text
 
 
-def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
+def add_method(parser: ArgumentParser, usual: str = DEFAULT) -> None:
     """Add --method, --paper and --design, of which one is given or none.
 
     usual : the default.
@@ -201,7 +201,7 @@ def add_method(parser: argparse.ArgumentParser, usual: str = DEFAULT) -> None:
     add_options(parser, Path, {"--design FILE": "design.toml, in place of --method"})
 
 
-def require_one(options: argparse.Namespace, *words: str) -> bool:
+def require_one(options: Namespace, *words: str) -> bool:
     """Refuse more than one of some options; return whether there is one."""
     given = [word for word in words if getattr(options, word)]
     if len(given) > 1:
@@ -209,13 +209,13 @@ def require_one(options: argparse.Namespace, *words: str) -> bool:
     return bool(given)
 
 
-def method_is_given(options: argparse.Namespace) -> bool:
+def method_is_given(options: Namespace) -> bool:
     """Return whether a command is given what learns."""
     return require_one(options, "method", "paper", "design")
 
 
 def chosen_method(
-    options: argparse.Namespace,
+    options: Namespace,
     vehicle: Vehicle,
     seed: int | None = None,
     *,
@@ -238,13 +238,13 @@ def chosen_method(
     return name, make_method(name, vehicle, seed or 0)
 
 
-def add_log_reading(parser: argparse.ArgumentParser) -> None:
+def add_log_reading(parser: ArgumentParser) -> None:
     """Add --log, --columns and --no-check."""
     add_log_map(parser)
     add_options(parser, bool, {"--no-check": "accept a log that contradicts physics"})
 
 
-def add_log_map(parser: argparse.ArgumentParser) -> None:
+def add_log_map(parser: ArgumentParser) -> None:
     """Add --log, --columns, --dbc, --rate, --cut-holes and --mend-clock: how a log is read."""
     parser.add_argument(
         "--log",
@@ -274,7 +274,7 @@ def add_log_map(parser: argparse.ArgumentParser) -> None:
     add_options(parser, bool, flags)
 
 
-def _map_path(options: argparse.Namespace) -> Path | None:
+def _map_path(options: Namespace) -> Path | None:
     """Return the file of --log, which a log itself is not."""
     path: Path | None = getattr(options, "log_map", None)
     if path is not None and path.suffix.lower() != ".toml":
@@ -284,7 +284,7 @@ def _map_path(options: argparse.Namespace) -> Path | None:
     return path
 
 
-def given_map(options: argparse.Namespace) -> LogMap:
+def given_map(options: Namespace) -> LogMap:
     """Return how logs are read by --log, and by the other options, which come first."""
     columns: dict[str, str] = {}
     for pair in options.columns:
@@ -307,7 +307,7 @@ def given_map(options: argparse.Namespace) -> LogMap:
 def read_log(
     log: str,
     vehicle: Vehicle,
-    options: argparse.Namespace,
+    options: Namespace,
     *,
     check: bool = True,
     dt: float = 0.01,

@@ -8,11 +8,27 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from codegen.writing import write_file
-from identifier import paper_study
 from identifier.methods import certify
 from identifier.paper.design import VARIANTS
 from identifier.paper.laws import Gains
 from identifier.paper.network import Network
+from identifier.paper_study import (
+    AFTER,
+    ALL,
+    FREEZES,
+    GAINS,
+    LAWS,
+    NETWORK,
+    ONLINE,
+    ONSETS,
+    PAST,
+    PAST_ONLINE,
+    STEPS,
+    Study,
+    frozen_column,
+    paper_design,
+    run_study,
+)
 from identifier.reproducibility import freeze_key
 from models.schema import require_few
 from models.vehicle import sedan
@@ -51,10 +67,10 @@ _TITLES = {
     "slalom": "Table II, slalom: RMSE of the axle force [kN]",
 }
 _MEASURES = {
-    paper_study.PAST_ONLINE: "past, against online (the paper's measure)",
-    paper_study.PAST: "past, against truth",
-    paper_study.AFTER: "after, against truth",
-    paper_study.ALL: "all, against truth",
+    PAST_ONLINE: "past, against online (the paper's measure)",
+    PAST: "past, against truth",
+    AFTER: "after, against truth",
+    ALL: "all, against truth",
 }
 MEASURES_MEAN = (
     "Frozen weights are measured in two ways. The paper's section IV-A compares the past, t < "
@@ -75,27 +91,24 @@ MEANING = (
 
 def row_labels(maneuver: str) -> dict[str, str]:
     """Return the label of every row of a table, by its column in the study."""
-    labels = {paper_study.ONLINE: "online, against truth"}
-    for t in paper_study.FREEZES[maneuver]:
+    labels = {ONLINE: "online, against truth"}
+    for t in FREEZES[maneuver]:
         for measure, words in _MEASURES.items():
-            labels[paper_study.frozen_column(measure, t)] = f"frozen at {freeze_key(t)} s: {words}"
+            labels[frozen_column(measure, t)] = f"frozen at {freeze_key(t)} s: {words}"
     return labels
 
 
 def printed_values(maneuver: str) -> dict[str, dict[str, float]]:
     """Return what the paper prints by law and column, beside the measure that it defines [kN]."""
-    beside = {paper_study.ONLINE: paper_study.ONLINE}
-    beside |= {
-        freeze_key(t): paper_study.frozen_column(paper_study.PAST_ONLINE, t)
-        for t in paper_study.FREEZES[maneuver]
-    }
+    beside = {ONLINE: ONLINE}
+    beside |= {freeze_key(t): frozen_column(PAST_ONLINE, t) for t in FREEZES[maneuver]}
     return {
         law: {beside[name]: value for name, value in row.items()}
         for law, row in _PAPER[maneuver].items()
     }
 
 
-def _rows(maneuver: str, study: paper_study.Study) -> list[list[str]]:
+def _rows(maneuver: str, study: Study) -> list[list[str]]:
     """Return the cells of a table: the label, and ours and the paper's value for each law.
 
     Medians and quartiles are those of the seeds that did not diverge; the last row counts those
@@ -105,7 +118,7 @@ def _rows(maneuver: str, study: paper_study.Study) -> list[list[str]]:
     cells = []
     for name, label in row_labels(maneuver).items():
         row = [label]
-        for law in paper_study.LAWS:
+        for law in LAWS:
             if table[law]:
                 q = table[law][name]
                 row.append(f"{q['median']:.3f} ({q['q25']:.3f}-{q['q75']:.3f})")
@@ -114,25 +127,24 @@ def _rows(maneuver: str, study: paper_study.Study) -> list[list[str]]:
             printed = paper.get(law, {}).get(name)
             row.append("" if printed is None else f"{printed:.4f}")
         cells.append(row)
-    lost = study.diverged()[maneuver]
-    counts = [
-        (f"{lost[law]} of {len(study.errors[maneuver][law])}", "") for law in paper_study.LAWS
-    ]
-    return [*cells, ["seeds that diverged", *(cell for pair in counts for cell in pair)]]
+    lost, last = study.diverged()[maneuver], ["seeds that diverged"]
+    for law in LAWS:
+        last += [f"{lost[law]} of {len(study.errors[maneuver][law])}", ""]
+    return [*cells, last]
 
 
 def _header() -> list[str]:
     names = ["condition"]
-    for law in paper_study.LAWS:
+    for law in LAWS:
         names += [VARIANTS[law].title, "" if VARIANTS[law].scaled else "paper"]
     return names
 
 
-def study_table(maneuver: str, study: paper_study.Study, caption: str) -> Table:
+def study_table(maneuver: str, study: Study, caption: str) -> Table:
     return Table(caption, [printed(word) for word in _header()], _rows(maneuver, study))
 
 
-def table_text(maneuver: str, study: paper_study.Study) -> str:
+def table_text(maneuver: str, study: Study) -> str:
     lines = [_header(), *_rows(maneuver, study)]
     seeds = len(study.errors[maneuver]["integral"])
     title = f"{_TITLES[maneuver]}, median (quartiles) of {seeds} seeds"
@@ -161,17 +173,16 @@ _FIGURES = {  # number of the paper's figure, by maneuver and law
 }
 
 
-def write_study(folder: Path, study: paper_study.Study) -> dict[str, bytes]:
+def write_study(folder: Path, study: Study) -> dict[str, bytes]:
     """Write tables.json, diverged.json, tables.txt and figures of a study; return the figures."""
     write_json(folder / "tables.json", study.tables())
     write_json(folder / "diverged.json", study.diverged())
     tables = [table_text(maneuver, study) for maneuver in study.errors]
     verdicts = [
-        f"{VARIANTS[law].title}: "
-        + verdict_line(certify(paper_study.paper_design(law, seed=0), sedan()))
-        for law in paper_study.LAWS
+        f"{VARIANTS[law].title}: " + verdict_line(certify(paper_design(law, seed=0), sedan()))
+        for law in LAWS
     ]
-    said = [*tables, settings(paper_study.GAINS, paper_study.NETWORK), *verdicts]
+    said = [*tables, settings(GAINS, NETWORK), *verdicts]
     write_file(folder / "tables.txt", "\n".join(said) + "\n")
     say("drawing figures")
     write_file(folder / SCHEME.name, SCHEME.read_bytes())
@@ -181,14 +192,14 @@ def write_study(folder: Path, study: paper_study.Study) -> dict[str, bytes]:
     return save_figures(folder, figures)
 
 
-def _draw(study: paper_study.Study, maneuver: str) -> dict[str, Figure]:
+def _draw(study: Study, maneuver: str) -> dict[str, Figure]:
     """Draw what did not diverge."""
     figures = {}
-    labels = {paper_study.ONLINE: "online,\nto truth"}  # both measures side by side
-    for t in paper_study.FREEZES[maneuver]:
+    labels = {ONLINE: "online,\nto truth"}  # both measures side by side
+    for t in FREEZES[maneuver]:
         frozen = f"frozen at {freeze_key(t)} s,"
-        labels[paper_study.frozen_column(paper_study.PAST_ONLINE, t)] = f"{frozen}\npast to online"
-        labels[paper_study.frozen_column(paper_study.ALL, t)] = f"{frozen}\nall to truth"
+        labels[frozen_column(PAST_ONLINE, t)] = f"{frozen}\npast to online"
+        labels[frozen_column(ALL, t)] = f"{frozen}\nall to truth"
     results = {
         law: {labels[n]: (q["median"], q["q25"], q["q75"]) for n, q in row.items() if n in labels}
         for law, row in study.tables()[maneuver].items()
@@ -199,9 +210,9 @@ def _draw(study: paper_study.Study, maneuver: str) -> dict[str, Figure]:
     }
     if any(results.values()):
         figures[f"{maneuver}_errors"] = comparison_figure(results, printed)
-    onset = paper_study.ONSETS[maneuver]
+    onset = ONSETS[maneuver]
     window = (onset - 1.0, float(study.recordings[maneuver].t[-1]))
-    for law in paper_study.LAWS:
+    for law in LAWS:
         trial = study.typical(maneuver, law)
         if trial is None:
             say(f"{maneuver}: the {law} law diverged on every seed, no figure")
@@ -232,9 +243,7 @@ def run(options: argparse.Namespace) -> None:
     parts = {_STUDY: float(options.seeds), _DRAWING: 10.0}
     with folder_of(options) as folder:
         progress = Progress("paper", parts, long=True)
-        study = paper_study.run_study(
-            options.seeds, partial(progress.begin(_STUDY).step, paper_study.STEPS)
-        )
+        study = run_study(options.seeds, partial(progress.begin(_STUDY).step, STEPS))
         progress.begin(_DRAWING)
         write_study(folder, study)
         text = (folder / "tables.txt").read_text(encoding="utf-8").rstrip("\n")

@@ -24,7 +24,7 @@ CAUTION = (
 )
 HEADER = (
     "maneuver", "m/s", "s", "room [m]", "a_y [m/s²]", "forces",
-    *(f"{name} f/r" for name in ("stiffness", "grip", "relaxation")),
+    "stiffness f/r", "grip f/r", "relaxation f/r",
 )  # fmt: skip
 
 

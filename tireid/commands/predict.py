@@ -18,7 +18,6 @@ from identifier.verdict import within_band
 from identifier.verdict.verdict import PERCENT
 from models.files import digest
 from tireid import __version__, output
-from tireid import report as page
 from tireid.commands import options as shared
 from tireid.figures.forces import prediction_figure
 from tireid.figures.predict import friction_figure, motion_figure
@@ -27,7 +26,18 @@ from tireid.figures.tires import slip_figure
 from tireid.identified import error_cells
 from tireid.learning import replay
 from tireid.progress import say, tell
-from tireid.reports.common import drawings, origin
+from tireid.report import (
+    Block,
+    Headline,
+    Images,
+    Marked,
+    Report,
+    Section,
+    drawings,
+    origin,
+    printed,
+    write_report,
+)
 from tireid.reports.identify import (
     band_sentence,
     curve_drawing,
@@ -97,19 +107,12 @@ def run(options: argparse.Namespace) -> int:
         if friction is not None:
             figures["friction"] = friction_figure(friction)
         images = save_figures(folder, figures)
-        write_predict_report(
-            folder, prediction, images, lines, source=options.model, command=options.words
-        )
+        write_predict_report(folder, prediction, images, lines, options.model, options.words)
     error, table = prediction.against_truth, ""
     if error is not None:
         cells = [visible(recording.name), *error_cells(error, prediction.true_force)]
         table = output.text_table([["predicted", "front", "rear"], cells], "<>>")
-    sensors = sensors_text(model, [recording])
-    tell(
-        "\n".join(
-            one for one in (table, lines, sensors, verdict_text(verdict, numbers=False)) if one
-        )
-    )
+    tell(table, lines, sensors_text(model, [recording]), verdict_text(verdict, numbers=False))
     say(f"wrote {options.out}/")
     return shared.exit_code(verdict, options)
 
@@ -217,9 +220,8 @@ def _prediction_text(prediction: Prediction, facts: Mapping[str, Any]) -> str:
 def write_predict_report(
     folder: Path,
     prediction: Prediction,
-    figures: page.Images,
+    figures: Images,
     lines: str,
-    *,
     source: Path,
     command: str,
 ) -> None:
@@ -228,13 +230,13 @@ def write_predict_report(
     lines : what is said of it beside its errors.   source : the model's file.
     """
     model, recording, verdict = prediction.model, prediction.recording, prediction.verdict
-    notes: list[str | page.Marked] = [*stored_warning(source)]
+    notes: list[str | Marked] = [*stored_warning(source)]
     notes += [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
     notes += extrapolated(model, recording)
-    error, found = prediction.against_truth, list[page.Block]()
+    error, found = prediction.against_truth, list[Block]()
     if error is not None:
         found.append(error_table([[recording.name, *error_numbers(error, prediction.true_force)]]))
-    found += [page.printed(line) for line in lines.splitlines()]
+    found += [printed(line) for line in lines.splitlines()]
     captions = {
         "motion": "Mean force over windows of 0.3 s: from the motion, and from the model.",
         "replay": "Axle forces over time.",
@@ -243,7 +245,7 @@ def write_predict_report(
     found += drawings({**figures, "replay": figures["forces"]}, captions)
     if band := band_sentence(model):
         found.append(band)
-    report = page.Report(
+    report = Report(
         title=f"Tires of {source.name} on {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, not used for "
         "identification.",
@@ -255,7 +257,7 @@ def write_predict_report(
         warnings=[*verdict_warnings(verdict), *notes],
         sections=[
             verdict_section(verdict),
-            page.Section("What it predicts", found),
+            Section("What it predicts", found),
             *sensors_section(model, [recording]),
             origin(
                 command,
@@ -265,20 +267,20 @@ def write_predict_report(
             ),
         ],
     )
-    page.write_report(folder, report)
+    write_report(folder, report)
 
 
-def _predict_headlines(prediction: Prediction) -> list[page.Headline]:
+def _predict_headlines(prediction: Prediction) -> list[Headline]:
     """Return what is missed of the true force, explained of the motion, and the known slip."""
     numbers = []
     error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
     if error is not None and size is not None and min(size.front, size.rear) > 0.0:
         shares = error.front / size.front, error.rear / size.rear
         front, rear = (f"{PERCENT * share:.1f}" for share in shares)
-        numbers.append(page.Headline(f"{front} / {rear} %", "of the rms true force, front / rear"))
+        numbers.append(Headline(f"{front} / {rear} %", "of the rms true force, front / rear"))
     if motion is not None and None not in motion.explained:
         lateral, yaw = (f"{PERCENT * max(share or 0.0, 0.0):.1f}" for share in motion.explained)
         numbers.append(
-            page.Headline(f"{lateral} / {yaw} %", "explained of the lateral / the yaw acceleration")
+            Headline(f"{lateral} / {yaw} %", "explained of the lateral / the yaw acceleration")
         )
     return [*numbers, *known_headline(prediction.model)]

@@ -27,13 +27,12 @@ def declare(new: Any) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    seed = seed_of(options)
     if not options.log.name.lower().endswith((".csv", ".csv.gz")):
         raise ValueError(f"{options.log}: the name must end in .csv or .csv.gz")
     for path in filter(None, (options.log, options.car)):
         require_free(path, force=options.force)
     vehicle = read_vehicle(options)
-    recording = sample_recording(vehicle, seed=seed)
+    recording = sample_recording(vehicle, seed=seed_of(options))
     write_recording(recording, options.log)
     say(f"wrote {options.log}: {len(recording)} samples, {recording.duration:.1f} s")
     if options.car is not None:

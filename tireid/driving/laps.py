@@ -86,5 +86,5 @@ def drive_laps(
         share = min(_MOST, _GROWS * share) if seen <= _NEAR else _SHRINKS * share
         if learnt.verdict.valid:
             tire = learnt.tire
-            newer = speed_limits(tire, confidence=confidence)
-            limits = newer.at_most(_LIMITS_GROW * float(limits.a_y[0]))
+            most = _LIMITS_GROW * float(limits.a_y[0])
+            limits = speed_limits(tire, confidence=confidence).at_most(most)

@@ -60,7 +60,6 @@ class _Driver:
         out = min(max(_OUT * max(self._peak, self._best), _LEAST_OUT), _MOST_OUT)
         self._too_far |= abs(self._side_slip) > out
         if measured.t >= self._ends:
-            self._size_swing()
             self._begin_swing(measured.t)
         if self._too_far:
             goal = self._side_slip  # into the slide
@@ -70,8 +69,8 @@ class _Driver:
         step = _RATE_LIMIT * self._period
         self.angle += min(max(goal - self.angle, -step), step)
 
-    def _size_swing(self) -> None:
-        """Size the next swing by what the last one has shown."""
+    def _begin_swing(self, t: float) -> None:
+        """Begin the next swing, of a size by what the last one has shown."""
         if self._too_far:
             self._largest = self._size if self._grows == _GROWS else self._largest
             self._size /= _GROWS
@@ -85,8 +84,6 @@ class _Driver:
             self._size = min(self._grows * self._size, self._largest)
         self._best = max(self._best, self._peak)
         self._peak, self._too_far = 0.0, False
-
-    def _begin_swing(self, t: float) -> None:
         self._begins, self._from, self._side = t, self.angle, -self._side
         fastest = max(_SWING, math.pi * self._size / _RATE_LIMIT)
         self._ends = t + fastest * self._rng.uniform(1.0, _SLOWER)

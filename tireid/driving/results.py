@@ -43,6 +43,7 @@ from tireid.figures.tires import TireCurve, axle_slip, drive_tires_figure
 from tireid.output import axle_columns, finite, text_table, write_csv, write_json
 from tireid.progress import say
 from tireid.report import (
+    READ,
     Block,
     Headline,
     Images,
@@ -50,12 +51,14 @@ from tireid.report import (
     Report,
     Section,
     Table,
+    drawings,
+    origin,
     printed,
     write_report,
 )
-from tireid.reports.common import READ, drawings, origin
 
 NO_FILM = "none"
+_Runs = Sequence[ClosedLoop]
 
 
 def headline(conditions: Conditions) -> str:
@@ -83,7 +86,7 @@ class Drives(NamedTuple):
     """
 
     conditions: Conditions
-    runs: Sequence[ClosedLoop]
+    runs: _Runs
     learnt: TireModel | None
     source: str
 
@@ -188,7 +191,7 @@ class Drives(NamedTuple):
 SCORES = ("tires", "rms e_y", "peak e_y", "completed", "failures", "wall time: median / p99 / max")
 
 
-def score_rows(runs: Sequence[ClosedLoop]) -> list[list[str]]:
+def score_rows(runs: _Runs) -> list[list[str]]:
     rows = []
     for run in runs:
         score, end = run.scores, f"no: {run.drive.ending} at {run.drive.s[-1]:.0f} m"
@@ -238,9 +241,7 @@ def _drive_columns(drive: Drive) -> dict[str, Array]:
     }
 
 
-def _known_curves(
-    runs: Sequence[ClosedLoop], setup: Setup, learnt: TireModel | None
-) -> list[TireCurve]:
+def _known_curves(runs: _Runs, setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
     """Return the tires of the trackers, and the linear and the true tire beside it."""
     models = {LINEAR: prediction_tire(setup.vehicle)}
     if learnt is not None:
@@ -256,8 +257,7 @@ def _known_curves(
             models[ORACLE + AT_THE_END] = setup.oracle(setup.drops[-1][1])
     v_x, slip = float(setup.speeds().mean()), np.linspace(-0.35, 0.35, 281)
     return [
-        TireCurve(label=label, alpha=slip, force=curves_at(model, slip, v_x).T)
-        for label, model in models.items()
+        TireCurve(label, slip, curves_at(model, slip, v_x).T) for label, model in models.items()
     ]
 
 
@@ -288,7 +288,7 @@ def write_drive_report(
     write_report(folder, report)
 
 
-def _drive_headlines(runs: Sequence[ClosedLoop]) -> list[Headline]:
+def _drive_headlines(runs: _Runs) -> list[Headline]:
     first, numbers = runs[0], list[Headline]()
     for run in runs:
         end = "" if run.scores.completed else f", who {run.drive.ending}"
@@ -305,7 +305,7 @@ def _drive_headlines(runs: Sequence[ClosedLoop]) -> list[Headline]:
     return [*numbers, Headline(took, "a step: median / 99 of 100")]
 
 
-def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
+def _drive_warnings(runs: _Runs) -> list[str]:
     said = []
     for run in runs:
         scores = run.scores
@@ -323,9 +323,7 @@ def _drive_warnings(runs: Sequence[ClosedLoop]) -> list[str]:
     return said
 
 
-def _drive_blocks(
-    folder: Path, runs: Sequence[ClosedLoop], figures: Images, film: str
-) -> list[Block]:
+def _drive_blocks(folder: Path, runs: _Runs, figures: Images, film: str) -> list[Block]:
     blocks: list[Block] = [Table("Scores of the drives.", SCORES, score_rows(runs))]
     if film != NO_FILM:
         caption = f"The drive on {runs[0].label} tires; outlines are the other cars."
@@ -338,7 +336,7 @@ def _drive_blocks(
     return [*blocks, *drawings(figures, captions)]
 
 
-def known_blocks(runs: Sequence[ClosedLoop], figures: Images) -> list[Block]:
+def known_blocks(runs: _Runs, figures: Images) -> list[Block]:
     """Return what trackers believed of the tires, and what they were given on the way."""
     captions = {
         "tires": "Forces of the first drive, and the tire models of the trackers.",

@@ -2,17 +2,19 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from codegen import find_compiler
+from codegen.arrays import Array
 from codegen.compiler import NoCompilerError
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.model import begun
 from identifier.inertial import InertialIdentifier
+from identifier.method import CannotFreezeError
 from identifier.methods import continuing
-from identifier.run import OnlineIdentifier
+from identifier.run import DivergedError, OnlineIdentifier
 from identifier.speed_limits import speed_limits
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
@@ -37,11 +39,11 @@ from mpc.path import Path, SpeedProfile
 from mpc.problem import Problem
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.driving.known import Known, Witness
 from tireid.driving.setup import BY_TIRES, PERIOD, WIDEST, Setup, SpeedWish
 from tireid.progress import Progress
 
 _NOTED = 0.1  # change of the grip that is worth a note
+_EVERY = 8  # samples between two looks at what is known
 _PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
 # least and most friction of a road over that of the measured tire [-]
 FRICTIONS = (0.05, 1.5)
@@ -85,6 +87,57 @@ class _BacksOff:
         self._noted = tracker.grip
         grip = f"plans with {tracker.grip:.2f} of the grip"
         return grip if said is None else f"{said}; {grip}"
+
+
+# What was known of the tires at every moment of a drive: the tracker steers by the weights that it
+# was handed; what the identifier has learnt by now runs ahead of them, until it is handed over.
+
+
+class Known(NamedTuple):
+    """What was known from a time [s] on.
+
+    steering : weights that the tracker steers by.   learnt : weights that were learnt by then.
+    slip : up to which these are known [rad], (2,).
+    """
+
+    t: float
+    steering: Array
+    learnt: Array
+    slip: Array
+
+
+class _Witness:
+    """Stands between a drive and what learns, and keeps what was known.
+
+    Attributes: known, in the order of time.
+
+    Parameters
+    ----------
+    learner : which is asked, as if nobody stood between.
+    period : of the samples [s].
+    """
+
+    def __init__(self, learner: Learner, period: float) -> None:
+        self.known: list[Known] = []
+        self._learner, self._period, self._samples = learner, period, 0
+
+    def observe(self, measured: Measured, tracker: Any) -> str | None:
+        """Ask the learner; return what it said."""
+        said = self._learner.observe(measured, tracker)
+        if self._samples % _EVERY == 0:
+            self.known.append(self._seen(tracker.tire))
+        self._samples += 1
+        return said
+
+    def _seen(self, steering: PredictionTire) -> Known:
+        try:
+            model = self._learner.supervisor.identifier.model()
+        except (DivergedError, CannotFreezeError, ValueError):  # as the supervisor: no model now
+            learnt, slip = np.full_like(steering.weights, np.nan), np.zeros(2)
+        else:
+            slip = np.full(2, np.nan) if model.known_slip is None else model.known_slip
+            learnt = prediction_tire(model).weights
+        return Known(self._samples * self._period, steering.weights.copy(), learnt, slip)
 
 
 def make_learner(learnt: TireModel, vehicle: Vehicle, *, steers: bool = True) -> Learner:
@@ -251,15 +304,14 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         raise ValueError(str(error)) from None
     informed = label == ORACLE and setup.drops
     learner: LearningTires | None = _Informer(setup) if informed else None
-    beside, witness = learner, None
+    beside, witness, watcher = learner, None, None
     speed: SpeedProfile | Earned = profile
-    watcher = None
     if label == LEARNING or (conditions.confirm and label == FROZEN):
         assert learnt is not None
         watcher = make_learner(learnt, setup.vehicle, steers=label == LEARNING)
         learner = beside = watcher
         if label == LEARNING:
-            beside = witness = Witness(watcher, PERIOD)
+            beside = witness = _Witness(watcher, PERIOD)
     if conditions.confirm:
         road = watcher and watcher.supervisor
         speed = Earned(profile, PERIOD, lambda: road.friction if road else 1.0)
@@ -358,7 +410,7 @@ def drive(
         if needed and tire is None:
             raise ValueError(f"{why}: none is given")
     conditions = Conditions(
-        setup=Setup(path=path, vehicle=vehicle, mu=friction, drops=(), wish=wish, tires=tires),
+        setup=Setup(path, vehicle, friction, (), wish, tires=tires),
         delay=delay_periods(delay),
         noise=noise,
         seed=seed,

@@ -103,16 +103,14 @@ class Setup(NamedTuple):
         On a path along X each wheel meets a drop at its place. Elsewhere all wheels meet it at the
         time at which the car is expected there.
         """
-        if not self.drops:
-            return Friction(scale=self.mu)
-        if not self.path.closed and np.all(np.cos(self.path.psi) > 0.2):  # along X
-            changes = [
-                FrictionChange(scale=mu, at_place=float(self.path.pose(s)[0]))
-                for s, mu in self.drops
-            ]
-        else:
-            changes = [FrictionChange(scale=mu, at_time=self.time_at(s)) for s, mu in self.drops]
-        return Friction(scale=self.mu, changes=tuple(changes))
+        along = not self.path.closed and np.all(np.cos(self.path.psi) > 0.2)  # X
+        changes = tuple(
+            FrictionChange(scale=mu, at_place=float(self.path.pose(s)[0]))
+            if along
+            else FrictionChange(scale=mu, at_time=self.time_at(s))
+            for s, mu in self.drops
+        )
+        return Friction(scale=self.mu, changes=changes)
 
     def time_at(self, s: float) -> float:
         """Return when the car is expected at a place, at the wanted speed [s].

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from codegen.escape import mathtext
 from identifier.compare.course import same_and_other
 from identifier.compare.study import Comparison, ranking
-from tireid.figures import style
+from tireid.figures.style import BLUE, GREEN, GREY, ORANGE, few_ticks, new_figure, styled
 
 _FARTHEST = 300.0  # [%], what is worse is drawn at the end of the axis
 _ROW = 0.3  # height of a method [in]
@@ -29,24 +29,24 @@ def method_label(name: str) -> str:
 
 ONLINE, _SAME, _OTHER = "online", "frozen, same drive", "frozen, other recordings"
 _KINDS = {
-    ONLINE: (style.BLUE, "o", -0.22),
-    _SAME: (style.GREEN, "D", 0.0),
-    _OTHER: (style.ORANGE, "s", 0.22),
+    ONLINE: (BLUE, "o", -0.22),
+    _SAME: (GREEN, "D", 0.0),
+    _OTHER: (ORANGE, "s", 0.22),
 }
 
 
-@style.styled
+@styled
 def methods_figure(comparison: Comparison) -> Figure:
     """Draw a row for each method: means over recordings, lines from the best to the worst."""
     rows = {method_label(name): _method_errors(comparison, name) for name in ranking(comparison)}
     lost = {method_label(n) for n, trial in comparison.trials.items() if trial.diverged_at}
-    figure = style.new_figure(0.9 + _ROW * len(rows))
+    figure = new_figure(0.9 + _ROW * len(rows))
     axes = figure.subplots()
     every = [v for row in rows.values() for vs in row.values() for v in vs]
     finite = [value for value in every if np.isfinite(value)]
     low, high = min(finite, default=1.0), min(max(finite, default=100.0), _FARTHEST)
     axes.set(xscale="log", xlim=(low / 1.2, high * 1.2))
-    style.few_ticks(axes.xaxis)
+    few_ticks(axes.xaxis)
     for position, (label, errors) in enumerate(rows.items()):
         for kind, values in errors.items():
             if values:
@@ -60,7 +60,7 @@ def methods_figure(comparison: Comparison) -> Figure:
                 0.995,
                 position,
                 "diverged",
-                color=style.GREY,
+                color=GREY,
                 ha="right",
                 transform=axes.get_yaxis_transform(),
                 va="center",

@@ -11,7 +11,21 @@ from matplotlib.figure import Figure
 from codegen.arrays import Array
 from models.faults import SensorFault
 from models.vehicle import Vehicle
-from tireid.figures import style
+from tireid.figures.style import (
+    AMBER,
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    PAGE,
+    PURPLE,
+    TIME,
+    Look,
+    few_ticks,
+    legend_above,
+    new_figure,
+    styled,
+)
 
 if TYPE_CHECKING:
     from mpc.loop.record import Drive
@@ -42,50 +56,50 @@ _Drives = Mapping[str, "Drive"]  # by their tires
 Drops = Sequence[tuple[float, float]]  # arc length [m] and friction from there on
 
 
-@style.styled
+@styled
 def drive_solve_figure(drive: "Drive") -> Figure:
     """Draw the solve times of a drive, their median and the time that one of a hundred exceeds."""
     times = 1e3 * drive.solve_time  # ms
-    figure = style.new_figure(2.5)
+    figure = new_figure(2.5)
     axes = figure.subplots()
-    axes.plot(drive.t, times, ".", ms=2.2, mew=0.0, color=style.BLUE, label="a step")
+    axes.plot(drive.t, times, ".", ms=2.2, mew=0.0, color=BLUE, label="a step")
     failed = drive.status != 0
     if failed.any():
         label = f"failed ({np.count_nonzero(failed)})"
-        axes.plot(drive.t[failed], times[failed], "x", ms=4.0, color=style.ORANGE, label=label)
-    for share, name, color in ((0.5, "median", style.PURPLE), (0.99, "99 %", style.ORANGE)):
+        axes.plot(drive.t[failed], times[failed], "x", ms=4.0, color=ORANGE, label=label)
+    for share, name, color in ((0.5, "median", PURPLE), (0.99, "99 %", ORANGE)):
         value = float(np.quantile(times, share))
         axes.axhline(value, color=color, linewidth=1.1, label=f"{name} {value:.3g} ms")
-    axes.set(xlabel=style.TIME, ylabel="solve time [ms]", yscale="log")
-    style.few_ticks(axes.yaxis)
+    axes.set(xlabel=TIME, ylabel="solve time [ms]", yscale="log")
+    few_ticks(axes.yaxis)
     period = f"largest {times.max():.3g} ms of a period of {1e3 * drive.period:g} ms"
     axes.set_title(period, loc="right")
     axes.set_title(f"{times.size} steps")
     return figure
 
 
-PATH: style.Look = {
+PATH: Look = {
     "color": "#9ADBC6",
     "linewidth": 3.5,
     "solid_capstyle": "butt",
     "label": "path",
 }
-CONES: style.Look = {
+CONES: Look = {
     "linestyle": "",
     "marker": "o",
     "markersize": 2.6,
     "markeredgewidth": 0.4,
     "markeredgecolor": "#7A4B00",
-    "markerfacecolor": style.AMBER,
+    "markerfacecolor": AMBER,
     "label": "cones",
 }
 ORACLE = "oracle"  # the name of the true tire
 AT_THE_END = " at the end"  # what a label ends with that is of a tire as it was then
 _TIRES = {
-    "linear": {"color": style.GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.3},
-    "frozen": {"color": style.ORANGE, "linestyle": "-", "linewidth": 1.2},
-    ORACLE: {"color": style.BLACK, "linestyle": (0, (5, 1.5)), "linewidth": 1.1},
-    "learning": {"color": style.BLUE, "linestyle": "-", "linewidth": 1.2},
+    "linear": {"color": GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.3},
+    "frozen": {"color": ORANGE, "linestyle": "-", "linewidth": 1.2},
+    ORACLE: {"color": BLACK, "linestyle": (0, (5, 1.5)), "linewidth": 1.1},
+    "learning": {"color": BLUE, "linestyle": "-", "linewidth": 1.2},
 }
 
 
@@ -97,9 +111,12 @@ def tire_look(label: str) -> dict[str, Any]:
 
 _REPLANNED, _NOTICED = "plans with another tire or grip", "sensor fault noticed"
 ARC = "arc length of the path [m]"
+_ERRORS = (
+    "deviation $e_y$\n[m]", "heading error\n[deg]", "lateral acc.\n[m/s²]", "speed $v_x$\n[m/s]",
+)  # fmt: skip
 
 
-@style.styled
+@styled
 def drive_errors_figure(
     drives: _Drives,
     *,
@@ -112,9 +129,8 @@ def drive_errors_figure(
     off_path : deviation [m] at which a car counts as off the path, drawn where it comes near.
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = style.new_figure(5.2)
+    figure = new_figure(5.2)
     panels = figure.subplots(4, 1, sharex=True)
-    labels = ("deviation $e_y$\n[m]", "heading error\n[deg]", "lateral acc.\n[m/s²]")
     for label, drive in reversed(list(drives.items())):
         look = tire_look(label)
         curves = (drive.e_y, np.rad2deg(drive.e_psi), drive.a_y, drive.v_x)
@@ -132,7 +148,7 @@ def drive_errors_figure(
                 mfc="white",
                 zorder=3.0,
             )
-    for axes, label in zip(panels, (*labels, "speed $v_x$\n[m/s]"), strict=True):
+    for axes, label in zip(panels, _ERRORS, strict=True):
         axes.set_ylabel(label)
         _mark_road(axes, drives, drops, faults)
     for axes in panels[:3]:
@@ -148,7 +164,7 @@ def drive_errors_figure(
     panels[3].set_ylim(low - room, high + room)
     panels[-1].set(xlabel=ARC, xlim=(0.0, max(float(drive.s[-1]) for drive in drives.values())))
     figure.align_ylabels(panels)
-    style.legend_above(figure, last=(*drives, _REPLANNED))
+    legend_above(figure, last=(*drives, _REPLANNED))
     return figure
 
 
@@ -159,7 +175,7 @@ def mark_drops(axes: Axes, drops: Drops) -> None:
     """
     for place, mu in drops:
         axes.axvline(
-            place, label=f"friction {mu:g}", color=style.GREY, linewidth=0.8, linestyle=(0, (4, 2))
+            place, label=f"friction {mu:g}", color=GREY, linewidth=0.8, linestyle=(0, (4, 2))
         )
 
 
@@ -196,7 +212,7 @@ def _mark_road(
                 )
 
 
-@style.styled
+@styled
 def drive_steering_figure(
     drives: _Drives,
     *,
@@ -210,7 +226,7 @@ def drive_steering_figure(
     angle_limit : that the tracker keeps [rad].   rate_limit : that the tracker keeps [rad/s].
     drops : where the friction changes: arc length [m] and friction from there on.
     """
-    figure = style.new_figure(3.4)
+    figure = new_figure(3.4)
     angle, rate = figure.subplots(2, 1, sharex=True)
     for label, drive in reversed(list(drives.items())):
         look = tire_look(label)
@@ -220,7 +236,7 @@ def drive_steering_figure(
         first.s,
         np.rad2deg(first.delta),
         linewidth=0.8,
-        color=style.PURPLE,
+        color=PURPLE,
         label=f"wheels of {name}",
     )
     speed = np.rad2deg(np.diff(first.command) / np.diff(first.t))
@@ -238,7 +254,7 @@ def drive_steering_figure(
         _mark_road(axes, drives, drops, faults)
     rate.set(xlabel=ARC, xlim=(0.0, max(float(drive.s[-1]) for drive in drives.values())))
     figure.align_ylabels([angle, rate])
-    style.legend_above(figure, last=tuple(drives))
+    legend_above(figure, last=tuple(drives))
     return figure
 
 
@@ -290,10 +306,10 @@ def _turn(angle: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
-_INNER_WIDTH = style.PAGE - 0.75  # what labels leave of the page [in]
+_INNER_WIDTH = PAGE - 0.75  # what labels leave of the page [in]
 
 
-@style.styled
+@styled
 def drive_path_figure(drives: _Drives) -> Figure:
     """Draw the path, its cones and where every car drove; the first with its outlines."""
     path = next(iter(drives.values())).path
@@ -303,7 +319,7 @@ def drive_path_figure(drives: _Drives) -> Figure:
     rows = min(_MOST_ROWS, max(1, round(width / _ROW_LENGTH))) if long else 1
     step = width / rows
     inch = min(_INNER_WIDTH / step, _HIGHEST / height)  # of a meter
-    figure = style.new_figure(rows * (height * inch + 0.3) + 0.6)
+    figure = new_figure(rows * (height * inch + 0.3) + 0.6)
     panels = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for row, axes in enumerate(panels):
         ends = float(low[0] + row * step), float(low[0] + (row + 1) * step)
@@ -312,7 +328,7 @@ def drive_path_figure(drives: _Drives) -> Figure:
         axes.set_yticks(axes.get_yticks()[1:-1])
         axes.set_ylim(low[1], high[1])
     panels[-1].set_xlabel("X [m]")
-    style.legend_above(figure, last=tuple(drives))
+    legend_above(figure, last=tuple(drives))
     return figure
 
 

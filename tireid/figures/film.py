@@ -21,7 +21,7 @@ from codegen.writing import naming
 from mpc.loop.record import Drive
 from mpc.tires import PredictionTire
 from mpc.tires.tire import curves_at
-from tireid.driving.known import Known
+from tireid.driving.runs import Known
 from tireid.figures.drive import (
     AT_THE_END,
     CONES,

@@ -15,16 +15,38 @@ from numpy.typing import NDArray
 from codegen.arrays import Array
 from identifier.doctor.readings import Motion, Reading, forces_and_slips
 from identifier.prediction import Prediction
-from identifier.reproducibility import Replay, online_error
+from identifier.reproducibility import Replay, freeze_key, online_error
 from identifier.run import History
 from models.recordings import Recording
 from models.rules import require_kind
 from models.vehicle import Vehicle
-from tireid.figures import style
+from tireid.figures.style import (
+    AXLES,
+    BLUE,
+    FROZEN,
+    GREY,
+    ONLINE,
+    ORANGE,
+    TRUTH,
+    ForceUnit,
+    Look,
+    axle_panels,
+    clock_zero,
+    drawable,
+    force_range,
+    force_unit_of,
+    label_forces,
+    label_time,
+    legend_beside,
+    mark_freeze,
+    new_figure,
+    note,
+    styled,
+)
 from tireid.figures.thinned import drawn_samples, drawn_times
 
-_Curve = tuple[Array, style.Look]  # forces of both axles (n, 2) [N], and their look
-_RESIDUAL: style.Look = {"linewidth": 0.8, "linestyle": "-"}
+_Curve = tuple[Array, Look]  # forces of both axles (n, 2) [N], and their look
+_RESIDUAL: Look = {"linewidth": 0.8, "linestyle": "-"}
 
 
 def _force_panels(
@@ -34,7 +56,7 @@ def _force_panels(
     judged: Sequence[_Curve],
     window: tuple[float, float] | None = None,
     heights: tuple[float, float] = (2.0, 1.0),
-) -> tuple[Figure, NDArray[Any], style.ForceUnit]:
+) -> tuple[Figure, NDArray[Any], ForceUnit]:
     """Draw forces in rows, below them what some miss of those that are known.
 
     rows : title of each behind the axle's name, and its curves.
@@ -45,34 +67,34 @@ def _force_panels(
     reference = curves[0] if known is None else known
     errors = [force - reference for force in curves]
     part = drawn_samples(recording.t, ends, reference, *curves, *errors)
-    t, unit = drawn_times(recording, recording.t[part]), style.force_unit_of(reference[part])
+    t, unit = drawn_times(recording, recording.t[part]), force_unit_of(reference[part])
 
     def scaled(force: Array) -> Array:
         return force[part] / unit.newtons
 
-    limits = style.force_range(scaled(reference), *map(scaled, curves))
+    limits = force_range(scaled(reference), *map(scaled, curves))
     residuals = [] if known is None else [(scaled(f) - scaled(known), look) for f, look in judged]
     ratios = [heights[0]] * len(rows) + [heights[1]] * bool(residuals)
-    figure, panels = style.axle_panels(ratios, room=0.9)
-    for axle, name in enumerate(style.AXLES):
+    figure, panels = axle_panels(ratios, room=0.9)
+    for axle, name in enumerate(AXLES):
         for axes, (title, row) in zip(panels[:, axle], rows, strict=False):
             axes.set(xlim=ends, ylim=limits, title=f"{name}{title}")
             for force, look in row:
-                axes.plot(t, style.drawable(scaled(force)[:, axle], limits), **look)
+                axes.plot(t, drawable(scaled(force)[:, axle], limits), **look)
         if residuals:
-            panels[-1, axle].axhline(0.0, color=style.GREY, linewidth=0.6)
+            panels[-1, axle].axhline(0.0, color=GREY, linewidth=0.6)
             for residual, look in residuals:
                 drawn = np.clip(residual[:, axle], -1e6, 1e6)
                 panels[-1, axle].plot(t, drawn, **{**look, **_RESIDUAL})
-        style.label_time(panels[-1, axle], recording.t)
+        label_time(panels[-1, axle], recording.t)
     if residuals:
         within = (np.clip(residual, *limits) for residual, _ in residuals)
-        panels[-1, 0].set_ylim(style.force_range(np.zeros(1), *within))
-    style.label_forces(panels, unit, residual=bool(residuals))
+        panels[-1, 0].set_ylim(force_range(np.zeros(1), *within))
+    label_forces(panels, unit, residual=bool(residuals))
     return figure, panels, unit
 
 
-@style.styled
+@styled
 def force_figure(
     history: History,
     replays: Mapping[float, Replay] | None = None,
@@ -95,35 +117,36 @@ def force_figure(
     """
     replays = dict(sorted((replays or {}).items()))
     recording, truth, first = history.recording, history.recording.axle_force, int(history.online)
-    online: list[_Curve] = [(history.axle_force, style.ONLINE)] * first
-    drawn_in_all = online if truth is None else [(truth, style.TRUTH), *online]
-    frozen = {at: (replay.axle_force, style.FROZEN) for at, replay in replays.items()}
+    online: list[_Curve] = [(history.axle_force, ONLINE)] * first
+    drawn_in_all = online if truth is None else [(truth, TRUTH), *online]
+    frozen = {at: (replay.axle_force, FROZEN) for at, replay in replays.items()}
     rows: list[tuple[str, Sequence[_Curve]]] = [(", online", drawn_in_all)] * first
+    zero = clock_zero(recording.t)  # of the axis below
     rows += [
-        (f", {style.frozen_title(recording.t, at)}", [*drawn_in_all, curve])
+        (f", frozen at {freeze_key(round(at - zero, 6))} s", [*drawn_in_all, curve])
         for at, curve in frozen.items()
     ]
     known = history.axle_force if truth is None and first else truth
     judged = [*(online if truth is not None else []), *list(frozen.values())[-1:]]
     figure, panels, unit = _force_panels(recording, rows, known, judged, window, (1.45, 1.05))
     error = online_error(history, since=since)
-    for axle, name in enumerate(style.AXLES):
+    for axle, name in enumerate(AXLES):
         if history.diverged_at is not None:
-            style.note(panels[0, axle], f"diverged at {history.diverged_at:.4g} s")
+            note(panels[0, axle], f"diverged at {history.diverged_at:.4g} s")
         elif error is not None:
-            style.note(panels[0, axle], f"RMSE {unit.format(error, axle)}")
+            note(panels[0, axle], f"RMSE {unit.format(error, axle)}")
         for axes, (at, replay) in zip(panels[first:, axle], replays.items(), strict=False):
-            style.note(axes, _errors(replay, unit, axle))
+            note(axes, _errors(replay, unit, axle))
             if first:
-                style.mark_freeze(panels[0, axle], at)
-            style.mark_freeze(axes, at, prediction=True)
+                mark_freeze(panels[0, axle], at)
+            mark_freeze(axes, at, prediction=True)
         if len(panels) > len(rows):
             against = "online" if truth is None else "truth"
             panels[-1, axle].set_title(f"{name}, residual to {against}")
     return figure
 
 
-def _errors(replay: Replay | Prediction, unit: style.ForceUnit, axle: int) -> str:
+def _errors(replay: Replay | Prediction, unit: ForceUnit, axle: int) -> str:
     """Return the error of a replay, and below it the paper's measure where it is known."""
     online = getattr(replay, "against_online", None)
     error, to = replay.against_truth, ""
@@ -136,26 +159,26 @@ def _errors(replay: Replay | Prediction, unit: style.ForceUnit, axle: int) -> st
     return said
 
 
-@style.styled
+@styled
 def prediction_figure(replay: Replay | Prediction, online: History | None = None) -> Figure:
     """Draw a frozen model on a recording it did not learn from, with what it misses below.
 
     The residual is the frozen force minus the true force, or minus the online force where there is
     no truth; with neither there is no residual.
     """
-    recording, known, look = replay.recording, replay.recording.axle_force, style.TRUTH
+    recording, known, look = replay.recording, replay.recording.axle_force, TRUTH
     if online is not None and known is None:
-        known, look = online.axle_force, style.ONLINE
-    frozen = (replay.axle_force, style.FROZEN)
+        known, look = online.axle_force, ONLINE
+    frozen = (replay.axle_force, FROZEN)
     row = [frozen] if known is None else [(known, look), frozen]
     figure, panels, unit = _force_panels(recording, [("", row)], known, [frozen])
     if known is not None:
         for axle, axes in enumerate(panels[0]):
-            style.note(axes, _errors(replay, unit, axle))
+            note(axes, _errors(replay, unit, axle))
     return figure
 
 
-@style.styled
+@styled
 def inputs_figure(recording: Recording) -> Figure:
     """Draw the signals of a recording; rear steering and a_y only where there are any."""
     require_kind(Recording, "as of read_recording, or run.recording", recording=recording)
@@ -172,36 +195,37 @@ def inputs_figure(recording: Recording) -> Figure:
     part = drawn_samples(recording.t, ends, recording.delta_r, *signals.values())
     t = drawn_times(recording, recording.t[part])
     steers = bool(np.any(recording.delta_r))
-    figure = style.new_figure(0.5 + 1.05 * len(signals), plain=not steers)
+    figure = new_figure(0.5 + 1.05 * len(signals), plain=not steers)
     panels = figure.subplots(len(signals), 1, sharex=True)
     panels[0].set_xlim(ends)
     for axes, (label, signal) in zip(panels, signals.items(), strict=True):
         values = signal[part]
-        axes.plot(t, values, color=style.BLUE, linewidth=0.9)
+        axes.plot(t, values, color=BLUE, linewidth=0.9)
         axes.set_ylabel(label)
         span = float(np.ptp(values))
         middle = float(values.min()) + span / 2
-        if span < 0.05 * abs(middle):  # a speed that is held shows as held
-            axes.set_ylim(middle - 0.05 * abs(middle), middle + 0.05 * abs(middle))
+        room = 0.05 * abs(middle)
+        if span < room:  # a speed that is held shows as held
+            axes.set_ylim(middle - room, middle + room)
     if steers:
         panels[1].lines[0].set_label(r"front $\delta_f$")
         rear = np.degrees(recording.delta_r[part])
-        panels[1].plot(t, rear, color=style.ORANGE, linewidth=0.9, label=r"rear $\delta_r$")
-        style.legend_beside(panels[1])
+        panels[1].plot(t, rear, color=ORANGE, linewidth=0.9, label=r"rear $\delta_r$")
+        legend_beside(panels[1])
         figure.align_ylabels()
-    style.label_time(panels[-1], recording.t)
+    label_time(panels[-1], recording.t)
     return figure
 
 
-@style.styled
+@styled
 def draw_diagnosis(
     recording: Recording, vehicle: Vehicle, repaired: Recording, car: Vehicle
 ) -> Figure:
     """Draw force over slip angle of both axles before and after a repair."""
-    figure, panels = style.axle_panels([2.9], sharex=False)
-    drawn = [("as logged", style.GREY, recording, vehicle)]
+    figure, panels = axle_panels([2.9], sharex=False)
+    drawn = [("as logged", GREY, recording, vehicle)]
     if repaired is not recording:
-        drawn.append(("repaired", style.BLUE, repaired, car))
+        drawn.append(("repaired", BLUE, repaired, car))
     for name, color, one, given in drawn:
         motion = Motion.of(one)
         if motion is None:
@@ -211,6 +235,6 @@ def draw_diagnosis(
             panel.plot(np.degrees(slip), force, ".", color=color, markersize=2.5, label=name)
     for panel in panels[0]:
         panel.set_xlabel("slip angle [deg]")
-        panel.axhline(0.0, color=style.GREY, linewidth=0.5)
+        panel.axhline(0.0, color=GREY, linewidth=0.5)
     panels[0, 0].set_ylabel("force from the motion [load]")
     return figure

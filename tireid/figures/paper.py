@@ -14,7 +14,26 @@ from identifier.run import History
 from identifier.setup import force_unit_name
 from identifier.stability.loop import Loop, eigenvalues, root_locus
 from identifier.stability.margins import gain_margin, phase_margin
-from tireid.figures import style
+from tireid.figures.style import (
+    AMBER,
+    BLACK,
+    BLUE,
+    GREEN,
+    GREY,
+    ONLINE,
+    ORANGE,
+    PURPLE,
+    SERIES,
+    drawable,
+    force_range,
+    label_time,
+    legend_above,
+    legend_beside,
+    mark_freeze,
+    new_figure,
+    paper_design,
+    styled,
+)
 from tireid.figures.thinned import drawn_of_run
 
 _WIDE = 20.0  # from this ratio between what is drawn on, the axis is logarithmic
@@ -23,7 +42,7 @@ _OFFSET = 0.2  # between neighboring laws, as a share of the distance of columns
 SCHEME = Path(__file__).with_name("fig1_scheme.png")  # Fig. 1, and as .svg beside it
 
 
-@style.styled
+@styled
 def error_figure(
     history: History,
     bounds: Mapping[str, float] | None = None,
@@ -44,7 +63,7 @@ def error_figure(
     typical, peak = (float(np.median(drawn)), float(drawn.max())) if drawn.size else (1.0, 1.0)
     top = max(peak, *known.values()) if known else peak
 
-    figure = style.new_figure(2.6)
+    figure = new_figure(2.6)
     axes = figure.subplots()
     axes.set_xlim(recording.t[0], recording.t[-1])
     if top > _WIDE * peak or peak > 100.0 * _WIDE * typical:
@@ -52,17 +71,17 @@ def error_figure(
         axes.set_ylim(typical / 30.0, 2.0 * top)
     else:
         axes.set_ylim(0.0, 1.08 * top)
-    look = {**style.ONLINE, "label": r"$|\tilde{\xi}|$ online"}
+    look = {**ONLINE, "label": r"$|\tilde{\xi}|$ online"}
     axes.plot(t, np.minimum(norm, 1e3 * top), **look)
-    looks = (style.PURPLE, "-"), (style.GREEN, "--"), (style.AMBER, "-.")
+    looks = (PURPLE, "-"), (GREEN, "--"), (AMBER, "-.")
     for (name, bound), (color, dashes) in zip(known.items(), cycle(looks), strict=False):
         axes.axhline(bound, color=color, linestyle=dashes, linewidth=1.1, label=name)
     for t_freeze in freeze_times:
-        style.mark_freeze(axes, t_freeze)
-    unit = force_unit_name(style.paper_design(history).force_unit)
+        mark_freeze(axes, t_freeze)
+    unit = force_unit_name(paper_design(history).force_unit)
     axes.set(ylabel=rf"error norm $|\tilde{{\xi}}|$ [{unit} s]")
-    style.label_time(axes, recording.t)
-    style.legend_above(figure, columns=4)
+    label_time(axes, recording.t)
+    legend_above(figure, columns=4)
     return figure
 
 
@@ -77,52 +96,52 @@ _SYMBOLS = {
 }
 
 
-@style.styled
+@styled
 def weights_figure(history: History, freeze_times: Sequence[float] = ()) -> Figure:
     """Draw every entry of W and V over time: W by axle, V by the input it weighs.
 
     freeze_times : times at which weights were taken [s].
     """
-    recording, design = history.recording, style.paper_design(history)
+    recording, design = history.recording, paper_design(history)
     t, (W, V) = drawn_of_run(history, lambda block: [block.before["W"], block.before["V"]])
 
-    figure = style.new_figure(4.2)
+    figure = new_figure(4.2)
     upper, lower = figure.subplots(2, 1, sharex=True)
     upper.set_xlim(recording.t[0], recording.t[-1])
-    _lines(upper, t, W[:, 0, :], style.GREEN, "front axle")
-    _lines(upper, t, W[:, 1, :], style.PURPLE, "rear axle")
+    _lines(upper, t, W[:, 0, :], GREEN, "front axle")
+    _lines(upper, t, W[:, 1, :], PURPLE, "rear axle")
     upper.set_ylabel(rf"weights $\hat{{W}}$ [{force_unit_name(design.force_unit)}]")
     for number, name in enumerate(design.network.inputs):
-        _lines(lower, t, V[:, :, number], style.SERIES[number % len(style.SERIES)], _SYMBOLS[name])
+        _lines(lower, t, V[:, :, number], SERIES[number % len(SERIES)], _SYMBOLS[name])
     lower.set(ylabel=r"weights $\hat{V}$ [-]")
-    style.label_time(lower, recording.t)
+    label_time(lower, recording.t)
     for axes, values in ((upper, W), (lower, V)):
         if history.diverged_at is not None:  # before the law runs away
             peak = np.abs(values).max(axis=(1, 2))
             values = values[peak <= 10.0 * np.median(peak[np.isfinite(peak)])]
-        axes.set_ylim(style.force_range(values))
+        axes.set_ylim(force_range(values))
         for t_freeze in freeze_times:
-            style.mark_freeze(axes, t_freeze)
-        style.legend_beside(axes)
+            mark_freeze(axes, t_freeze)
+        legend_beside(axes)
     figure.align_ylabels()
     return figure
 
 
 def _lines(axes: Axes, t: Array, values: Array, color: str, label: str) -> None:
     """Draw the columns of `values` (n, k) in one color under one label."""
-    drawn = style.drawable(values, style.force_range(values))
+    drawn = drawable(values, force_range(values))
     axes.plot(t, drawn, color=color, linewidth=0.7)[0].set_label(label)
 
 
 _Quartiles = tuple[float, float, float]  # median, lower and upper quartile
 _MARKS = {  # color, marker
-    "instantaneous": (style.ORANGE, "s"),
-    "integral": (style.BLUE, "o"),
-    "instantaneous_scaled": (style.GREEN, "D"),
+    "instantaneous": (ORANGE, "s"),
+    "integral": (BLUE, "o"),
+    "instantaneous_scaled": (GREEN, "D"),
 }
 
 
-@style.styled
+@styled
 def comparison_figure(
     results: Mapping[str, Mapping[str, _Quartiles]],
     paper: Mapping[str, Mapping[str, float]],
@@ -134,7 +153,7 @@ def comparison_figure(
     paper : by law, by column: the value that the paper prints [kN].
     """
     columns = list(dict.fromkeys(name for row in results.values() for name in row))
-    figure = style.new_figure(2.9)
+    figure = new_figure(2.9)
     axes = figure.subplots()
     order: list[str] = []
     for number, (law, row) in enumerate(results.items()):
@@ -180,14 +199,14 @@ def comparison_figure(
     axes.set(xlim=(-0.5, len(columns) - 0.5), ylabel="force RMSE [kN]")
     for boundary in range(1, len(columns)):
         axes.axvline(boundary - 0.5, color="#DDDDDD", linewidth=0.6)
-    style.legend_above(figure, columns=len(results), last=order)
+    legend_above(figure, columns=len(results), last=order)
     return figure
 
 
 _FACTORS = np.geomspace(1e-3, 1e3, 1500)  # on the loop gain, along the locus
 
 
-@style.styled
+@styled
 def locus_figure(loop: Loop, dt: float) -> Figure:
     """Draw the root locus of the sampled loop, with the design on it and the gain at its limit.
 
@@ -199,20 +218,18 @@ def locus_figure(loop: Loop, dt: float) -> Figure:
     design = 1.0 + eigenvalues(loop.matrix()) * dt
     margin = gain_margin(loop, dt)
     circle = np.exp(1j * np.linspace(-np.pi, np.pi, 2881))
-    figure = style.new_figure(3.5)
+    figure = new_figure(3.5)
     panels = figure.subplots(1, 2)
     span = 1.3 * float(np.abs(1.0 - design).max())
     views = (-1.1, 1.1, 1.1), (1.0 - 1.5 * span, 1.0 + 0.5 * span, span)
     for axes, (left, right, height) in zip(panels, views, strict=True):
-        axes.plot(
-            circle.real, circle.imag, linewidth=0.9, color=style.BLACK, label="stability limit"
-        )
-        axes.plot(locus.real, locus.imag, ".", color=style.GREY, markersize=1.0, label="any gain")
-        axes.plot(design.real, design.imag, "o", color=style.BLUE, markersize=4.5, label="design")
+        axes.plot(circle.real, circle.imag, linewidth=0.9, color=BLACK, label="stability limit")
+        axes.plot(locus.real, locus.imag, ".", color=GREY, markersize=1.0, label="any gain")
+        axes.plot(design.real, design.imag, "o", color=BLUE, markersize=4.5, label="design")
         if 0.0 < margin.factor < np.inf:
             edge = 1.0 + eigenvalues(loop.scaled(margin.factor).matrix()) * dt
             name = f"{margin.factor:.3g} times its gain"
-            axes.plot(edge.real, edge.imag, "x", color=style.ORANGE, markersize=5.5, label=name)
+            axes.plot(edge.real, edge.imag, "x", color=ORANGE, markersize=5.5, label=name)
         axes.set(xlim=(left, right), ylim=(-height, height), aspect="equal")
         axes.set_xlabel("real part of z [-]")
     panels[0].set_ylabel("imaginary part of z [-]")

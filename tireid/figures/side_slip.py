@@ -11,9 +11,24 @@ from matplotlib.figure import Figure
 from codegen.arrays import Array
 from identifier.compare.course import SIGMAS, SideSlip
 from models.recordings import Recording
-from tireid.figures import style
 from tireid.figures.compare import method_label, short_names
 from tireid.figures.drive import ARC
+from tireid.figures.style import (
+    AMBER,
+    BLUE,
+    GREEN,
+    GREY,
+    ONLINE,
+    ORANGE,
+    PURPLE,
+    SKY,
+    TRUTH,
+    Look,
+    label_time,
+    new_figure,
+    note,
+    styled,
+)
 from tireid.figures.thinned import drawn_samples, drawn_times
 
 if TYPE_CHECKING:
@@ -23,13 +38,13 @@ _MOST = 4  # recordings that are drawn
 _BEYOND = 1.6  # times what was recorded, or estimated first: an axis reaches no farther
 
 _FIRST = "inertial"  # which has the band where several estimate v_y
-_OTHERS = (style.ORANGE, style.GREEN, style.PURPLE, style.AMBER, style.SKY, style.GREY)
+_OTHERS = (ORANGE, GREEN, PURPLE, AMBER, SKY, GREY)
 _BAND = "within 2 standard deviations"
-_SHADE: style.Look = {"color": style.BLUE, "alpha": 0.2, "linewidth": 0.0}
-_ALONE: style.Look = {"color": style.GREY, "label": "inertial identifier alone"}
+_SHADE: Look = {"color": BLUE, "alpha": 0.2, "linewidth": 0.0}
+_ALONE: Look = {"color": GREY, "label": "inertial identifier alone"}
 
 
-@style.styled
+@styled
 def side_slip_figure(
     recordings: Sequence[Recording], given: Mapping[str, Mapping[str, SideSlip]]
 ) -> Figure:
@@ -39,14 +54,13 @@ def side_slip_figure(
     """
     drawn = list(recordings)[:_MOST]
     given = {name: by_name for name, by_name in given.items() if by_name}
-    has_band = {n: any(one.v_y_sd is not None for one in given[n].values()) for n in given}
-    first = max(given, key=lambda name: (name == _FIRST, has_band[name]))
-    looks: dict[str, dict[str, Any]] = {
-        first: {"color": style.BLUE, "zorder": 2.5}
-    }  # above the others
+    first = max(
+        given, key=lambda n: (n == _FIRST, any(one.v_y_sd is not None for one in given[n].values()))
+    )
+    looks: dict[str, dict[str, Any]] = {first: {"color": BLUE, "zorder": 2.5}}  # above the others
     others = [name for name in given if name != first]
     looks |= {n: {"color": color} for n, color in zip(others, cycle(_OTHERS), strict=False)}
-    figure = style.new_figure(0.7 + 1.5 * len(drawn))
+    figure = new_figure(0.7 + 1.5 * len(drawn))
     panels = figure.subplots(len(drawn), 1, squeeze=False)[:, 0]
     names = short_names([recording.name for recording in recordings])
     for axes, recording in zip(panels, drawn, strict=True):
@@ -60,7 +74,7 @@ def _draw(
     axes: Axes,
     recording: Recording,
     given: Mapping[str, SideSlip],
-    looks: Mapping[str, style.Look],
+    looks: Mapping[str, Look],
 ) -> None:
     """Draw the side slip of a recording, with the band of the first estimate."""
     truth, first = recording.logged_v_y, next(iter(given.values()))
@@ -79,29 +93,29 @@ def _draw(
         low, high = (slip(end).clip(-limit, limit) for end in (first.v_y - room, first.v_y + room))
         axes.fill_between(t, low, high, label=_BAND, **_SHADE)
     if truth is not None:
-        axes.plot(t, main, **{**style.TRUTH, "label": "recorded"})
+        axes.plot(t, main, **{**TRUTH, "label": "recorded"})
     for name, one in given.items():
         drawn = slip(one.v_y).clip(-limit, limit)
         axes.plot(t, drawn, linewidth=0.9, label=method_label(name), **looks[name])
     axes.set(xlim=ends, ylim=(-limit, limit), ylabel="side slip [deg]")
     if first.rms is not None:
-        style.note(axes, f"RMSE {first.rms:.2g} deg")
-    style.label_time(axes, recording.t)
+        note(axes, f"RMSE {first.rms:.2g} deg")
+    label_time(axes, recording.t)
 
 
-@style.styled
+@styled
 def drive_lateral_figure(drive: "Drive") -> Figure:
     """Draw the estimated v_y over the true one, and its error, each with the band of two sigma."""
     v_y, band = drive.estimates["v_y"], SIGMAS * drive.estimates["v_y_sd"]
-    figure = style.new_figure(3.6)
+    figure = new_figure(3.6)
     panels = figure.subplots(2, 1, sharex=True)
     for axes, scale, zero in zip(
         panels, (1.0, 1e3), (np.zeros_like(v_y), drive.v_y), strict=True
     ):  # m/s, mm/s
         for curve, look in (
             (drive.estimates["inertial_v_y"], _ALONE),
-            (drive.v_y, style.TRUTH),
-            (v_y, {**style.ONLINE, "label": "estimate"}),
+            (drive.v_y, TRUTH),
+            (v_y, {**ONLINE, "label": "estimate"}),
         ):
             axes.plot(drive.s, scale * (curve - zero), **look)
         ends = scale * (v_y - band - zero), scale * (v_y + band - zero)

@@ -25,7 +25,7 @@ from PIL import Image
 from codegen.arrays import Array
 from codegen.writing import write_file
 from identifier.paper.design import PaperIdentifier
-from identifier.reproducibility import AxleRmse, freeze_key
+from identifier.reproducibility import AxleRmse
 from identifier.run import History
 
 PAGE = 7.16  # width of both columns of a paper [in]
@@ -206,7 +206,7 @@ AXLES = ("Front axle", "Rear axle")
 _FREEZE, _PREDICTION = "freeze", "after the freeze (prediction)"
 
 
-def _clock_zero(t: Array) -> float:
+def clock_zero(t: Array) -> float:
     """Return what figures take off the times of a recording [s]; 0 where they are as short as is.
 
     t : times of the samples (n,) [s].
@@ -215,20 +215,12 @@ def _clock_zero(t: Array) -> float:
     return 0.0 if abs(first) < FAR else CLOCK_STEP * float(np.floor(first / CLOCK_STEP))
 
 
-def frozen_title(t: Array, t_freeze: float) -> str:
-    """Return what a title calls a freeze, in the clock of the axis below it.
-
-    t : times of the samples (n,) [s].   t_freeze : time of the freeze [s].
-    """
-    return f"frozen at {freeze_key(round(t_freeze - _clock_zero(t), 6))} s"
-
-
 def label_time(axes: Axes, t: Array) -> None:
     """Name the time axis of a panel, and number it from the zero that it names.
 
     t : times of the samples (n,) [s].
     """
-    zero = _clock_zero(t)
+    zero = clock_zero(t)
     axes.set_xlabel(TIME if zero == 0.0 else f"time since {zero:.0f} s [s]")
     if zero != 0.0:
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value - zero:g}"))
@@ -322,15 +314,13 @@ class ForceUnit(NamedTuple):
         return f"{digits} {self.name}" if np.isfinite(value) else "not finite"
 
 
-_KILONEWTON, _NEWTON = ForceUnit("kN", 1000.0), ForceUnit("N", 1.0)
-
-
 def force_unit_of(force: Array) -> ForceUnit:
     """Return kN where a force reaches 1 kN, else N.
 
     force : any shape [N]; what is not finite does not count.
     """
-    return _KILONEWTON if np.abs(force[np.isfinite(force)]).max(initial=0.0) >= 1000.0 else _NEWTON
+    large = np.abs(force[np.isfinite(force)]).max(initial=0.0) >= 1000.0
+    return ForceUnit("kN", 1000.0) if large else ForceUnit("N", 1.0)
 
 
 def paper_design(history: History) -> PaperIdentifier:

@@ -14,8 +14,28 @@ from identifier.run import History
 from identifier.tire_model import TireModel
 from models.bicycle import measured_slip
 from models.recordings import Recording
-from tireid.figures import style
 from tireid.figures.drive import tire_look
+from tireid.figures.style import (
+    AXLES,
+    BLACK,
+    BLUE,
+    GREEN,
+    LINEAR,
+    ORANGE,
+    PURPLE,
+    SKY,
+    Look,
+    axle_panels,
+    drawable,
+    force_range,
+    force_unit_of,
+    label_forces,
+    label_time,
+    legend_above,
+    mark_freeze,
+    new_figure,
+    styled,
+)
 from tireid.figures.thinned import cloud, drawn_of_run
 
 if TYPE_CHECKING:
@@ -23,7 +43,7 @@ if TYPE_CHECKING:
 
 _UNKNOWN = "slip not known"
 _BAND = "band of 90 %"
-_CLOUD: style.Look = {
+_CLOUD: Look = {
     "linestyle": "",
     "marker": ".",
     "markersize": 2.2,
@@ -32,7 +52,7 @@ _CLOUD: style.Look = {
 }
 
 
-@style.styled
+@styled
 def slip_figure(model: TireModel, recording: Recording, online: History | None = None) -> Figure:
     """Draw force over slip angle, front and rear: truth, frozen model and linear tire.
 
@@ -42,9 +62,9 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     if not (recording.v_x >= model.min_speed).any():
         raise ValueError(f"{recording.name}: v_x never reaches {model.min_speed:g} m/s")
     vehicle, force = model.vehicle, model.predict(recording)
-    known, color, label = recording.axle_force, style.BLACK, "truth"
+    known, color, label = recording.axle_force, BLACK, "truth"
     if known is None and online is not None:
-        known, color, label = online.axle_force, style.BLUE, "online"
+        known, color, label = online.axle_force, BLUE, "online"
     against = force if known is None else known
 
     slip = recording.alpha(vehicle.l_f, vehicle.l_r)
@@ -52,24 +72,24 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
     part = cloud(recording.t, *signals)
     part = part[recording.v_x[part] >= model.min_speed]
     alpha, frozen, reference = np.rad2deg(slip[part]), force[part], against[part]
-    unit = style.force_unit_of(reference)
+    unit = force_unit_of(reference)
     frozen, reference = frozen / unit.newtons, reference / unit.newtons
-    limits = style.force_range(reference, frozen)
+    limits = force_range(reference, frozen)
     stiffness = vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear
 
-    learnt: style.Look = {**_CLOUD, "color": style.ORANGE, "label": "frozen weights"}
-    figure, panels = style.axle_panels([3.2] if known is None else [3.2, 1.3], sharex="col")
+    learnt: Look = {**_CLOUD, "color": ORANGE, "label": "frozen weights"}
+    figure, panels = axle_panels([3.2] if known is None else [3.2, 1.3], sharex="col")
     for axle, (axes, lowest) in enumerate(zip(panels[0], panels[-1], strict=True)):
         x, y, truth = alpha[:, axle], frozen[:, axle], reference[:, axle]
         if known is not None:
             look = {**_CLOUD, "color": color, "label": label, "markersize": 3.0, "alpha": 0.35}
-            axes.plot(x, style.drawable(truth, limits), **look)
+            axes.plot(x, drawable(truth, limits), **look)
             lowest.axhline(0.0, color=color, linewidth=0.6)
             lowest.plot(x, np.clip(y - truth, *limits), **learnt)
-        axes.plot(x, style.drawable(y, limits), **learnt)
+        axes.plot(x, drawable(y, limits), **learnt)
         margin = 0.04 * float(np.ptp(x)) or 1.0
         ends = np.array([x.min() - margin, x.max() + margin])
-        axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **style.LINEAR)
+        axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **LINEAR)
         if model.known_slip is not None:
             _draw_curve(axes, model, axle, ends, unit.newtons)
             edge, look = float(np.rad2deg(model.known_slip[axle])), {"lw": 0.0, "zorder": 0}
@@ -78,8 +98,8 @@ def slip_figure(model: TireModel, recording: Recording, online: History | None =
                     panel.axvspan(low, high, color="#EFE9DD", label=_UNKNOWN, **look)
         axes.set(xlim=ends, ylim=limits)
         _label_slip(lowest)
-    style.label_forces(panels, unit, residual=known is not None)
-    style.legend_above(figure, last=(_UNKNOWN,))
+    label_forces(panels, unit, residual=known is not None)
+    legend_above(figure, last=(_UNKNOWN,))
     return figure
 
 
@@ -98,16 +118,16 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
             degrees,
             low,
             high,
-            facecolor=(style.SKY, 0.6),
+            facecolor=(SKY, 0.6),
             label=_BAND,
-            edgecolor=style.BLUE,
+            edgecolor=BLUE,
             linewidth=0.4,
             zorder=1.5,
         )
     axes.plot(
         degrees,
         model.force(slip)[:, axle] / newtons,
-        color=style.BLUE,
+        color=BLUE,
         linewidth=1.2,
         zorder=4,
         label=f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}",
@@ -137,10 +157,10 @@ def axle_slip(drive: "Drive") -> Array:
 _REACH = 1.25  # curves go on this far beyond the slip of the drive
 
 
-@style.styled
+@styled
 def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
     """Draw the forces of a drive as a cloud, and the curves that trackers believed."""
-    unit = style.force_unit_of(drive.axle_force)
+    unit = force_unit_of(drive.axle_force)
     alpha, force = np.rad2deg(axle_slip(drive)), drive.axle_force / unit.newtons
     reach = _REACH * float(np.abs(alpha).max())
     near = [
@@ -148,21 +168,21 @@ def drive_tires_figure(drive: "Drive", curves: Sequence[TireCurve]) -> Figure:
         for curve in curves
         if not curve.label.startswith("linear")
     ]
-    limits = style.force_range(force, *near)
+    limits = force_range(force, *near)
     cloud = {**_CLOUD, "markersize": 3.0, "alpha": 0.6, "label": "this drive, true forces"}
-    figure, panels = style.axle_panels([3.3])
+    figure, panels = axle_panels([3.3])
     for axle, axes in enumerate(panels[0]):
-        axes.plot(alpha[:, axle], force[:, axle], color=style.SKY, **cloud)
+        axes.plot(alpha[:, axle], force[:, axle], color=SKY, **cloud)
         for curve in curves:
-            drawn = style.drawable(curve.force[:, axle] / unit.newtons, limits)
+            drawn = drawable(curve.force[:, axle] / unit.newtons, limits)
             axes.plot(np.rad2deg(curve.alpha), drawn, label=curve.label, **tire_look(curve.label))
         axes.set(xlim=(-reach, reach), ylim=limits)
         _label_slip(axes)
-    style.label_forces(panels, unit, residual=False)
+    label_forces(panels, unit, residual=False)
     return figure
 
 
-@style.styled
+@styled
 def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) -> Figure:
     """Draw what was learnt of both axles over time.
 
@@ -175,17 +195,15 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     if not tracks:
         raise TypeError(f"{history.method} has no estimates of the axles")
     at, curves = drawn_of_run(history, lambda block: [o.values for o in history.tracks_over(block)])
-    figure = style.new_figure(4.4)
+    figure = new_figure(4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
         label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values
-        for axle, color in enumerate((style.GREEN, style.PURPLE)):
-            axes.plot(
-                at, values[:, axle], linewidth=1.0, color=color, label=style.AXLES[axle].lower()
-            )
+        for axle, color in enumerate((GREEN, PURPLE)):
+            axes.plot(at, values[:, axle], linewidth=1.0, color=color, label=AXLES[axle].lower())
         axes.set(ylabel=label, xlim=(t[0], t[-1]))
         axes.set_ylim(0.0, 1.1 * float(values.max()) or 1.0)
         for freeze in freeze_times:
-            style.mark_freeze(axes, freeze)
-    style.label_time(panels[-1], t)
+            mark_freeze(axes, freeze)
+    label_time(panels[-1], t)
     return figure

@@ -255,8 +255,7 @@ class LearnLog:
 
 
 def _failed(row: LogRow, error: Exception) -> LogRow:
-    text = " ".join(str(error).split()) or type(error).__name__
-    return replace(row, error=text[:500])
+    return replace(row, error=(" ".join(str(error).split()) or type(error).__name__)[:500])
 
 
 def learn_recording(row: LogRow, recording: Recording, vehicle: Vehicle) -> LogRow:

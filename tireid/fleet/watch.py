@@ -19,7 +19,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import chdtrc
 
 from codegen.arrays import Array
 from identifier.estimate.information import PLACE, SIZE, Information, coordinates
@@ -80,6 +79,8 @@ def watch(
         raise ValueError(
             f"baseline must be positive and alarm between 0 and 1, not {baseline:g} and {alarm:g}"
         )
+    from scipy.special import chdtrc  # which the other tasks do without
+
     beliefs: dict[str, Priors] = {}
     driven: dict[str, dict[str, Information]] = {}
     for key, row in grouped(rows, by):

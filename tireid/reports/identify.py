@@ -21,11 +21,25 @@ from identifier.verdict import Verdict
 from identifier.verdict.verdict import PERCENT
 from models.files import digest
 from models.recordings import Recording
-from tireid import report as page
 from tireid import verdicts
 from tireid.diagnoses import diagnosis_section, diagnosis_warnings
 from tireid.identified import Results
-from tireid.reports.common import READ, drawings, origin
+from tireid.report import (
+    READ,
+    Block,
+    Cell,
+    Headline,
+    Images,
+    Marked,
+    Picture,
+    Report,
+    Section,
+    Table,
+    Tone,
+    drawings,
+    origin,
+    write_report,
+)
 
 _EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
 
@@ -33,7 +47,7 @@ _EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth
 def write_identify_report(
     folder: Path,
     found: Results,
-    figures: page.Images,
+    figures: Images,
     diagnosis: Diagnosis,
     command: str,
 ) -> None:
@@ -46,7 +60,7 @@ def write_identify_report(
         *verdicts.number_headlines(verdict),
         *identify_headlines(found),
     ]
-    report = page.Report(
+    report = Report(
         title=f"Tires of {learnt.vehicle.name}, identified on {learnt.recording.name}",
         summary=_how_learnt(learnt),
         numbers=[
@@ -61,13 +75,13 @@ def write_identify_report(
         ],
         sections=[
             verdicts.verdict_section(verdict),
-            page.Section("Identified tires", learnt_blocks(found.method, model, figures)),
+            Section("Identified tires", learnt_blocks(found.method, model, figures)),
             *verdicts.sensors_section(model, found.drives),
-            page.Section(
+            Section(
                 "How well it predicts",
                 [*_evaluated(evaluated), *_errors(found, figures)],
             ),
-            page.Section(
+            Section(
                 "What went in",
                 drawings(figures, {"inputs": f"Signals of {learnt.recording.name}."}),
             ),
@@ -80,7 +94,7 @@ def write_identify_report(
             ),
         ],
     )
-    page.write_report(folder, report)
+    write_report(folder, report)
 
 
 def _how_learnt(learnt: History) -> str:
@@ -109,7 +123,7 @@ def side_slip_text(learnt: History) -> str:
     )
 
 
-def identify_headlines(found: Results) -> list[page.Headline]:
+def identify_headlines(found: Results) -> list[Headline]:
     """Return the errors of a frozen model, other drives first, and up to which slip it knows."""
     numbers, runs = [], found.runs
     for kind, some in (("of validation", runs[1:]), ("of identification", runs[:1])):
@@ -120,11 +134,11 @@ def identify_headlines(found: Results) -> list[page.Headline]:
                 shares.append(error.both / size.both)
         if shares:
             meaning = f"of the rms force: error on drives {kind}, frozen"
-            numbers.append(page.Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
+            numbers.append(Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
     return [*numbers, *verdicts.known_headline(found.model)]
 
 
-def _evaluated_headlines(evaluated: verdicts.Verdicts) -> list[page.Headline]:
+def _evaluated_headlines(evaluated: verdicts.Verdicts) -> list[Headline]:
     """Return on how many validation drives a model is valid, and its error."""
     meaning = "replayed validation drives with a valid prediction"
     numbers = verdicts.verdicts_headline(evaluated, meaning)
@@ -132,11 +146,11 @@ def _evaluated_headlines(evaluated: verdicts.Verdicts) -> list[page.Headline]:
     if shares:
         front, rear = (f"{PERCENT * share:.1f}" for share in np.mean(shares, axis=0))
         meaning = "error over the force in the motion of these drives, front / rear"
-        numbers.append(page.Headline(f"{front} / {rear} %", meaning))
+        numbers.append(Headline(f"{front} / {rear} %", meaning))
     return numbers
 
 
-def curve_drawing(figures: page.Images, verdict: Verdict) -> page.Picture:
+def curve_drawing(figures: Images, verdict: Verdict) -> Picture:
     """Return the learnt curve with its band, the first figure of a report."""
     word = "" if verdict.valid else f"{verdict.word[0].upper()}{verdict.word[1:]}. "
     caption = f"{word}Axle force over slip angle: drive, curve and its band."
@@ -173,16 +187,16 @@ def extrapolated(model: TireModel, recording: Recording) -> list[str]:
     ]
 
 
-def learnt_blocks(law: str, model: TireModel, figures: page.Images) -> list[page.Block]:
+def learnt_blocks(law: str, model: TireModel, figures: Images) -> list[Block]:
     facts = [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
-    blocks: list[page.Block] = [
+    blocks: list[Block] = [
         (
             "Slip has the sign of the paper, so that curves rise: positive slip pushes to the "
             "left. curve.csv has the curve with its uncertainty, weights.json the model."
         )
     ]
     if facts:
-        blocks.append(page.Table(f"Parameters of the tires, {law}.", ["", *AXLES], facts))
+        blocks.append(Table(f"Parameters of the tires, {law}.", ["", *AXLES], facts))
     if band := band_sentence(model):
         blocks.append(band)
     captions = {
@@ -208,25 +222,25 @@ def band_sentence(model: TireModel) -> str:
     )
 
 
-def _evaluated(evaluated: verdicts.Verdicts) -> list[page.Block]:
-    rows: list[list[page.Cell]] = []
+def _evaluated(evaluated: verdicts.Verdicts) -> list[Block]:
+    rows: list[list[Cell]] = []
     for name, verdict in evaluated.items():
         errors = verdict.model_error or (None, None)
         shares = [None if one is None else with_doubt(PERCENT * one) for one in errors]
-        tone: page.Tone = "" if verdict.valid else "bad" if verdict.judged else "doubt"
-        rows.append([name, page.Marked(verdict.word, tone), *shares])
+        tone: Tone = "" if verdict.valid else "bad" if verdict.judged else "doubt"
+        rows.append([name, Marked(verdict.word, tone), *shares])
     if not rows:
         return []
     caption = (
         "The verdict on each replayed drive, as of tireid predict, and the error over the force "
         "in the motion."
     )
-    return [page.Table(caption, ["drive", "verdict", "front [%]", "rear [%]"], rows)]
+    return [Table(caption, ["drive", "verdict", "front [%]", "rear [%]"], rows)]
 
 
-def _errors(found: Results, figures: page.Images) -> list[page.Block]:
+def _errors(found: Results, figures: Images) -> list[Block]:
     learnt, *others = found.runs
-    rows, online = list[list[page.Cell]](), learnt.online
+    rows, online = list[list[Cell]](), learnt.online
     for run in (learnt, *found.parts, *others):
         name, size = run.recording.name, force_rms(run)
         if online:
@@ -234,30 +248,30 @@ def _errors(found: Results, figures: page.Images) -> list[page.Block]:
         for key, replays in found.frozen.items():
             error = replays[name].against_truth or replays[name].against_online
             rows.append([f"{name}, frozen, {key} s", *error_numbers(error, size)])
-    blocks: list[page.Block] = [
+    blocks: list[Block] = [
         error_table(rows, "; without one it is against what was identified online" * online)
     ]
     if "forces" in figures:
         caption = f"Axle forces over time: {'online, and ' * online}replayed with frozen weights."
         read = READ["forces" if online else "replay"]
-        blocks.append(page.Picture(figures["forces"], caption, read))
+        blocks.append(Picture(figures["forces"], caption, read))
     for name, image in figures.items():
         if name.startswith("replay_"):
             caption = f"The frozen model on {name.removeprefix('replay_')}."
-            blocks.append(page.Picture(image, caption, READ["replay"]))
+            blocks.append(Picture(image, caption, READ["replay"]))
     return blocks
 
 
-def error_table(rows: Sequence[Sequence[page.Cell]], more: str = "") -> page.Table:
+def error_table(rows: Sequence[Sequence[Cell]], more: str = "") -> Table:
     """Return a table of errors, of rows of a name and `error_numbers`."""
-    return page.Table(
+    return Table(
         f"RMSE of the axle force, and its share of the rms force where there is a truth{more}.",
         ["drive", "front [N]", "share", "rear [N]", "share"],
         rows,
     )
 
 
-def error_numbers(error: AxleRmse | None, size: AxleRmse | None) -> list[page.Cell]:
+def error_numbers(error: AxleRmse | None, size: AxleRmse | None) -> list[Cell]:
     """Return front and rear error, each with its share of the rms force where it is known."""
     if error is None:
         return [None] * 4
