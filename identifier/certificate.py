@@ -123,10 +123,12 @@ def at_least(value: float, *, good: float, bad: float | None) -> Status:
     return "warn" if bad is None or value >= bad else "fail"
 
 
-def statement(name: str, title: str, value: float, unit: str, advice: str = "") -> Property:
-    """Return a property that is only stated: it has no limit and passes."""
+def statement(
+    name: str, title: str, value: float, unit: str, advice: str = "", status: Status = "pass"
+) -> Property:
+    """Return a property that is only stated: it has no limit."""
     return Property(
-        name=name, title=title, value=value, limit=None, margin=None, status="pass", unit=unit,
+        name=name, title=title, value=value, limit=None, margin=None, status=status, unit=unit,
         advice=advice,
     )  # fmt: skip
 

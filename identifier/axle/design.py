@@ -166,7 +166,9 @@ class AxleIdentifier(Method):
             )
             sensors = stored.sensors
             if stored is not start:  # of another form: units can be what no curve of it could
-                P = _within_prior(P, prior_P, n)
+                weights = np.linalg.inv(P[:, :n, :n]) + np.linalg.inv(prior_P[:, :n, :n])
+                P = P.copy()
+                P[:, :n, n:], P[:, n:, :n], P[:, :n, :n] = 0.0, 0.0, np.linalg.inv(weights)
         widest = per_variance(prior_P, n, self.regression.widest)
         W, beside = self._within_bounds(W, beside, P)
         scan = self._scan(vehicle)
@@ -335,14 +337,6 @@ def curve_tracks(
         Track("relaxation length", "m", lag),
         Track("force at saturation", "static load", W.sum(axis=2)),
     )
-
-
-def _within_prior(P: Array, prior: Array, n: int) -> Array:
-    """Return covariances (2, q, q) whose weights are also believed as before any drive."""
-    found = np.zeros_like(P)
-    found[:, n:, n:] = P[:, n:, n:]
-    found[:, :n, :n] = np.linalg.inv(np.linalg.inv(P[:, :n, :n]) + np.linalg.inv(prior[:, :n, :n]))
-    return found
 
 
 @cache

@@ -176,7 +176,11 @@ def _element(tag: str, attributes: Mapping[str, object], *children: Element) -> 
     """Return an element; attributes that are empty strings are left out.
     attributes : by name; True and False become true and false.
     """
-    words = {name: _text(value) for name, value in attributes.items() if value != ""}
+    words = {
+        name: str(value).lower() if isinstance(value, bool) else visible(str(value))
+        for name, value in attributes.items()
+        if value != ""
+    }
     made = Element(tag, words)
     made.extend(children)
     return made
@@ -186,10 +190,6 @@ def _document(root: Element) -> str:
     """Return a whole XML file, indented."""
     indent(root)
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, encoding="unicode")}\n'
-
-
-def _text(value: object) -> str:
-    return str(value).lower() if isinstance(value, bool) else visible(str(value))
 
 
 # modelDescription.xml of FMI 2.0 and 3.0, and the list of sources for whoever builds it again.

@@ -243,14 +243,14 @@ def _stated(proven: Proven) -> list[Property]:
         ]
     else:
         advice = "lower eta_W until theta is below 1 and give W a leakage"
-        none = statement("error_bound", f"{error}: there is none", math.inf, "U s", advice)
-        entries.append(replace(none, status="warn"))
+        title = f"{error}: there is none"
+        entries.append(statement("error_bound", title, math.inf, "U s", advice, "warn"))
     if math.isfinite(proven.V):
         entries.append(statement("V_bound", "proven bound of |V|", proven.V, "-", _CONDITION))
     else:
         advice = "give V a leakage below that of one sample"
-        none = statement("V_bound", "proven bound of |V|: there is none", math.inf, "-", advice)
-        entries.append(replace(none, status="warn"))
+        title = "proven bound of |V|: there is none"
+        entries.append(statement("V_bound", title, math.inf, "-", advice, "warn"))
     return entries
 
 

@@ -208,8 +208,7 @@ class MagicFormula:
     @classmethod
     def from_tir(cls, path: str | PathLike[str]) -> Self:
         """Read a tire property file (PAC2002 or MF-Tyre 5.0 to 5.2).   path : the `.tir` file."""
-        c, side, valid_range, name = read_magic_formula(path)
-        return cls(coefficients=c, side=side, valid_range=valid_range, name=name)
+        return cls(**read_magic_formula(path)._asdict())
 
     def forces(
         self,
