@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from identifier.frozen import VEHICLE_KEYS
-from identifier.tire_model import TireModel
+from identifier.tire_model import TireModel, stored_verdict
 from models.faults import KINDS, SIZED, FaultError, SensorFault
 from models.rules import require_within
 from models.schema import require_few
@@ -35,6 +35,7 @@ CONFIRM = (
     "earn the speed: begin at 45 %% of what the tires allow, and go on as the car holds it and "
     "nothing says that the friction is another"
 )
+_TELL = "no speed follows, tell one: --speed 0.4g, --speed 15m/s"
 _EPILOG = (
     "Without --weights, frozen tires are identified first: the same car drives on "
     f"an open field for {DURATION:g} s, steered at random and ever harder until its "
@@ -282,6 +283,8 @@ def frozen_tires(
         return "no tires were identified", None
     if stored is not None:
         require_its_car(options, stored.vehicle, setup.vehicle)
+        if setup.wish.share is not None and stored_verdict(options.weights) is False:
+            raise ValueError(f"{options.weights} was not valid when it was learnt: {_TELL}")
         return f"frozen ones from {options.weights}", stored
     law, method = shared.chosen_method(options, setup.vehicle)
     recording = learning_drive(
@@ -293,6 +296,8 @@ def frozen_tires(
     )
     run = identify(recording, setup.vehicle, method, check=False)
     warn_of(run.verdict, f"the identification drive of {law}")
+    if setup.wish.share is not None and not run.verdict.valid:
+        raise ValueError(f"the tires are not valid: {_TELL}")
     assert recording.a_y is not None
     banded = conditions.caution > 0.0 or setup.wish.share is not None
     return (

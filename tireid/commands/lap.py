@@ -94,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
     share = _number(options, "share", SHARES, BARE)
     brakes = _number(options, "brakes", ACCELERATIONS, BARE)
     v_max = _number(options, "v_max", SPEEDS)
-    table = Path(options.engine).is_file()
+    table = "." in options.engine and math.isnan(quantity(options.engine, ACCELERATIONS, BARE)[0])
     engine = _engine(options.engine) if table else _number(options, "engine", ACCELERATIONS, BARE)
     planned = {"v_max": v_max, "engine": engine, "brakes": brakes}
     require_within(ValueError, 0.05, 1.0, **{"--share": share})
@@ -116,7 +116,9 @@ def run(options: argparse.Namespace) -> int:
         for word in ("confirm", "mu", "seed"):
             if getattr(options, word) is not None:
                 raise ValueError(f"--{word} is of a car that drives: add --laps 1")
-    elif not path.closed or n < 1.0 or n % 1.0:
+    elif n < 1.0 or n % 1.0:
+        raise ValueError(f"--laps must be a whole number, 1 or more, it is {n:g}")
+    elif not path.closed:
         raise ValueError(f"--laps N drives a closed path N times: leave it out for {path.name}")
     elif vehicle.chassis is None:
         raise ValueError("--laps drives a car with a chassis: add --vehicle FILE, with [chassis]")
