@@ -75,7 +75,8 @@ def _write(stream: TextIO | None, text: str) -> None:
         if text:
             from codegen.escape import terminal  # all of codegen: silence does not need it
 
-            stream.write(terminal(text))
+            text = terminal(text)
+        stream.write(text)
         stream.flush()
     except OSError:
         with suppress(OSError, ValueError):  # ValueError: it has no file behind it

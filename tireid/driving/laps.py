@@ -67,9 +67,9 @@ def drive_laps(
 
     A lap that speaks against its tires teaches nothing.
 
-    planned : engine, brakes and v_max, as of `speed_profile`.   driven : as of `drive`.
+    planned : engine, brakes and v_max, as of `speed_profile`.
     road : friction that the first lap is planned for, over that of the identified tires.
-    confidence : as of `speed_limits`.
+    confidence : as of `speed_limits`.   driven : as of `drive`.
     """
     limits = first_limits(tire, confidence).scaled(road)
     for number in range(laps):
@@ -86,5 +86,6 @@ def drive_laps(
         share = min(_MOST, _GROWS * share) if seen <= _NEAR else _SHRINKS * share
         if learnt.verdict.valid:
             tire = learnt.tire
-            most = _LIMITS_GROW * float(limits.a_y[0])
-            limits = speed_limits(tire, confidence=confidence).at_most(most)
+            limits = speed_limits(tire, confidence=confidence).at_most(
+                _LIMITS_GROW * float(limits.a_y[0])
+            )
