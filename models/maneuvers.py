@@ -54,6 +54,10 @@ def _check(maneuver: Any, *, steepest: float) -> None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Steered:
+    """What every maneuver has.
+    duration : length [s].
+    """
+
     rate_limit: float
     duration: float
     rear_ratio: float = 0.0
@@ -64,6 +68,11 @@ class _Steered:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Swung(_Steered):
+    """What every maneuver of sines has.
+    amplitude : largest angle, that of a sine [rad].   frequency : of a sine, or of the fastest
+        swing [Hz].
+    """
+
     amplitude: float
     frequency: float
     onset: float
@@ -91,9 +100,7 @@ class StepSteer(_Steered):
 
 
 class Slalom(_Swung):
-    """A sine from onset to the end.
-    amplitude : of the sine [rad].   frequency : of the sine [Hz].
-    """
+    """A sine of `amplitude` [rad] and `frequency` [Hz], from onset to the end."""
 
     __slots__ = ()
 
@@ -105,7 +112,7 @@ class Slalom(_Swung):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DoubleLaneChange(_Swung):
     """One sine to the next lane, a pause, and the opposite sine back: steered, not path-tracked.
-    amplitude : of both sines [rad].   frequency : of both sines [Hz].
+    `amplitude` [rad] and `frequency` [Hz] are those of both sines.
     pause : time straight ahead between them [s].
     """
 
@@ -126,7 +133,6 @@ class RandomSteer(_Swung):
     The angles are drawn from `numpy.random.default_rng(seed)`, uniform in +-amplitude and one every
     half period, so that the steepest path between two is that of a sine of `frequency`. The same
     seed is the same maneuver, at any sampling.
-    amplitude : largest angle [rad].   frequency : of the fastest swing [Hz].
     """
 
     seed: int
@@ -144,9 +150,10 @@ class RandomSteer(_Swung):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SampledSteer(_Steered):
     """Given angles at given times, joined by straight lines, as a planned maneuver is.
+
+    After the last time, up to the duration, the last angle is held.
     times : of the angles [s], rising, (k,); straight ahead before the first.
     angles : of the front wheels [rad], (k,), the first zero.
-    duration : length [s]; after the last time the last angle is held.
     """
 
     times: tuple[float, ...]

@@ -104,8 +104,8 @@ class Slips(NamedTuple):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConstantStiffness(Positive):
     """A tire with stiffnesses that do not depend on load.
-    C_alpha : cornering stiffness of one tire [N/rad].
-    C_kappa : longitudinal slip stiffness of one tire [N].
+    C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
+    C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
     """
 
     C_alpha: float
@@ -123,7 +123,7 @@ class ConstantStiffness(Positive):
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BrushTire(ConstantStiffness):
     """A tire of constant stiffness whose force points along the demand of its tread.
-    friction : friction coefficient of the tire as measured [-].
+    friction : friction coefficient of the tire as measured [-], > 0.
     """
 
     friction: float

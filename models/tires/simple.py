@@ -16,8 +16,7 @@ class LinearTire(ConstantStiffness):
     """F_x = C_κ κ, F_y = C_α α while the wheel touches the ground.
 
     Load only decides about contact; friction and camber do nothing: no limit, by definition.
-    C_alpha : cornering stiffness of one tire [N/rad], > 0.
-    C_kappa : longitudinal slip stiffness of one tire [N], > 0.
+    Stiffnesses are those of `ConstantStiffness`.
     """
 
     __slots__ = ()
@@ -49,9 +48,8 @@ class LinearTire(ConstantStiffness):
 
 class FialaTire(BrushTire):
     """Brush tire: |F| <= μ F_z exactly, smooth into full sliding; camber does nothing.
-    C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
-    C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
-    friction : friction coefficient of the tire as measured [-], > 0.
+
+    Stiffnesses and friction are those of `BrushTire`.
     """
 
     __slots__ = ()
@@ -73,9 +71,8 @@ class FialaTire(BrushTire):
 
 class DugoffTire(BrushTire):
     """Friction-limited linear tire: |F| < μ F_z, reached only in the limit; camber does nothing.
-    C_alpha : cornering stiffness of one tire [N/rad], > 0, at every load.
-    C_kappa : longitudinal slip stiffness of one tire [N], > 0, at every load.
-    friction : friction coefficient of the tire as measured [-], > 0.
+
+    Stiffnesses and friction are those of `BrushTire`.
     """
 
     __slots__ = ()
