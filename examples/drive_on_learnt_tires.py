@@ -23,7 +23,7 @@ from mpc.path import SpeedProfile, iso_3888_2, speed_profile
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
 from tireid.figures.drive import drive_errors_figure
-from tireid.figures.style import save_figure
+from tireid.figures.style import save_figures
 
 EXPECTED_BELOW = 0.5
 SHARE = 0.9  # of what the learnt tires allow
@@ -69,7 +69,7 @@ def main() -> float:
         rms[name] = float(np.sqrt(np.mean(driven.e_y**2)))
         print(f"{name}: rms deviation {100 * rms[name]:.1f} cm, {driven.ending}")
     figure = drive_errors_figure(drives, off_path=2.0)
-    save_figure(figure, Path("drive_on_learnt_tires.png"))
+    save_figures(Path(), {"drive_on_learnt_tires": figure})
     return rms["frozen"] / rms["linear"]
 
 

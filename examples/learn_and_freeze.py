@@ -11,7 +11,7 @@ import tireid as ti
 from models.maneuvers import DoubleLaneChange, Slalom
 from models.plant import Plant
 from tireid.figures.forces import prediction_figure
-from tireid.figures.style import save_figure
+from tireid.figures.style import save_figures
 
 EXPECTED_BELOW = 0.2  # kN
 RATE_LIMIT = np.radians(30.0)  # rad/s
@@ -44,7 +44,7 @@ def main() -> float:
     assert prediction.against_truth is not None
     error = prediction.against_truth.both / 1000.0
     print(f"frozen after the slalom, double lane change: {error:.3f} kN RMSE")
-    save_figure(prediction_figure(prediction), Path("learn_and_freeze.png"))
+    save_figures(Path(), {"learn_and_freeze": prediction_figure(prediction)})
     return error
 
 

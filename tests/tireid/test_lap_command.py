@@ -98,7 +98,7 @@ def test_half_of_the_ellipse_is_used_where_half_of_it_is_asked():
     [
         (["--engine", "0"], "--engine wants an acceleration, 4m/s2"),
         (["--engine", "three.csv"], "two columns are needed"),
-        (["--engine", "nowhere.csv"], "or a table of speed and acceleration"),
+        (["--engine", "nowhere.csv"], "nowhere.csv: there is no such file"),
         (["--v-max", "60"], "--v-max wants a speed, 200km/h or 60m/s"),
         (["--share", "170%"], "--share must lie between 0.05 and 1"),
         (["--laps", "1"], "add --vehicle FILE"),
