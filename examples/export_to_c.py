@@ -18,7 +18,7 @@ from models.plant import Plant
 from models.recordings import Recording
 from models.sensors import Sensor, Sensors
 from models.vehicle import Vehicle, sedan
-from tireid.exporting import self_test, write_files
+from tireid.exporting import self_test
 
 EXPECTED_BELOW = 1.0  # N, of forces of 8 kN
 SENSORS = Sensors(v_y=Sensor(noise=0.02), r=Sensor(noise=0.002))  # m/s and rad/s, rms
@@ -53,7 +53,9 @@ def main() -> float:
     folder = Path("identifier_c")
     folder.mkdir(exist_ok=True)
     package = build_package(design, car, learnt, name="tires")
-    write_files(folder, package, figures="")
+    for path, text in package.files.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, encoding="utf-8")
     print(f"{folder}/: {', '.join(sorted(package.files))}")
 
     expected = identify(change, car, design, learnt).axle_force
