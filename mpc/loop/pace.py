@@ -48,8 +48,9 @@ class Earned:
         s : arc length, laps included [m].   v : speed [m/s].
         """
         limits = self._planner.limits
-        if np.isfinite(measured.a_y):
-            self._a_y += self._weight * (measured.a_y - self._a_y)
+        shown = measured.a_y, v * measured.r  # a broken sensor alone earns nothing
+        if np.isfinite(shown).all():
+            self._a_y += self._weight * (min(shown, key=abs) - self._a_y)
         ratio = min(self._friction(), 1.0)  # more grip than learnt is no reason to hurry
         if ratio < _ALARM and ratio < self._ratio:  # what was held was held on another road
             self._held = 0.0

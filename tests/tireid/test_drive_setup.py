@@ -7,9 +7,10 @@ import pytest
 
 from identifier.speed_limits import SpeedLimits
 from models.vehicle import GRAVITY, sedan
-from mpc.path import Path, speed_profile
+from mpc.path import Path, handling_course, speed_profile
 from tests.identifier.export.test_emitted import fitted, network
 from tireid.commands.drive import parse_fault
+from tireid.driving import runs
 from tireid.driving.results import headline
 from tireid.driving.runs import Conditions
 from tireid.driving.setup import Setup, SpeedWish, _profile
@@ -118,3 +119,19 @@ def test_a_case_is_said_with_its_speeds_share_drops_delay_and_seed():
     assert "m/s, 70 % of what the identified tires allow, earned on the way;" in said(
         drive, confirm=True
     )
+
+
+def test_a_long_drive_has_the_time_it_needs(monkeypatch):
+    """Twenty laps take more than five minutes; a car that earns its speed takes longer still."""
+    given = []
+
+    def noted(*_, time_limit, **__):
+        given.append(time_limit)
+        raise InterruptedError
+
+    monkeypatch.setattr(runs, "Tracker", lambda *_, **__: None)
+    monkeypatch.setattr(runs, "drive_tracker", noted)
+    for laps in (1.0, 20.0):
+        with pytest.raises(InterruptedError):
+            runs.drive(handling_course(), sedan(), speeds=10.0, laps=laps)
+    assert given[0] >= 100.0 and given[1] > 2.0 * 20.0 * handling_course().length / 10.0

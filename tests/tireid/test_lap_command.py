@@ -93,6 +93,11 @@ def test_half_of_the_ellipse_is_used_where_half_of_it_is_asked():
         _ = type(profile)(profile.path, 10.0).used
 
 
+def test_told_speeds_have_no_limits_to_plot():
+    with pytest.raises(ValueError, match="plan them by speed_profile to plot"):
+        ti.plot(ti.SpeedProfile(ti.paths.handling_course(), 10.0))
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

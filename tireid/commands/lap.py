@@ -94,7 +94,7 @@ def run(options: argparse.Namespace) -> int:
     share = _number(options, "share", SHARES, BARE)
     brakes = _number(options, "brakes", ACCELERATIONS, BARE)
     v_max = _number(options, "v_max", SPEEDS)
-    table = "." in options.engine and math.isnan(quantity(options.engine, ACCELERATIONS, BARE)[0])
+    table = Path(options.engine).is_file()
     engine = _engine(options.engine) if table else _number(options, "engine", ACCELERATIONS, BARE)
     planned = {"v_max": v_max, "engine": engine, "brakes": brakes}
     require_within(ValueError, 0.05, 1.0, **{"--share": share})

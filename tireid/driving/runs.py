@@ -44,6 +44,7 @@ from tireid.progress import Progress
 
 _NOTED = 0.1  # change of the grip that is worth a note
 _EVERY = 8  # samples between two looks at what is known
+_GIVEN_UP = 300.0, 5.0  # s, and of the time at the wanted speed: one that is earned may take twice
 _PLAN_EVERY = 4  # periods between two plans that are kept: half a frame of the film
 # least and most friction of a road over that of the measured tire [-]
 FRICTIONS = (0.05, 1.5)
@@ -150,7 +151,7 @@ def make_learner(learnt: TireModel, vehicle: Vehicle, *, steers: bool = True) ->
     try:
         method = continuing(learnt, vehicle, PERIOD)
     except ValueError as error:
-        raise ValueError(f"--tires learning: {error}") from None
+        raise ValueError(f"learning and confirm go on from tires: {error}") from None
     if learnt.kind == AxleModel.kind:
         method = AxleIdentifier.for_vehicle(vehicle, dt=PERIOD)
     identifier = OnlineIdentifier(method, vehicle, PERIOD, learnt)
@@ -326,6 +327,7 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         learner=_BacksOff(beside) if conditions.caution > 0.0 else beside,
         lateral=conditions.lateral(learnt),
         laps=conditions.laps,
+        time_limit=max(_GIVEN_UP[0], _GIVEN_UP[1] * conditions.laps * profile.lap_time),
         widest=WIDEST,
         plan_every=_PLAN_EVERY,
         name=f"{setup.path.name}, {label}",

@@ -24,7 +24,11 @@ def plot(what: Recording | SpeedProfile) -> Figure:
     ----------
     what : of `read_recording`, or of `speed_profile`.
     """
-    return lap_figure(what) if isinstance(what, SpeedProfile) else inputs_figure(what)
+    if not isinstance(what, SpeedProfile):
+        return inputs_figure(what)
+    if what.planned is None:
+        raise ValueError("these speeds were told: plan them by speed_profile to plot their limits")
+    return lap_figure(what)
 
 
 @styled

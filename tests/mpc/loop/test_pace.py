@@ -25,10 +25,15 @@ def earned(road):
     return Earned(FASTEST, PERIOD, road)
 
 
+def turning(a_y, v):
+    return SimpleNamespace(a_y=a_y, r=a_y / v)
+
+
 def held(pace, a_y, s=0.0, times=300):
     """Hold a lateral acceleration for some samples; return the share then."""
     for _ in range(times):
-        pace.observe(SimpleNamespace(a_y=a_y), s, float(pace.profile.at(s)))
+        v = float(pace.profile.at(s))
+        pace.observe(turning(a_y, v), s, v)
     return pace.share
 
 
@@ -51,13 +56,21 @@ def test_it_grows_by_eight_per_cent_of_what_was_held_up_to_all():
     assert float(pace.profile.at(s + PATH.length)) == pytest.approx(float(FASTEST.at(s)), rel=1e-3)
 
 
+def test_one_broken_sensor_earns_nothing():
+    pace = earned(Road())
+    for _ in range(300):
+        pace.observe(SimpleNamespace(a_y=9.0, r=0.1), 0.0, 15.0)
+        pace.observe(SimpleNamespace(a_y=1.0, r=0.9), 0.0, 15.0)
+    assert pace.share == 0.45
+
+
 def test_it_falls_with_a_friction_that_is_lost():
     road = Road()
     pace = earned(road)
     held(pace, 0.7 * 9.0)
     fast, s = float(pace.profile.at(90.0)), 90.0
     road.friction = 0.6
-    pace.observe(SimpleNamespace(a_y=0.0), s, fast)
+    pace.observe(turning(0.0, fast), s, fast)
     assert pace.share <= 0.6 * 0.82
     assert float(pace.profile.at(s)) == pytest.approx(fast), "from the speed that it has"
     ahead = s + np.arange(0.0, 60.0, PATH.step)
@@ -75,6 +88,6 @@ def test_it_falls_with_a_friction_that_is_lost():
 def test_a_share_is_noted_in_tenths():
     pace, notes = earned(Road()), []
     for a_y in np.linspace(0.0, 9.0, 600):
-        notes.append(pace.observe(SimpleNamespace(a_y=a_y), 0.0, 10.0))
+        notes.append(pace.observe(turning(a_y, 10.0), 0.0, 10.0))
     said = [note for note in notes if note]
     assert 2 <= len(said) <= 4 and all(note.startswith("drives at 0.") for note in said)
