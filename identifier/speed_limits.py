@@ -4,7 +4,8 @@ Steady turning loads both axles in proportion, so that the weaker one limits the
 Race Car Vehicle Dynamics, 1995, ch. 9). While tires push f weights forward,
 A(f)/g = min_i φ_i λ_i sqrt(1 - (c_i f)²), λ_i = 1 + κ_i v_x² ∓ (h L/l_o) f, l_o the other arm,
 φ_i the largest force of the axle over its slip, c_i of braking or driving. No push is larger than
-1/c_i, and f² + (A/g)² <= (A(0)/g)²: tires grip lengthwise as sideways.
+1/c_i, and f² + (A/g)² <= (A(0)/g)²: tires grip lengthwise as sideways. An axle that drives the
+share d_i of f, where the car tells it, has c_i >= d_i W/(φ_i λ_i F_z,i), W its weight.
 φ_i is the lower end of the band within some times the slip that was identified, h and c_i are the
 ends of theirs that leave less: each is right or too low in the stated share of cases.
 """
@@ -169,14 +170,18 @@ def _left(
     car: Vehicle, p: Array, grip: Array, v_x: float, a_y: float, sign: float
 ) -> tuple[Array, NDArray[np.int64]]:
     use = p[[INDEX[f"{'driving' if sign > 0.0 else 'braking'}_{axle}"] for axle in "fr"]]
-    most = min(a_y, 1.0 / max(float(use.max()), 1e-9))
+    front = car.lengthwise("drive_front_share") if sign > 0.0 else None
+    carried = np.zeros(2) if front is None else np.array([front, 1.0 - front]) * car.weight
+    top = min(a_y, 1.0 / max(float(use.max()), 1e-9))
     plain = p.copy()
     plain[[INDEX[name] for name in ELLIPSE]] = 0.0
-    f = np.linspace(0.0, most, _PUSHES + 1)
+    f = np.linspace(0.0, top, _PUSHES + 1)
     a_x = sign * GRAVITY * f[:2] - car.drag * v_x**2
     first, second = np.array(pushed_function()(plain, car_numbers(car), a_x[None], v_x)).T
     loads = first + (second - first) * np.arange(f.size)[:, None]
-    pushed = grip * loads * np.sqrt(np.maximum(1.0 - (f[:, None] * use) ** 2, 0.0))
+    most = grip * np.maximum(loads, 1e-9)
+    used = f[:, None] * np.maximum(use, carried / car.axle_loads / most)
+    pushed = most * np.sqrt(np.maximum(1.0 - used**2, 0.0))
     left = np.minimum(pushed.min(axis=1), np.sqrt(np.maximum(a_y**2 - f**2, 0.0)))
     left[0] = a_y
     left = np.minimum.accumulate(left) - 1e-12 * np.arange(f.size)  # falls: read it backwards

@@ -33,6 +33,16 @@ def test_an_axle_that_brakes_alone_limits_by_hand():
     assert (found.brake.axle[0, 10:-1] == 1).all(), "the rear one"
 
 
+def test_an_axle_that_drives_alone_pushes_no_more_than_its_own_grip():
+    """F_z,f/W of the circle: φ_f = 1.1 is spent on a_x m = φ_f F_z,f sqrt(1 - (a_y/A)²)."""
+    model = level(load_transfer=0.0, **NO_ELLIPSE)
+    model = replace(model, vehicle=replace(model.vehicle, drive_front_share=1.0))
+    found, car = ti.speed_limits(model), model.vehicle
+    most = found.a_y[:, None] * car.l_r / car.wheelbase * np.sqrt(1.0 - SHARES**2)
+    np.testing.assert_allclose(found.push.most, most, atol=0.01 * found.a_y[0])
+    assert (found.push.axle[0, :-1] == 0).all() and found.brake.most[0, 0] > 1.5 * most[0, 0]
+
+
 def test_what_is_allowed_both_axles_of_the_model_can_give():
     use = {"braking_f": 0.3, "braking_r": 0.9, "driving_f": 0.1, "driving_r": 0.8}
     model = fitted(PRESSED, sd=1e-6, load_transfer=0.35, **use)

@@ -103,7 +103,7 @@ def test_told_speeds_have_no_limits_to_plot():
     [
         (["--engine", "0"], "--engine wants an acceleration, 4m/s2"),
         (["--engine", "three.csv"], "two columns are needed"),
-        (["--engine", "nowhere.csv"], "nowhere.csv: there is no such file"),
+        (["--engine", "nowhere.csv"], "or a table of speed and acceleration"),
         (["--v-max", "60"], "--v-max wants a speed, 200km/h or 60m/s"),
         (["--share", "170%"], "--share must lie between 0.05 and 1"),
         (["--laps", "1"], "add --vehicle FILE"),

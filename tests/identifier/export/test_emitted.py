@@ -28,7 +28,7 @@ from models.plant.dynamics import relaxation_lengths
 from models.tires import MagicFormula
 from models.vehicle import GRAVITY, Vehicle, sedan
 
-CAR = sedan().without_chassis()
+CAR = replace(sedan().without_chassis(), drive_front_share=None)  # nobody tells what it drives
 PRESSED = replace(CAR, downforce_area_front=1.0, downforce_area_rear=2.0)
 SMALL = Vehicle(
     name="1:10", mass=3.5, yaw_inertia=0.05, l_f=0.16, l_r=0.17,
