@@ -132,6 +132,7 @@ class Supervisor:
         self._steered = [(-math.inf, in_use, self._road)]
         self._models: list[tuple[float, TireModel | None]] = [(-math.inf, identifier.start)]
         self._agreed, self._trusted_since = True, -math.inf
+        self._suspected_at = -math.inf
         self.decisions: list[Decision] = []
         self.last = Decision(0.0, Verdict.KEEP, "no driving yet")
 
@@ -243,6 +244,11 @@ class Supervisor:
             judge=judge,
             rules=rules,
         )
+        if change is not None and change.verdict is Verdict.FRICTION:
+            again = self.t - self._suspected_at < 1.5 * rules.every
+            self._suspected_at = self.t
+            if not again:  # one look in a turn-in may err
+                return self._keep("friction is perhaps lost")
         if change is not None:
             self._road, self.target = change.road, change.tire
             return Decision(self.t, change.verdict, change.reason, change.road.ratio)
