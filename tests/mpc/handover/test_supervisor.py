@@ -12,6 +12,7 @@ from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
 from mpc.handover import supervisor as supervisor_module
 from mpc.handover.judge import ChiSquare, Judge
+from mpc.handover.road import Change
 from mpc.handover.rules import Rules, Verdict
 from mpc.handover.supervisor import Supervisor
 from mpc.tires import prediction_tire
@@ -37,6 +38,23 @@ def test_a_friction_drop_is_believed_within_the_first_bend(car, learnt, dropped)
     assert 0.4 < first.friction < 0.7
     before = [d for d in supervisor.decisions if d.t < DROP]
     assert all(d.verdict is Verdict.LEARNT for d in before)
+
+
+@pytest.mark.parametrize(("looks", "lost"), [((20,), False), ((20, 22), False), ((20, 21), True)])
+def test_friction_is_lost_where_two_looks_in_a_row_say_so(
+    car, learnt, dry, monkeypatch, looks, lost
+):
+    supervisor, seen = supervisor_of(car, learnt), []
+
+    def looked(road, tire, *_, **__):
+        seen.append(1)
+        if len(seen) in looks:
+            return Change(Verdict.FRICTION, road._replace(ratio=0.5), tire, 10.0, 1.0)
+
+    monkeypatch.setattr(supervisor_module, "look_at_road", looked)
+    watched(supervisor, dry[1].between(0.0, 3.0))
+    assert len(seen) > max(looks)
+    assert (Verdict.FRICTION in [d.verdict for d in supervisor.decisions]) == lost
 
 
 def test_from_nothing_the_learnt_tire_takes_over_and_is_better(car, dry):
