@@ -48,8 +48,8 @@ def test_friction_is_lost_where_two_looks_in_a_row_say_so(
 
     def looked(road, tire, *_, **__):
         seen.append(1)
-        if len(seen) in looks:
-            return Change(Verdict.FRICTION, road._replace(ratio=0.5), tire, 10.0, 1.0)
+        there = Change(Verdict.FRICTION, road._replace(ratio=0.5), tire, 10.0, 1.0)
+        return there if len(seen) in looks else None
 
     monkeypatch.setattr(supervisor_module, "look_at_road", looked)
     watched(supervisor, dry[1].between(0.0, 3.0))
