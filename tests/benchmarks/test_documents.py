@@ -10,36 +10,38 @@ from benchmarks.run_all import BENCHMARKS
 from benchmarks.targets import Table
 
 RECORD = {"date": "2026-01-02", "code": "abc", "missed": ["time (<= 1 s)"], "values": {"time": 2.0}}
-TEXT = "Laps.\n\n<!-- table lap -->\nold\n<!-- end -->\n\nMore.\n"
+TEXT = "Laps.\n\n<!-- table circuit -->\nold\n<!-- end -->\n\nMore.\n"
 
 
 @pytest.fixture(autouse=True)
 def a_script(monkeypatch):
-    """A benchmark `lap` with one table."""
+    """A benchmark `circuit` with one table."""
 
     def tables(values):
-        return {"lap": Table(("lap", "time [s]"), [["first", f"{values['time']:.1f}"]])}
+        return {"circuit": Table(("lap", "time [s]"), [["first", f"{values['time']:.1f}"]])}
 
     real = documents._tables
-    monkeypatch.setattr(documents, "_tables", lambda name: tables if name == "lap" else real(name))
+    monkeypatch.setattr(
+        documents, "_tables", lambda name: tables if name == "circuit" else real(name)
+    )
     real_code = documents._code
     monkeypatch.setattr(
-        documents, "_code", lambda name: "abc" if name == "lap" else real_code(name)
+        documents, "_code", lambda name: "abc" if name == "circuit" else real_code(name)
     )
 
 
 def test_a_table_is_written_whole_with_its_date_and_what_it_missed():
-    new = written(TEXT, {"lap": RECORD})
+    new = written(TEXT, {"circuit": RECORD})
     assert "| lap | time [s] |\n| --- | --- |\n| first | 2.0 |\n" in new
-    assert "`lap.py`, 2026-01-02. Targets missed: time (<= 1 s)." in new
+    assert "`circuit.py`, 2026-01-02. Targets missed: time (<= 1 s)." in new
     assert "old" not in new and new.endswith("<!-- end -->\n\nMore.\n")
-    assert written(new, {"lap": RECORD}) == new
+    assert written(new, {"circuit": RECORD}) == new
 
 
 def test_a_table_says_that_its_record_is_older_than_the_code_or_that_there_is_none():
-    older = written(TEXT, {"lap": RECORD | {"code": "other"}})
-    assert "`lap.py`, 2026-01-02; **the code has changed since**." in older
-    assert "Not recorded yet: `python -m benchmarks.run_all --record --only lap`." in written(
+    older = written(TEXT, {"circuit": RECORD | {"code": "other"}})
+    assert "`circuit.py`, 2026-01-02; **the code has changed since**." in older
+    assert "Not recorded yet: `python -m benchmarks.run_all --record --only circuit`." in written(
         TEXT, {}
     )
 
@@ -49,7 +51,7 @@ def test_check_finds_a_table_that_differs_from_its_record(tmp_path, monkeypatch)
     page.write_text(TEXT)
     monkeypatch.setattr(documents, "ROOT", tmp_path)
     monkeypatch.setattr(documents, "documents", lambda: [page])
-    monkeypatch.setattr(documents, "records", lambda: {"lap": RECORD})
+    monkeypatch.setattr(documents, "records", lambda: {"circuit": RECORD})
     assert documents.main(["--check"]) == 1
     assert page.read_text() == TEXT
     assert documents.main([]) == 0
