@@ -7,7 +7,7 @@ tires of Fiala, Dugoff and a Magic Formula, others in front than behind, or of t
 Each is steered until its sensors show that it slides, identified, and drives five laps of one of
 two courses, as `tireid lap` does. Speeds see no true grip; what does is only compared with them: a
 lap planned on the largest steady lateral acceleration of the plant, and the fastest acceleration
-that can be told to all cars. A car is safe within 0.5 m of its path.
+that suits all cars. A car is safe within 0.5 m of its path.
 
 The margin of a first lap is ln(last safe share of the limits / the share in use): the share grows
 by 2 % until the car is unsafe. Cars on a friction of 1 drive laps that confirm, and meet 0.6 of it.
@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.cornering import cornering_limit
+from benchmarks.mpc_cases import cornering_limit
 from benchmarks.random_cars import FIRST_SEED, LIKE, random_car
 from benchmarks.targets import Table, Targets, Values, parse, show
 from identifier.speed_limits import SpeedLimits
@@ -54,9 +54,9 @@ WITHIN = 0.5  # m
 STEP = 1.02  # of the share of the limits
 SAFE = 3.85  # sd of the margin: at most 1 of 1000 unsafe, 95 % sure of it from 40 normal ones
 TRUE_SHARE = 0.95  # of the true limit
-TOLD = 0.05 * GRAVITY  # m/s², steps of the told acceleration
+A_Y_STEP = 0.05 * GRAVITY  # m/s², steps of the given acceleration
 LEAVES = 0.92  # of the true limit, near which cars leave: where a search begins
-_FEW = 8  # cars that are driven at a told acceleration before the next ones
+_FEW = 8  # cars that are driven at a given acceleration before the next ones
 DAYS = 1000  # added to the seed of the noise of each car
 
 
@@ -214,7 +214,7 @@ def laps_of(number: int, margins: int, laps: int) -> Laps:
     """
     car = lap_car(number)
     tire, limit = car.learnt(), car.limit
-    true = SpeedLimits.told(limit, brake=limit / BRAKED)  # who knows it brakes with all of it
+    true = SpeedLimits.ellipse(limit, brake=limit / BRAKED)  # who knows it brakes with all of it
     found = list(
         drive_laps(
             car.course, car.vehicle, tire, laps, friction=car.friction, tires=car.tires,
@@ -300,19 +300,19 @@ def is_alarmed(lap: ClosedLoop) -> bool:
     return any(one.verdict is Verdict.FRICTION for one in lap.learner.supervisor.decisions)
 
 
-def told_lap(given: tuple[int, TireModel, float]) -> tuple[bool, float]:
-    """Return whether a car is safe at a told acceleration, and the time of its lap [s].
+def given_lap(given: tuple[int, TireModel, float]) -> tuple[bool, float]:
+    """Return whether a car is safe at a given acceleration, and the time of its lap [s].
 
     Parameters
     ----------
     given : its number, the tires that it steers on, and the acceleration [m/s²].
     """
     number, tire, a_y = given
-    lap = lap_car(number).drive(tire, SpeedLimits.told(a_y), 1.0)
+    lap = lap_car(number).drive(tire, SpeedLimits.ellipse(a_y), 1.0)
     return is_safe(lap), float(lap.drive.t[-1])
 
 
-def fastest_told(pool: Executor, cars: Sequence[Laps]) -> tuple[float, list[float]]:
+def fastest_given(pool: Executor, cars: Sequence[Laps]) -> tuple[float, list[float]]:
     """Return the largest acceleration that keeps all cars [m/s²], and their laps at it [s].
 
     Parameters
@@ -321,20 +321,20 @@ def fastest_told(pool: Executor, cars: Sequence[Laps]) -> tuple[float, list[floa
     cars : that learnt.
     """
     weakest = sorted(cars, key=lambda one: one.limit)
-    a_y = TOLD * math.ceil(weakest[0].limit / TOLD)
-    while a_y > TOLD / 2.0:
+    a_y = A_Y_STEP * math.ceil(weakest[0].limit / A_Y_STEP)
+    while a_y > A_Y_STEP / 2.0:
         times: dict[int, float] = {}
         for i in range(0, len(weakest), _FEW):  # the first ones are lost where any is
             some = weakest[i : i + _FEW]
             drives = [(one.car, one.tire, a_y) for one in some]
-            laps = list(pool.map(told_lap, drives))
+            laps = list(pool.map(given_lap, drives))
             if not all(safe for safe, _ in laps):
                 break
             times |= {one.car: time for one, (_, time) in zip(some, laps, strict=True)}
         if len(times) == len(cars):
             return a_y, [times[one.car] for one in cars]
-        a_y -= TOLD
-    raise ValueError(f"some car of {len(cars)} is lost at {a_y + TOLD:g} m/s² already")
+        a_y -= A_Y_STEP
+    raise ValueError(f"some car of {len(cars)} is lost at {a_y + A_Y_STEP:g} m/s² already")
 
 
 def judge_laps(targets: Targets, cars: Sequence[Laps]) -> None:
@@ -367,13 +367,13 @@ def judge_laps(targets: Targets, cars: Sequence[Laps]) -> None:
     targets.at_most("last lap over that of the true limit, median", last, 1.12, "-")
 
 
-def judge_told(targets: Targets, cars: Sequence[Laps], a_y: float, times: Iterable[float]) -> None:
-    """Print, record and judge last laps against those at a told acceleration."""
-    show("fastest told acceleration that keeps all", f"{a_y / GRAVITY:.2f} g")
+def judge_given(targets: Targets, cars: Sequence[Laps], a_y: float, times: Iterable[float]) -> None:
+    """Print, record and judge last laps against those at a given acceleration."""
+    show("fastest given acceleration that keeps all", f"{a_y / GRAVITY:.2f} g")
     ratio = [one.driven[-1] / time for one, time in zip(cars, times, strict=True)]
-    targets.record("told/g", a_y / GRAVITY)
-    label = "last lap over that of the fastest told acceleration, median"
-    targets.at_most(label, float(np.median(ratio)), 0.92, "-", key="told/over")
+    targets.record("given/g", a_y / GRAVITY)
+    label = "last lap over that of the fastest given acceleration, median"
+    targets.at_most(label, float(np.median(ratio)), 0.92, "-", key="given/over")
 
 
 def judge_dry(targets: Targets, cars: Sequence[Dry]) -> None:
@@ -409,8 +409,8 @@ def tables(v: Values) -> dict[str, Table]:
         ["margin of the first lap: mean, standard deviation, least of "
          f"{v['margin/cars']} cars",
          ", ".join(f"{v[f'margin/{name}']:.3f}" for name in ("mean", "sd", "least"))],
-        ["fastest told acceleration that keeps all cars [g]", f"{v['told/g']:.2f}"],
-        ["last lap over that lap, median", f"{v['told/over']:.2f}"],
+        ["fastest given acceleration that keeps all cars [g]", f"{v['given/g']:.2f}"],
+        ["last lap over that lap, median", f"{v['given/over']:.2f}"],
         [f"cars beyond {WITHIN} m on {WET:g} of the friction learnt on, confirming",
          f"{v['confirm/left']} of {v['confirm/cars']}"],
         ["confirming costs of a dry lap, median [%]", f"{v['confirm/cost']:.1f}"],
@@ -427,7 +427,7 @@ def main() -> int:
     with ProcessPoolExecutor() as pool:
         found = list(pool.map(laps_of, range(cars), [margins] * cars, [laps] * cars))
         judge_laps(targets, found)
-        judge_told(targets, found, *fastest_told(pool, found))
+        judge_given(targets, found, *fastest_given(pool, found))
         judge_dry(targets, list(pool.map(dry_and_wet, range(wet), [laps] * wet)))
     return targets.finish(keep=options.record)
 

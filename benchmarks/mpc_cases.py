@@ -6,20 +6,26 @@ changes the noise and the identification drive.
 """
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
-from benchmarks.cornering import cornering_limit
 from identifier.tire_model import TireModel
-from models.vehicle import GRAVITY, sedan
+from models.friction import Friction
+from models.maneuvers import StepSteer
+from models.plant import Plant
+from models.tires import Tire
+from models.vehicle import GRAVITY, Vehicle, sedan
 from tireid.cli import build_parser
 from tireid.commands.drive import conditions_of, frozen_tires
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, run_drive
 
+_RAMP_TIME = 20.0  # s
+_RAMP_SPEED = 20.0  # m/s
+_LARGEST_ANGLE = 0.3  # rad at friction 1: beyond the peak of any tire for the road
 TIRES = {"linear": LINEAR, "paper": FROZEN, "axle": FROZEN, "learning": LEARNING, "oracle": ORACLE}
 
 
@@ -41,6 +47,34 @@ class Score(NamedTuple):
     peak: float
     completed: bool
     failures: int
+
+
+def cornering_limit(
+    vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0, rear_tire: Tire | None = None
+) -> float:
+    """Return the largest steady lateral acceleration [m/s^2]; no speed of a drive may see it.
+
+    The car is steered more and more at constant speed. The driven axle also holds the speed against
+    the drag of cornering, so that this lies a few per cent below what tires give sideways alone.
+
+    Parameters
+    ----------
+    vehicle : with a chassis.
+    tire : of the wheels; None reads the file named by the chassis.
+    mu : friction of the road over that of the tire's measurement [-].
+    rear_tire : of the two rear wheels, where they have another.
+    """
+    return _steady_limit(vehicle, cast(Hashable, tire), mu, cast(Hashable, rear_tire))
+
+
+@cache
+def _steady_limit(vehicle: Vehicle, tire: Hashable, mu: float, rear_tire: Hashable) -> float:
+    """Drive the ramp once for each car and road: setting up a drive asks a dozen times."""
+    rate = _LARGEST_ANGLE * mu / _RAMP_TIME
+    ramp = StepSteer(amplitude=_LARGEST_ANGLE * mu, rate_limit=rate, onset=0.1, duration=_RAMP_TIME)
+    plant = Plant(vehicle, cast(Tire | None, tire), rear_tire=cast(Tire | None, rear_tire))
+    run = plant.simulate(ramp, speed=_RAMP_SPEED, friction=Friction(scale=mu))
+    return float(np.abs(run.a_y).max())
 
 
 def share_of_limit(percent: float, mu: float) -> str:

@@ -1,6 +1,6 @@
 """Learn the tires of a sedan on a slalom, freeze them, and drive a lane change with them.
 
-The learnt tires say how fast. The tracker is told of them, then of the linear ones of the vehicle
+The learnt tires say how fast. The tracker is given them, then the linear ones of the vehicle
 file; the car, its speed, the noise of its sensors and the delay are the same. Draws
 drive_on_learnt_tires.png.
 """
@@ -32,7 +32,7 @@ DELAY = 2  # periods of 10 ms
 
 
 def steer(tires: PredictionTire, speed: SpeedProfile) -> Drive:
-    """Return the drive of a tracker that is told of some tires.
+    """Return the drive of a tracker that is given some tires.
 
     Parameters
     ----------

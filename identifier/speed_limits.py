@@ -67,8 +67,8 @@ class SpeedLimits:
     known_slip: Array | None = None
 
     @classmethod
-    def told(cls, a_y: float, push: float | None = None, brake: float | None = None) -> Self:
-        """Return ellipses of told half axes [m/s²], without a tire; None takes a_y."""
+    def ellipse(cls, a_y: float, push: float | None = None, brake: float | None = None) -> Self:
+        """Return friction ellipses of given half axes [m/s²], at every speed; None takes a_y."""
         push, brake = a_y if push is None else push, a_y if brake is None else brake
         require_positive(ValueError, a_y=a_y, push=push, brake=brake)
         left, axle = np.sqrt(1.0 - SHARES**2)[None], np.zeros((1, SHARES.size), dtype=np.int64)

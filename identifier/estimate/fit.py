@@ -104,7 +104,7 @@ def fit(
     parts: list[tuple[float, Information]] = []
     found: Posterior | None = None
     reach = Reach() if start is None else Reach(*start.reach[:5])
-    told = Information.nothing() if start is None else _told(start, before)
+    earlier = Information.nothing() if start is None else _earlier(start, before)
     known, count, sd = Information.nothing(), 0.0, Priors.of(vehicle).sd
     total, done = sum(one.duration for one in recordings), 0.0
     coarse = coarse or total >= _LONG
@@ -127,7 +127,7 @@ def fit(
             begin[[*_ZEROS, _ROAD]] = before.mean[[*_ZEROS, _ROAD]]
         enough = ENOUGH if begin is None else _ENOUGH_MORE
         share = MOST_COUNT / max(count, MOST_COUNT)
-        beliefs = before.after(told + known.counted(share)) if last else before
+        beliefs = before.after(earlier + known.counted(share)) if last else before
         found = estimate(drives, vehicle, beliefs, begin, enough=enough)
         if not found.ended:
             _log.warning("%s: the descent ended at its limit, not where nothing was left to gain",
@@ -154,7 +154,7 @@ def fit(
     share = MOST_COUNT / max(count, MOST_COUNT)
     parts = [(t, part.counted(share)) for t, part in parts]
     if found is not None and len(parts) > 1:
-        p, covariance = settled(before.after(told + known.counted(share)), found.p)
+        p, covariance = settled(before.after(earlier + known.counted(share)), found.p)
         found = replace(found, p=p, covariance=covariance)
     if blinds := [one for one in recordings if one.logged_v_y is None]:
         last = found or (None if start is None else _next_day(start, sd))
@@ -195,8 +195,8 @@ def fit(
     return _Fit(model, found, parts)
 
 
-def _told(start: FittedModel, before: Priors) -> Information:
-    """Return what the logs behind tires told: what these are surer of than beliefs.
+def _earlier(start: FittedModel, before: Priors) -> Information:
+    """Return the information of the logs behind tires: what these are surer of than beliefs.
 
     Their sensors had zeros of their own, and another road that is doubted a friction of its own.
     """
@@ -206,11 +206,11 @@ def _told(start: FittedModel, before: Priors) -> Information:
     sure = np.linalg.inv((start.covariance + LEAST_DOUBT * np.diag(sd**2))[where])
     values, vectors = np.linalg.eigh(sure - curvature[where])
     H[where] = (vectors * np.maximum(values, 0.0)) @ vectors.T
-    told = Information.about(start.p, -slope, H, sd, start.reach.slip, 0.0)
-    told, doubt = told.of_one_day(sd[_ZEROS]), start.covariance[_ROAD, _ROAD]
+    found = Information.about(start.p, -slope, H, sd, start.reach.slip, 0.0)
+    found, doubt = found.of_one_day(sd[_ZEROS]), start.covariance[_ROAD, _ROAD]
     if doubt > 0.0:
-        told = told.loosened(coordinates(start.p)[1][:, [_ROAD]], np.sqrt([doubt]))
-    return told
+        found = found.loosened(coordinates(start.p)[1][:, [_ROAD]], np.sqrt([doubt]))
+    return found
 
 
 def _next_day(start: FittedModel, sd: Array) -> FittedModel:

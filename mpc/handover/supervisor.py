@@ -143,7 +143,12 @@ class Supervisor:
 
     @property
     def friction(self) -> float:
-        """Friction of the road over that of the first tire in use, as it is known now [-]."""
+        """Friction of the road over that of the first tire in use, as it is known now [-].
+
+        NaN while the sensors disagree.
+        """
+        if not self._agreed:
+            return math.nan
         if self._weighed is not self.target:
             self._weighed = self.target
             self._friction = float((largest_push(self.target) / self._first).min())

@@ -5,6 +5,7 @@ is lost before any alarm. So a drive begins at a share of the limits that the we
 goes on to `GROWTH` times the largest one that it held without an alarm.
 """
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -30,7 +31,8 @@ class Earned:
     ----------
     profile : the fastest one, of `speed_profile`.
     period : of the samples [s].
-    friction : of the road over the identified one, as it is known now [-].
+    friction : of the road over the identified one, as it is known now [-]; NaN where nobody knows,
+        which earns nothing.
     """
 
     def __init__(self, profile: SpeedProfile, period: float, friction: Callable[[], float]) -> None:
@@ -48,10 +50,12 @@ class Earned:
         s : arc length, laps included [m].   v : speed [m/s].
         """
         limits = self._planner.limits
-        shown = measured.a_y, v * measured.r  # a broken sensor alone earns nothing
-        if np.isfinite(shown).all():
+        shown, ratio = (measured.a_y, v * measured.r), self._friction()
+        if math.isnan(ratio):
+            ratio, self._a_y = self._ratio, 0.0
+        elif np.isfinite(shown).all():  # a broken sensor alone earns nothing
             self._a_y += self._weight * (min(shown, key=abs) - self._a_y)
-        ratio = min(self._friction(), 1.0)  # more grip than learnt is no reason to hurry
+        ratio = min(ratio, 1.0)  # more grip than learnt is no reason to hurry
         if ratio < _ALARM and ratio < self._ratio:  # what was held was held on another road
             self._held = 0.0
         self._ratio = ratio

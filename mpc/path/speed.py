@@ -1,7 +1,7 @@
 """How fast a path can be driven: v² |κ| = a_y, with braking before the turn and power after it.
 
 What a turn leaves lengthwise is that of `identifier.speed_limits`, of tires that were identified or
-of a told ellipse: v²|κ| <= σ A(f/σ) and dv²/ds = 2 (f - drag v²), f <= engine(v), from place to
+of a given ellipse: v²|κ| <= σ A(f/σ) and dv²/ds = 2 (f - drag v²), f <= engine(v), from place to
 place, once forwards and once backwards.
 """
 
@@ -59,8 +59,8 @@ class SpeedProfile:
     path : to drive.
     v : wanted speed [m/s], a number or one for each sample of the path, (n,).
     limited_by : what limits it there, (n,): turn, drive, brake (the tires), engine or v_max;
-        empty where the speed was told.
-    axle : front or rear, which one slides first there, (n,); empty where the speed was told.
+        empty where the speed is given.
+    axle : front or rear, which one slides first there, (n,); empty where the speed is given.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class SpeedProfile:
     def used(self) -> Array:
         """Share of the limits that planned speeds use, 1 where the tires give all, (n,)."""
         if self.planned is None:
-            raise ValueError("these speeds were told: plan them by speed_profile to have limits")
+            raise ValueError("these speeds are given: plan them by speed_profile to have limits")
         limits, a_y = self.planned[0].limits, np.abs(self.a_y)
         f, reach = self.a_x + limits.drag * self.v**2, []
         for most, push, brake in zip(
@@ -116,8 +116,11 @@ class SpeedProfile:
             turn = most * np.linspace(0.0, 1.0, push.size)
             y, x = np.append(-brake, push[::-1]), np.append(turn, turn[::-1])
             reach.append(np.interp(np.arctan2(f, a_y), np.arctan2(y, x), np.hypot(y, x)))
-        edge = [np.interp(v, limits.v, r) for v, r in zip(self.v, np.array(reach).T, strict=True)]
-        return np.hypot(f, a_y) / edge
+        row = np.interp(self.v, limits.v, np.arange(limits.v.size))
+        low, sample, reached = row.astype(int), np.arange(f.size), np.array(reach)
+        high = np.minimum(low + 1, limits.v.size - 1)
+        edge = (1.0 + low - row) * reached[low, sample] + (row - low) * reached[high, sample]
+        return np.asarray(np.hypot(f, a_y) / edge)
 
     def to_csv(self, file: str | PathLike[str], *, tum: bool = False) -> None:
         """Write the speeds and what they ask of the tires, a row for each sample.
@@ -281,7 +284,7 @@ def speed_profile(
     Parameters
     ----------
     path : to drive.
-    limits : of the car, of `speed_limits` or told.
+    limits : of the car, of `speed_limits`, or an ellipse.
     share : of them that is used [-].
     engine : largest acceleration that it gives, before drag [m/s²]: a number, or rising speeds
         [m/s] and what it gives there, (k,) each; None takes 5 m/s².

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import lap
-from benchmarks.lap import TOLD, WITHIN, courses, fastest_told, is_safe, lap_car, last_safe
+from benchmarks.lap import A_Y_STEP, WITHIN, courses, fastest_given, is_safe, lap_car, last_safe
 from models.tires import DugoffTire, FialaTire, MagicFormula
 
 
@@ -47,15 +47,15 @@ def test_a_car_is_safe_that_ends_its_lap_within_half_a_meter():
     assert not is_safe(lap_of(False, 0.1))
 
 
-def test_the_fastest_told_acceleration_keeps_every_car(monkeypatch):
+def test_the_fastest_given_acceleration_keeps_every_car(monkeypatch):
     """Cars leave at some share of their limit, one of them much earlier than the others."""
     cars = [SimpleNamespace(car=k, tire=None, limit=4.6 + 0.1 * k) for k in range(20)]
 
-    def told_lap(given):
+    def given_lap(given):
         number, _, a_y = given
         return a_y <= cars[number].limit * (0.45 if number == 13 else 0.9), 100.0 + number
 
-    monkeypatch.setattr(lap, "told_lap", told_lap)
-    a_y, times = fastest_told(SimpleNamespace(map=map), cars)
-    assert a_y == pytest.approx(5 * TOLD)
+    monkeypatch.setattr(lap, "given_lap", given_lap)
+    a_y, times = fastest_given(SimpleNamespace(map=map), cars)
+    assert a_y == pytest.approx(5 * A_Y_STEP)
     assert np.array_equal(times, 100.0 + np.arange(20))

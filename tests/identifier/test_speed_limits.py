@@ -92,8 +92,8 @@ def test_limits_are_scaled_by_a_friction():
         (lambda: ti.speed_limits(fitted(), confidence=0.5), "above 0.5 and below 1, it is 0.5"),
         (lambda: ti.speed_limits(fitted(), beyond=np.nan), "beyond must be 1 or more known slips"),
         (lambda: ti.speed_limits(unknown()), "rear axle is not known at any slip: drive harder"),
-        (lambda: ti.SpeedLimits.told(0.0), "a_y must be positive and finite"),
-        (lambda: ti.SpeedLimits.told(9.0).scaled(-1.0), "ratio must be positive"),
+        (lambda: ti.SpeedLimits.ellipse(0.0), "a_y must be positive and finite"),
+        (lambda: ti.SpeedLimits.ellipse(9.0).scaled(-1.0), "ratio must be positive"),
     ],
 )
 def test_what_are_no_limits_is_one_clear_line(made, said):

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 import tireid as ti
-from benchmarks.cornering import cornering_limit
+from benchmarks.mpc_cases import cornering_limit
 from identifier.tire_model import load_model
 from models.files import digest
 from models.friction import Friction

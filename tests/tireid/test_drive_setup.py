@@ -52,7 +52,7 @@ def test_how_fast_a_share_of_the_tires_is_never_follows_from_the_road(monkeypatc
     def looked(*_, **__):
         raise AssertionError("it has looked at the true tire")
 
-    limits = SpeedLimits.told(8.0)
+    limits = SpeedLimits.ellipse(8.0)
     dry = setup(COURSE, SpeedWish(share=0.7))._replace(limits=limits)
     v = dry.speeds()
     monkeypatch.setattr("tireid.driving.setup.DoubleTrackCar", looked)
@@ -80,7 +80,7 @@ def test_tires_that_are_not_sure_tell_no_speed():
 
 
 def test_speeds_are_those_of_the_path_that_is_driven():
-    given = speed_profile(COURSE, SpeedLimits.told(8.0), v_max=20.0)
+    given = speed_profile(COURSE, SpeedLimits.ellipse(8.0), v_max=20.0)
     same = Path.from_waypoints(90.0 * np.cos(AROUND), 40.0 * np.sin(AROUND), closed=True)
     assert setup(same, SpeedWish(profile=given)).profile() is given
     with pytest.raises(ValueError, match="speeds are of the path oval, not of lane"):
@@ -115,7 +115,7 @@ def test_a_case_is_said_with_its_speeds_share_drops_delay_and_seed():
     low, high = drive.speeds().min(), drive.speeds().max()
     assert f"oval at {low:.1f} to {high:.1f} m/s, up to 0.5 g in bends; friction 1;" in words
     assert "0 ms delay, no noise" in words
-    drive = setup(COURSE, SpeedWish(share=0.7))._replace(limits=SpeedLimits.told(9.0))
+    drive = setup(COURSE, SpeedWish(share=0.7))._replace(limits=SpeedLimits.ellipse(9.0))
     assert "m/s, 70 % of what the identified tires allow, earned on the way;" in said(
         drive, confirm=True
     )

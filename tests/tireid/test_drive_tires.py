@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.cornering import cornering_limit
+from benchmarks.mpc_cases import cornering_limit
 from identifier.paper.network import Network, NetworkModel, Weights
 from models.vehicle import sedan
 from mpc.tires import prediction_tire

@@ -85,15 +85,15 @@ def test_less_share_friction_or_engine_is_slower(folder, out, undrawn):
 
 
 def test_half_of_the_ellipse_is_used_where_half_of_it_is_asked():
-    limits = ti.SpeedLimits.told(8.0, 4.0, 8.0)
+    limits = ti.SpeedLimits.ellipse(8.0, 4.0, 8.0)
     profile = ti.speed_profile(ti.paths.constant_radius(), limits, share=0.5)
     round_ = np.abs(profile.a_y) > 3.9
     np.testing.assert_allclose(profile.used[round_], 0.5, atol=0.01)
-    with pytest.raises(ValueError, match="told: plan them"):
+    with pytest.raises(ValueError, match="given: plan them"):
         _ = type(profile)(profile.path, 10.0).used
 
 
-def test_told_speeds_have_no_limits_to_plot():
+def test_given_speeds_have_no_limits_to_plot():
     with pytest.raises(ValueError, match="plan them by speed_profile to plot"):
         ti.plot(ti.SpeedProfile(ti.paths.handling_course(), 10.0))
 
@@ -140,4 +140,4 @@ def test_a_lap_is_driven_learnt_from_and_kept(folder, out, capsys, undrawn):
     assert driven["share"] == pytest.approx(0.82) and driven["off_path_m"] < 0.3
     assert driven["driven_s"] == pytest.approx(driven["planned_s"], rel=0.05)
     assert (out / "weights.json").exists() == driven["valid"]
-    assert "lap 1, planned_s" in capsys.readouterr().out
+    assert "lap 1: planned" in capsys.readouterr().out

@@ -58,7 +58,7 @@ def declare(new: Any) -> None:
         "--speed WHAT": (
             TIRES,
             f"{TIRES}: {100.0 * SHARE:.0f} %% of what the identified tires allow, braking for "
-            "bends; 70%%: another share of that limit; or told: a lateral acceleration in the "
+            "bends; 70%%: another share of that limit; or given: a lateral acceleration in the "
             "tightest bend (0.4g, 4m/s2), constant on an open path, or a speed (17m/s, 60km/h) "
             "(%(default)s)",
         ),

@@ -141,7 +141,11 @@ def run(options: argparse.Namespace) -> int:
                     "off_path_m": lap.seen, "valid": valid,
                 }  # fmt: skip
                 rows.append(row)
-                tell(", ".join(f"{name} {x:.4g}" for name, x in row.items()))
+                tell(
+                    "lap {}: planned {:.2f} s, driven {:.2f} s, {:.2f} of the limits, a_y up to "
+                    "{:.2f} m/s²; {:.2f} m off the path".format(*row.values())
+                    + ("" if valid else "; it taught nothing")
+                )
                 if lap.learnt and valid:
                     lap.learnt.tire.save(folder / "weights.json", valid=True)
             completed = lap.driven.scores.completed

@@ -1,4 +1,4 @@
-"""A drive to learn tires on, of a simulated car, whose driver is told of no grip."""
+"""A drive to learn tires on, of a simulated car, whose driver knows no grip."""
 
 import math
 from dataclasses import replace

@@ -1,6 +1,6 @@
 """What is driven: a path, a car on its road, and how fast.
 
-How fast it is follows from what is known of its tires or is told, never from the road.
+How fast it is follows from what is known of its tires or is given, never from the road.
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ from mpc.tires import PredictionTire, oracle_tire
 
 WIDEST = 2.0  # deviation at which a car is off the path [m]
 FASTEST = 30.0  # m/s
-# Share of a told lateral acceleration to drive and brake with: 2 and 3 m/s² on a dry road.
+# Share of a given lateral acceleration to drive and brake with: 2 and 3 m/s² on a dry road.
 _DRIVES, _BRAKES = 0.22, 0.33
 PERIOD = 0.01  # control period [s]
 
@@ -89,7 +89,7 @@ class Setup(NamedTuple):
     def profile(self) -> SpeedProfile:
         """Return the wanted speed along the path.
 
-        Where a_y is told it is constant on an open path; a closed one brakes for the bends.
+        Where a_y is given it is constant on an open path; a closed one brakes for the bends.
         """
         return _profile(self.path, self.wish, self.limits)
 
@@ -132,8 +132,8 @@ def _profile(path: Path, wish: SpeedWish, limits: SpeedLimits | None) -> SpeedPr
     if wish.a_y is not None:
         if not path.closed:
             return SpeedProfile(path, steady_speed(path, a_y_max=wish.a_y))
-        told = SpeedLimits.told(wish.a_y, _DRIVES * wish.a_y, _BRAKES * wish.a_y)
-        return speed_profile(path, told, share=1.0, v_max=FASTEST)
+        given = SpeedLimits.ellipse(wish.a_y, _DRIVES * wish.a_y, _BRAKES * wish.a_y)
+        return speed_profile(path, given, share=1.0, v_max=FASTEST)
     if limits is None:
         raise ValueError("no tires were identified that tell how fast: say a speed")
     assert wish.share is not None

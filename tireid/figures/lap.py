@@ -27,7 +27,7 @@ def plot(what: Recording | SpeedProfile) -> Figure:
     if not isinstance(what, SpeedProfile):
         return inputs_figure(what)
     if what.planned is None:
-        raise ValueError("these speeds were told: plan them by speed_profile to plot their limits")
+        raise ValueError("these speeds are given: plan them by speed_profile to plot their limits")
     return lap_figure(what)
 
 

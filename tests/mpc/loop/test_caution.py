@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.cornering import cornering_limit
+from benchmarks.mpc_cases import cornering_limit
 from models.faults import SensorFault
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar

@@ -9,7 +9,7 @@ from identifier.speed_limits import SpeedLimits
 from mpc.loop.pace import Earned
 from mpc.path import handling_course, speed_profile
 
-LIMITS, PERIOD = SpeedLimits.told(9.0), 0.01
+LIMITS, PERIOD = SpeedLimits.ellipse(9.0), 0.01
 PATH = handling_course()
 FASTEST = speed_profile(PATH, LIMITS, share=0.82, v_max=30.0)
 
@@ -54,6 +54,14 @@ def test_it_grows_by_eight_per_cent_of_what_was_held_up_to_all():
     assert held(pace, np.nan) == pytest.approx(0.82), "a broken sensor shows nothing"
     s = 0.4 * PATH.length
     assert float(pace.profile.at(s + PATH.length)) == pytest.approx(float(FASTEST.at(s)), rel=1e-3)
+
+
+def test_nothing_is_earned_while_nobody_knows_the_friction():
+    road = Road()
+    pace, road.friction = earned(road), np.nan
+    assert held(pace, 0.7 * 9.0) == 0.45
+    road.friction = 1.0
+    assert held(pace, 0.5 * 9.0) == pytest.approx(1.08 * 0.5, abs=0.02)
 
 
 def test_one_broken_sensor_earns_nothing():

@@ -12,7 +12,7 @@ from mpc.path import (
 )
 from mpc.path.speed import BRAKED
 
-TOLD = SpeedLimits.told(8.0, 3.0, 6.0)
+ELLIPSE = SpeedLimits.ellipse(8.0, 3.0, 6.0)
 GIVEN = {"share": 1.0, "v_max": 25.0}
 
 
@@ -34,12 +34,12 @@ def ring():
 
 def pressed(**other):
     """Limits over speed: downforce, and less to drive with than to brake."""
-    told = SpeedLimits.told(1.0, 0.4, 0.8)
+    small = SpeedLimits.ellipse(1.0, 0.4, 0.8)
     v = np.array([0.0, 6.0, 13.0, 30.0])
     a_y = 8.0 + 0.004 * v**2
     sides = {
         name: side._replace(most=a_y[:, None] * side.most, axle=np.tile(side.axle, (4, 1)))
-        for name, side in (("push", told.push), ("brake", told.brake))
+        for name, side in (("push", small.push), ("brake", small.brake))
     }
     return SpeedLimits(v=v, a_y=a_y, **sides, **other)
 
@@ -51,7 +51,7 @@ def left(limits, side, v, a_y):
 
 
 def test_the_profile_keeps_every_limit_and_uses_them(path):
-    found = speed_profile(path, TOLD, **GIVEN)
+    found = speed_profile(path, ELLIPSE, **GIVEN)
     v, a_y = found.v, np.abs(found.a_y)
     a_x = np.diff(v**2) / (2 * path.step)
     assert v.shape == path.s.shape
@@ -66,10 +66,10 @@ def test_the_profile_keeps_every_limit_and_uses_them(path):
 
 def test_nowhere_could_the_car_be_faster(path):
     """Everywhere the speed is what the turn, the place before or the place behind allows."""
-    v = speed_profile(path, TOLD, **GIVEN).v[: -1 if path.closed else None]
+    v = speed_profile(path, ELLIPSE, **GIVEN).v[: -1 if path.closed else None]
     square, kappa = v**2, np.abs(path.kappa[: v.size])
     rise, fall = (
-        np.roll(square + 2 * path.step * use * left(TOLD, side, v, square * kappa), shift)
+        np.roll(square + 2 * path.step * use * left(ELLIPSE, side, v, square * kappa), shift)
         for side, use, shift in (("push", 1.0, 1), ("brake", BRAKED, -1))
     )
     if not path.closed:
@@ -82,13 +82,13 @@ def test_it_says_what_limits_where():
     """A straight, a bend, a straight: brakes, turns, drives, and then the engine has no more."""
     x = np.linspace(0.0, 300.0, 61)
     bend = Path.from_waypoints(x, 40.0 * np.arctan((x - 150.0) / 20.0), name="bend")
-    found = speed_profile(bend, TOLD, share=1.0, v_max=60.0, engine=2.0)
+    found = speed_profile(bend, ELLIPSE, share=1.0, v_max=60.0, engine=2.0)
     order = list(dict.fromkeys(found.limited_by))
     assert set(order) == {"brake", "turn", "drive", "engine"}
     assert found.limited_by[0] == "brake" and found.limited_by[-1] == "engine"
     assert found.limited_by[np.abs(found.a_y).argmax()] == "turn"
     assert set(found.axle) <= {"front", "rear"}
-    assert set(speed_profile(bend, TOLD, v_max=5.0).limited_by) == {"v_max"}
+    assert set(speed_profile(bend, ELLIPSE, v_max=5.0).limited_by) == {"v_max"}
 
 
 def test_downforce_lets_a_car_turn_faster_by_hand():
@@ -101,9 +101,9 @@ def test_downforce_lets_a_car_turn_faster_by_hand():
 
 
 def test_half_the_friction_is_the_root_of_two_of_the_time_in_a_bend(ring):
-    dry, wet = (speed_profile(ring, TOLD.scaled(mu), engine=9.0) for mu in (1.0, 0.5))
+    dry, wet = (speed_profile(ring, ELLIPSE.scaled(mu), engine=9.0) for mu in (1.0, 0.5))
     assert wet.lap_time / dry.lap_time == pytest.approx(np.sqrt(2.0), rel=1e-6)
-    half = speed_profile(ring, TOLD, share=0.41)
+    half = speed_profile(ring, ELLIPSE, share=0.41)
     np.testing.assert_allclose(half.v, wet.v, rtol=1e-12)
 
 
@@ -128,15 +128,17 @@ def test_against_the_air_a_flying_lap_ends_as_fast_as_it_began(ring):
 def test_an_engine_gives_what_its_table_says():
     straight = Path.from_waypoints([0.0, 100.0], [0.0, 0.0])
     tabled = ([0.0, 10.0, 20.0], [3.0, 3.0, 1.0])
-    found = speed_profile(straight, SpeedLimits.told(9.0), engine=tabled, v_max=40.0, start=(0, 10))
+    found = speed_profile(
+        straight, SpeedLimits.ellipse(9.0), engine=tabled, v_max=40.0, start=(0, 10)
+    )
     a_x = np.diff(found.v**2) / (2 * straight.step)
     np.testing.assert_allclose(a_x, np.interp(found.v[:-1], *tabled), rtol=1e-6)
 
 
 def test_a_start_changes_the_speed_by_no_more_than_the_car_can(path):
-    whole = speed_profile(path, TOLD, **GIVEN)
+    whole = speed_profile(path, ELLIPSE, **GIVEN)
     s, slow = 0.3 * path.length, 0.6 * float(whole.at(0.3 * path.length))
-    found = speed_profile(path, TOLD, start=(s, slow), **GIVEN)
+    found = speed_profile(path, ELLIPSE, start=(s, slow), **GIVEN)
     assert float(found.at(s)) == pytest.approx(slow)
     fine = s + np.arange(0.0, path.length if path.closed else 80.0, path.step)
     v = found.at(fine)
@@ -150,16 +152,16 @@ def test_a_start_changes_the_speed_by_no_more_than_the_car_can(path):
     np.testing.assert_allclose(np.diff(times), path.step * pace, rtol=0.01)
     np.testing.assert_allclose(found.v[found.s >= s], found.at(found.s[found.s >= s]))
     assert set(found.limited_by[(found.s >= s) & (found.s < s + 2.0)]) <= {"drive", "engine"}
-    standing = speed_profile(path, TOLD, start=(0.0, 3.0), **GIVEN)
+    standing = speed_profile(path, ELLIPSE, start=(0.0, 3.0), **GIVEN)
     assert standing.v[0] == 3.0 and standing.lap_time > whole.lap_time
     assert standing.lap_time == pytest.approx(standing.time_at(path.length), rel=1e-6)
 
 
 def test_a_straight_is_driven_at_v_max_and_has_no_limit_of_its_own():
     straight = Path.from_waypoints([0.0, 100.0], [0.0, 0.0])
-    assert speed_profile(straight, TOLD, **GIVEN).v == pytest.approx(25.0)
+    assert speed_profile(straight, ELLIPSE, **GIVEN).v == pytest.approx(25.0)
     with pytest.raises(PathError, match="nothing limits the speed: give v_max"):
-        speed_profile(straight, TOLD)
+        speed_profile(straight, ELLIPSE)
     with pytest.raises(PathError, match="has no turn"):
         steady_speed(straight, a_y_max=8.0)
 
@@ -181,7 +183,7 @@ def test_a_straight_is_driven_at_v_max_and_has_no_limit_of_its_own():
 )
 def test_what_is_no_profile_is_one_clear_line(given, said):
     with pytest.raises(ValueError, match=said) as caught:
-        speed_profile(iso_3888_2(), TOLD, **given)
+        speed_profile(iso_3888_2(), ELLIPSE, **given)
     assert "\n" not in str(caught.value)
 
 

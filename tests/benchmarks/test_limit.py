@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.cornering import cornering_limit
+from benchmarks.mpc_cases import cornering_limit
 from models.tires import FialaTire, MagicFormula
 from models.vehicle import GRAVITY, sedan
 from mpc.tires.ladder import cornering_force
