@@ -186,3 +186,52 @@ def look_at_road(
                 estimate = Road(before, changed_at=t)
                 return Change(Verdict.RECOVERY, estimate, before, now.total, then.total)
     return None
+
+
+class Look(NamedTuple):
+    """What a look at the road found.
+
+    now : chi-square of the tire in use in the last moments.   change : what is known from now on.
+    suspected : whether a loss showed that the next look has to confirm.
+    """
+
+    now: ChiSquare
+    change: Change | None
+    suspected: bool
+
+
+class RoadWatch:
+    """Looks at the road now and then, and remembers what it found.
+
+    Attributes: road; baseline, the mean chi-square of the tire in use where the road does not
+    change [-].
+    base : the tire as it was learnt.
+    """
+
+    def __init__(self, base: PredictionTire, judge: Judge, rules: Rules) -> None:
+        self.road, self.baseline = Road(base), 1.0
+        self._judge, self._rules, self._suspected_at = judge, rules, -math.inf
+
+    def look(self, in_use: PredictionTire, window: Window, t: float, trusted: float) -> Look:
+        """Take a look: a loss counts where two in a row show it, one in a turn-in may err.
+
+        window : of samples that last for the last moments.   t : time [s].
+        trusted : slip up to which a tire must be one [rad].
+        """
+        rules, judge = self._rules, self._judge
+        now = judge.chi_square(in_use, window.last(judge.lookback(rules.last_moments)))
+        change = look_at_road(
+            self.road, in_use, window, t=t, baseline=self.baseline, trusted=trusted, judge=judge,
+            rules=rules,
+        )  # fmt: skip
+        if change is not None and change.verdict is Verdict.FRICTION:
+            again, self._suspected_at = t - self._suspected_at < 1.5 * rules.every, t
+            if not again:
+                return Look(now, None, True)
+        if change is not None:
+            self.road = change.road
+            return Look(now, change, False)
+        share = rules.every / rules.baseline_time
+        rise = min(now.mean, 4.0 * self.baseline) - self.baseline  # shall not follow a change
+        self.baseline = max(1.0, self.baseline + share * rise)
+        return Look(now, None, False)

@@ -17,7 +17,7 @@ from mpc.handover.certificate import (
     tire_complaint,
 )
 from mpc.handover.judge import ChiSquare, Judge, Window
-from mpc.handover.road import Road, look_at_road
+from mpc.handover.road import RoadWatch
 from mpc.handover.rules import Decision, Rules, Verdict
 from mpc.tires import PredictionTire, prediction_tire
 
@@ -125,14 +125,12 @@ class Supervisor:
         self._learnt_every = max(1, round(self.rules.learnt_every / dt))
         self._samples, self._dt = 0, dt
         self._sample, self._lost = (0.0, 0.0, 0.0, 0.0), 0
-        self._baseline = 1.0  # mean chi-square of the tire in use
-        self._road = Road(in_use)
+        self._watch = RoadWatch(in_use, self.judge, self.rules)
         self._first, self._weighed, self._friction = largest_push(in_use), in_use, 1.0
         # What was steered with and what was learnt, and since when [s], to go back to.
-        self._steered = [(-math.inf, in_use, self._road)]
+        self._steered = [(-math.inf, in_use, self._watch.road)]
         self._models: list[tuple[float, TireModel | None]] = [(-math.inf, identifier.start)]
         self._agreed, self._trusted_since = True, -math.inf
-        self._suspected_at = -math.inf
         self.decisions: list[Decision] = []
         self.last = Decision(0.0, Verdict.KEEP, "no driving yet")
 
@@ -195,7 +193,7 @@ class Supervisor:
         self.last = self._decide(sample[0])
         if self.last.verdict is not Verdict.KEEP:
             self.decisions.append(self.last)
-            self._steered.append((self.t, self.target, self._road))
+            self._steered.append((self.t, self.target, self._watch.road))
         return self.last
 
     def _remember(self) -> None:
@@ -217,7 +215,7 @@ class Supervisor:
         before = self._trusted_until
         self._steered = [one for one in self._steered if one[0] <= before]
         self._models = [one for one in self._models if one[0] <= before] or self._models[:1]
-        _, self.target, self._road = self._steered[-1]
+        _, self.target, self._watch.road = self._steered[-1]
         self.identifier.restart(self._models[-1][1])
         self.last = Decision(self.t, Verdict.FAULT, fault)
         self.decisions.append(self.last)
@@ -237,36 +235,20 @@ class Supervisor:
         rules, judge = self.rules, self.judge
         if self._window.duration < judge.lookback(rules.last_moments):
             return self._keep("too few samples")
-        moments = self._window.last(judge.lookback(rules.last_moments))
-        now = judge.chi_square(self.target, moments)
-        change = look_at_road(
-            self._road,
-            self.target,
-            self._window,
-            t=self.t,
-            baseline=self._baseline,
-            trusted=self._excitation.trusted_slip(self.target),
-            judge=judge,
-            rules=rules,
-        )
-        if change is not None and change.verdict is Verdict.FRICTION:
-            again = self.t - self._suspected_at < 1.5 * rules.every
-            self._suspected_at = self.t
-            if not again:  # one look in a turn-in may err
-                return self._keep("friction is perhaps lost")
-        if change is not None:
-            self._road, self.target = change.road, change.tire
+        trusted = self._excitation.trusted_slip(self.target)
+        look = self._watch.look(self.target, self._window, self.t, trusted)
+        if look.suspected:
+            return self._keep("friction is perhaps lost")
+        if (change := look.change) is not None:
+            self.target = change.tire
             return Decision(self.t, change.verdict, change.reason, change.road.ratio)
-        share = rules.every / rules.baseline_time
-        rise = min(now.mean, 4.0 * self._baseline) - self._baseline  # shall not follow a change
-        self._baseline = max(1.0, self._baseline + share * rise)
         if self._samples % self._learnt_every:
             return self._keep(self.last.reason)
-        return self._learnt(moments, now, v_x)
+        return self._learnt(look.now, v_x)
 
-    def _learnt(self, moments: Array, now: ChiSquare, v_x: float) -> Decision:
-        rules, judge = self.rules, self.judge
-        seconds = min(rules.seconds, self.t - self._road.changed_at)
+    def _learnt(self, now: ChiSquare, v_x: float) -> Decision:
+        rules, judge, watch = self.rules, self.judge, self._watch
+        seconds = min(rules.seconds, self.t - watch.road.changed_at)
         samples = self._window.last(judge.lookback(seconds))
         if seconds < rules.least_seconds or len(samples) * self._dt < rules.least_seconds:
             return self._keep("too few seconds to judge the identified tires")
@@ -283,11 +265,12 @@ class Supervisor:
         weights = np.stack([self.target.weights, candidate.weights])
         before, after = judge.chi_squares(candidate, weights, samples)
         reason = f"chi-square of {seconds:.1f} s {before.total:.0f} -> {after.total:.0f}"
-        if before.total - after.total < rules.evidence * self._baseline:
+        if before.total - after.total < rules.evidence * watch.baseline:
             return self._keep(f"not better: {reason}")
+        moments = self._window.last(judge.lookback(rules.last_moments))
         latest = judge.chi_square(candidate, moments)
-        if latest.total > now.total + rules.correction * self._baseline:
+        if latest.total > now.total + rules.correction * watch.baseline:
             return self._keep("worse in the last moments")
         self.target = candidate
-        self._road = self._road.on(candidate)
+        watch.road = watch.road.on(candidate)
         return Decision(self.t, Verdict.LEARNT, reason)
