@@ -134,7 +134,7 @@ class _Numbers(NamedTuple):
 class Live:
     """Identifies the tires of a car while it drives, and says what is known of it.
 
-    Attributes: counts, of what became of the samples.
+    Attributes: counts, of what became of the samples; identifier, None before the first.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ class Live:
         self._look_every, self._state_every = (
             round(time / self.dt) for time in (self._rules.every, EVERY)
         )
-        self._identifier: OnlineIdentifier | None = None
+        self.identifier: OnlineIdentifier | None = None
         self._method: Any = None
         reference = tire or resume
         self._watch = None if reference is None else self._watching(begun(reference))
@@ -207,7 +207,7 @@ class Live:
             method, start = InertialIdentifier.beginning_with(known, self.vehicle, dt=self.dt)
         identifier = OnlineIdentifier(method, self.vehicle, self.dt, start)
         identifier.prepare()
-        self._identifier, self._method, self._measures_v_y = identifier, method, v_y
+        self.identifier, self._method, self._measures_v_y = identifier, method, v_y
         self._start, self._holds = start, getattr(method, "held", False)
 
     def feed(
@@ -240,7 +240,7 @@ class Live:
         if not math.isfinite(t):
             self.counts.refused += 1
             return None
-        if self._identifier is None:
+        if self.identifier is None:
             if v_y is None and a_y is None:
                 raise ValueError("v_y or a_y is needed, the sample has neither")
             self.prepare(v_y=v_y is not None)
@@ -256,7 +256,7 @@ class Live:
 
     def _take(self, instant: Instant) -> None:
         """Show the recursion an instant."""
-        identifier = self._identifier
+        identifier = self.identifier
         assert identifier is not None
         if instant.jump or identifier.diverged:
             anew = identifier.diverged or self._holds or self._model is None
@@ -320,7 +320,7 @@ class Live:
 
     def _remember(self) -> State | None:
         """Take the means since the last state, refresh what is identified, and return a state."""
-        identifier = self._identifier
+        identifier = self.identifier
         assert identifier is not None
         point = self._sums.point(self.dt) if self._sums.n > self._state_every // 2 else None
         self._sums = _Sums()
@@ -363,8 +363,8 @@ class Live:
         sd = self._v_y_sd / max(self._sample[0], model.min_speed)
         if not self._measures_v_y and not sd <= RULES.side_slip:
             return f"side slip is known to {math.degrees(sd):.2g} deg"
-        assert self._identifier is not None
-        reached = self._method.limits.active(self._identifier.state())
+        assert self.identifier is not None
+        reached = self._method.limits.active(self.identifier.state())
         reached = [one for one in reached if one.refuses]
         return f"{reached[0].title} is at its bound: {reached[0].meaning}" if reached else ""
 
@@ -376,12 +376,12 @@ class Live:
         age : of the newest sample [s].
         """
         model, live = self._model, self._identified
-        if model is None or live is None or self._identifier is None:
+        if model is None or live is None or self.identifier is None:
             return None
         reason = self._doubts
         if age > OLD:
             reason = f"nothing came for {age:.1f} s"
-        elif self._identifier.stale:
+        elif self.identifier.stale:
             reason = "samples hold no numbers of a car"
         given = live if not reason or self._stored is None else self._stored
         v_x = self._sample[0]
