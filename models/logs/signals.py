@@ -7,6 +7,7 @@ axle forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is posit
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -121,16 +122,26 @@ class Signal:
             parts[0].size, lambda part: self._value([one[part] for one in parts], quantity)
         )
 
+    def at(self, parts: Sequence[float]) -> float:
+        """Return `value` of one instant, which is no force, bit for bit."""
+        total = parts[0]
+        for one in parts[1:]:  # as numpy adds; sum() may compensate
+            total += one
+        return float(self._road_wheel(total / len(parts) * self.factor - self.offset))
+
     def _value(self, parts: Sequence[Array], quantity: str) -> Array:
         total = (np.sum if quantity == FORCE else np.mean)(parts, axis=0)
-        total = total * self.factor - self.offset
-        if self.table:
-            hand, road = np.array(self.table).T
-            inside: Array = np.interp(total, hand, road)
-            first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
-            below, above = np.minimum(total - hand[0], 0.0), np.maximum(total - hand[-1], 0.0)
-            return np.asarray(inside + first * below + last * above)
-        return np.asarray(total / self.ratio)
+        return np.asarray(self._road_wheel(total * self.factor - self.offset))
+
+    def _road_wheel(self, total: Any) -> Any:
+        """Return the angle of the road wheels, by ratio or table.   total : (n,), or a number."""
+        if not self.table:
+            return total / self.ratio
+        hand, road = np.array(self.table).T
+        inside = np.interp(total, hand, road)
+        first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
+        below, above = np.minimum(total - hand[0], 0.0), np.maximum(total - hand[-1], 0.0)
+        return inside + first * below + last * above
 
 
 def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:

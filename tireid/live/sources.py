@@ -1,0 +1,243 @@
+"""Where samples come from while a car drives: packets, a bus, or a log that is replayed."""
+
+import importlib
+import math
+import os
+import socket
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from threading import Event
+from typing import Any, TypeVar
+from urllib.parse import urlsplit
+
+import numpy as np
+
+from codegen.escape import displayed
+from models.extras import needs
+from models.logs.log import RecordingError
+from models.recordings.map import LARGEST_PACKET, LogMap
+from models.recordings.reader import read_repaired, split_log_argument
+from models.recordings.record import Recording
+from models.vehicle import Vehicle
+from tireid.live.frames import Frames
+from tireid.live.packets import Packets, Sample, require_live
+from tireid.live.state import Counts
+
+FORMS = "udp://[HOST]:PORT, can:[KIND:]CHANNEL, zenoh:KEY, or a log"
+QUIET = 0.2  # s without a sample, after which the caller goes on all the same
+_WAIT = 0.1  # s, longest wait at a time: closing is not later
+_BURST = 2e-3  # s, within which frames of one instant come
+_QUEUE = 256  # packets of zenoh that wait, 2.5 s at 100 Hz
+
+_T = TypeVar("_T")
+_Steps = Iterator[Sample | None]
+
+
+class Source:
+    """Samples, as an iterator that ends with the log, or when the source is closed.
+
+    It gives None where there was no sample for 0.2 s.
+
+    words : what is read, one line.   steps : samples, and None after each wait.
+    v_y : returns whether lateral velocity comes, None where no packet told yet.
+    close : ends what the source holds open.
+    """
+
+    def __init__(
+        self,
+        words: str,
+        steps: _Steps,
+        v_y: Callable[[], bool | None],
+        close: Callable[[], object] = lambda: None,
+    ) -> None:
+        self.words, self._steps, self._v_y, self._close = words, steps, v_y, close
+        self._closed = False
+
+    @property
+    def v_y(self) -> bool | None:
+        """Whether lateral velocity comes; it is known with the first sample, None before."""
+        return self._v_y()
+
+    def __iter__(self) -> Iterator[Sample | None]:
+        last = time.monotonic()
+        while not self._closed:
+            try:
+                one = next(self._steps)
+            except StopIteration:
+                return
+            except Exception:
+                if self._closed:  # meanwhile, by another thread
+                    return
+                raise
+            now = time.monotonic()
+            if one is not None or now - last >= QUIET:
+                last = now
+                yield one
+
+    def close(self) -> None:
+        """End the iteration, also one of another thread, and free what is open."""
+        if not self._closed:
+            self._closed = True
+            self._close()
+
+    def __enter__(self) -> "Source":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def open_source(
+    text: str, log_map: LogMap, counts: Counts, *, vehicle: Vehicle, speed: float = 1.0
+) -> Source:
+    """Open udp://[HOST]:PORT, can:[KIND:]CHANNEL, zenoh:KEY, or a log.
+
+    Parameters
+    ----------
+    text : of the source; behind a log may be ":RUN".
+    log_map : how it is read.
+    counts : in which packets and frames that cannot be read are counted.
+    vehicle : as declared, the map's repair not yet applied: a log must fit it.
+    speed : of the replay of a log; infinite waits for nothing.
+
+    Raises
+    ------
+    RecordingError
+        Where it cannot be opened, or the map declares what only a whole log allows.
+    """
+    opened = {"udp": _udp, "can": _can, "zenoh": _zenoh}.get(text.partition(":")[0])
+    if opened and ":" in text and not Path(text).exists():
+        require_live(log_map)
+        return opened(text, log_map, counts)
+    if not speed > 0.0:
+        raise RecordingError(f"speed must be positive, it is {speed:g}")
+    path, run = split_log_argument(text)
+    if not path.exists():
+        raise RecordingError(f"{displayed(text)} is no file and no source; sources are {FORMS}")
+    recording, _ = read_repaired(path, vehicle, run, log_map=log_map)
+    if np.any(recording.delta_r):
+        raise RecordingError(f"{recording.name}: rear axle steers, which cannot be read live")
+    measured = recording.logged_v_y is not None
+    words = f"{recording.name}, {recording.duration:.4g} s at {speed:g} times its speed"
+    return Source(words, _replayed(recording, speed), lambda: measured)
+
+
+def _replayed(recording: Recording, speed: float) -> _Steps:
+    none = np.full(len(recording), math.nan)
+    a_y, v_y = (none if one is None else one for one in (recording.a_y, recording.logged_v_y))
+    columns = (recording.t, recording.v_x, recording.r, recording.delta_f, a_y, v_y)
+    begin = time.monotonic()
+    for k in range(len(recording)):
+        sample = Sample(*(float(one[k]) for one in columns))
+        due = begin + (sample.t - float(recording.t[0])) / speed
+        while (left := due - time.monotonic()) > 0.0:
+            time.sleep(min(left, _WAIT))
+            yield None
+        yield sample
+
+
+def _steps(
+    receive: Callable[[], _T | None], take: Callable[[_T | None], Iterable[Sample]]
+) -> _Steps:
+    """Yield samples, and None after each packet and each wait in vain."""
+    while True:
+        yield from take(receive())
+        yield None
+
+
+def _udp(text: str, log_map: LogMap, counts: Counts) -> Source:
+    try:
+        where = urlsplit(text)
+        host, port = where.hostname or "127.0.0.1", where.port
+        if port is None or where.scheme != "udp" or not text.startswith("udp://"):
+            raise ValueError
+    except ValueError:
+        raise RecordingError(
+            f"{displayed(text)} must be udp://HOST:PORT or udp://:PORT, PORT at most 65535"
+        ) from None
+    packets = Packets(text, log_map, counts)
+    bound = None
+    try:
+        family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        bound = socket.socket(family, socket.SOCK_DGRAM)
+        bound.bind(address)
+    except OSError as error:
+        if bound:
+            bound.close()
+        raise RecordingError(
+            f"{text}: port {port} of {host} cannot be opened ({error.strerror}); name another, or "
+            "end the program that has it"
+        ) from None
+    bound.settimeout(_WAIT)
+
+    def receive() -> bytes | None:
+        try:
+            return bound.recv(LARGEST_PACKET)
+        except (TimeoutError, ConnectionError):  # Windows: an answer to a sender did not arrive
+            return None
+
+    host, port = bound.getsockname()[:2]
+    words = f"UDP at {host}:{port}, {log_map.packet or 'JSON'}"
+    return Source(words, _steps(receive, packets.take), lambda: packets.v_y, bound.close)
+
+
+def _zenoh(text: str, log_map: LogMap, counts: Counts) -> Source:
+    zenoh = _library("zenoh", text)
+    packets = Packets(text, log_map, counts)
+    queue, came = deque[bytes](maxlen=_QUEUE), Event()  # the oldest goes; its time shows the loss
+
+    def callback(sample: Any) -> None:
+        payload = sample.payload
+        queue.append(payload.to_bytes() if len(payload) <= LARGEST_PACKET else b"")
+        came.set()
+
+    def receive() -> bytes | None:
+        came.clear()
+        if not queue:
+            came.wait(_WAIT)
+        return queue.popleft() if queue else None
+
+    session = None
+    try:
+        from_env = "ZENOH_CONFIG" in os.environ
+        session = zenoh.open(zenoh.Config.from_env() if from_env else zenoh.Config())
+        session.declare_subscriber(text.partition(":")[2], callback)
+    except Exception as error:
+        if session:
+            session.close()
+        raise RecordingError(f"{text}: cannot be opened ({_reason(error)})") from None
+    return Source(text, _steps(receive, packets.take), lambda: packets.v_y, session.close)
+
+
+def _can(text: str, log_map: LogMap, counts: Counts) -> Source:
+    kind, _, channel = text.removeprefix("can:").rpartition(":")
+    can, _ = _library("can", text), _library("cantools", text)
+    frames = Frames(text, log_map, counts)
+    kind = kind or "socketcan"
+    more = {"preserve_timestamps": True} if kind == "virtual" else {}
+    try:
+        bus = can.Bus(channel=channel, interface=kind, can_filters=frames.filters, **more)
+    except Exception as error:  # a driver may raise anything
+        raise RecordingError(f"{text}: cannot be opened ({_reason(error)})") from None
+
+    def receive() -> Any:
+        try:
+            return bus.recv(_BURST if frames.waiting else _WAIT)
+        except can.CanError as error:
+            raise RecordingError(f"{text}: cannot be read ({_reason(error)})") from None
+
+    words = f"CAN {kind} {channel}, {log_map.dbc}"
+    return Source(words, _steps(receive, frames.take), lambda: frames.v_y, bus.shutdown)
+
+
+def _library(name: str, text: str) -> Any:
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise RecordingError(needs(f"{text}: reading it", name, "live")) from None
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
