@@ -132,14 +132,11 @@ class Frames:
             self._zero = t
         if self._zero > CALENDAR:  # as `models.logs.stamps.since`
             t = round((t - self._zero) * 1e6) / 1e6
-        if math.isnan(self._first):
-            self._first = self._newest = t
-        if t < self._newest - _BACK:
-            self._first, self._base = t, None
+        if not t >= self._newest - _BACK:
+            self._first, self._newest, self._base = t, t, None
             for one in self._channels:
                 one.last.clear()
             self.waiting.clear()
-            self._newest = t
         self._newest = max(self._newest, t)
         for one in channels:
             if one.take(t, frame.data[: message.length]) and one is self._base:

@@ -8,14 +8,14 @@ import math
 import struct
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import NoneType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from codegen.escape import displayed
 from models.logs.log import RecordingError, some
 from models.logs.signals import BETA, INSTEAD, POSE, WHEELS, Signal, quantity_of
-from models.logs.units import PER_SECOND, is_given, time_unit, to_si
+from models.logs.units import PER_SECOND, TIME, is_given, time_unit, to_si
 from models.recordings.choice import column_of, has_v_y, missing_signals
 from models.recordings.map import AXES, LARGEST_PACKET, LogMap
 from tireid.live.state import Counts
@@ -41,22 +41,15 @@ def require_live(log_map: LogMap) -> None:
     """Refuse what a map declares and only a whole log allows."""
     signals, repair = log_map.signals, log_map.repair
     declared = {
-        "file.run": log_map.run,
-        "clock.rate": log_map.rate,
-        "filters.low_pass": log_map.low_pass,
-        "repair.delay": repair.delay,
-        "repair.lag": repair.lag,
+        "file.run": log_map.run, "clock.rate": log_map.rate, "filters.low_pass": log_map.low_pass,
+        "repair.delay": repair.delay, "repair.lag": repair.lag,
         "repair.acceleration_sensor_x": repair.acceleration_sensor_x,
-        **{f"signals.{name}.sign": one.sign for name, one in signals.items()},
         "signals.delta_r": "delta_r" in signals,
-    }
-    if "v_x" not in signals:
-        declared |= {f"signals.{name}": name in signals for name in (*WHEELS, *POSE)}
-    for key, value in declared.items():
-        if value:
-            raise RecordingError(
-                f"{key} of log.toml cannot be read live, only of a log; leave it out"
-            )
+        **{f"signals.{name}.sign": one.sign for name, one in signals.items()},
+        **{f"signals.{name}": "v_x" not in signals for name in (*WHEELS, *POSE) if name in signals},
+    }  # fmt: skip
+    if key := next((key for key, value in declared.items() if value), None):
+        raise RecordingError(f"{key} of log.toml cannot be read live, only of a log; leave it out")
 
 
 class Reading:
@@ -103,13 +96,9 @@ class Packets:
             for name in READ:
                 if name != BETA and INSTEAD.get(name) not in self._signals:
                     self._signals.setdefault(name, Signal(channel=(column_of(name),)))
-        unit = time_unit(log_map.clock_unit or "s")
-        if not unit:
-            raise RecordingError(
-                f"{label}: clock.unit must be one of {', '.join(PER_SECOND)} to be read live, not "
-                f"{displayed(log_map.clock_unit)}"
-            )
-        self._per_second, self._arrived, self._counts_from = PER_SECOND[unit], False, math.nan
+        to_si(log_map.clock_unit, TIME, f"{label}: clock.unit")
+        self._per_second = PER_SECOND.get(time_unit(log_map.clock_unit), 1.0)
+        self._arrived, self._zero = False, math.nan  # whether time is that of arrival; the first
         self._reading = Reading(log_map, self._signals, {})
         names = [*(name for name, _ in self._reading.channels), log_map.clock or _TIME]
         self._places = [(name, name.split(".")) for name in names]
@@ -138,9 +127,9 @@ class Packets:
         if self._looked < _FIRST:
             self._look(packet)
         if self._arrived:
-            now = time.monotonic()
-            self._counts_from = now if math.isnan(self._counts_from) else self._counts_from
-            t = now - self._counts_from
+            t = time.monotonic()
+            self._zero = t if math.isnan(self._zero) else self._zero
+            t -= self._zero
         elif self._per_second != 1.0:
             t /= self._per_second
         channels = self._reading.channels
@@ -176,11 +165,9 @@ def _number(packet: Mapping[str, Any], name: str, path: Sequence[str]) -> float:
         value = packet
         for one in path:
             value = None if value is None else value.get(one)
-    if value is None:
-        return math.nan
-    if type(value) not in (int, float):
+    if type(value) not in (int, float, NoneType):
         raise TypeError
-    return float(value)
+    return math.nan if value is None else float(value)
 
 
 def _names(packet: Mapping[str, Any], before: str) -> Iterable[str]:

@@ -7,9 +7,10 @@ import socket
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from threading import Event
-from typing import Any, TypeVar
+from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -31,40 +32,35 @@ _WAIT = 0.1  # s, longest wait at a time: closing is not later
 _BURST = 2e-3  # s, within which frames of one instant come
 _QUEUE = 256  # packets of zenoh that wait, 2.5 s at 100 Hz
 
-_T = TypeVar("_T")
-_Steps = Iterator[Sample | None]
 
-
+@dataclass(slots=True, eq=False)
 class Source:
     """Samples, as an iterator that ends with the log, or when the source is closed.
 
     It gives None where there was no sample for 0.2 s.
 
-    words : what is read, one line.   steps : samples, and None after each wait.
-    v_y : returns whether lateral velocity comes, None where no packet told yet.
-    close : ends what the source holds open.
+    words : what is read, one line.   steps : samples, and None after each packet or wait.
+    reading : whose v_y says whether lateral velocity comes.   free : closes what is open.
     """
 
-    def __init__(
-        self,
-        words: str,
-        steps: _Steps,
-        v_y: Callable[[], bool | None],
-        close: Callable[[], object] = lambda: None,
-    ) -> None:
-        self.words, self._steps, self._v_y, self._close = words, steps, v_y, close
-        self._closed = False
+    words: str
+    steps: Iterator[Sample | None]
+    reading: Packets | Frames | Recording
+    free: Callable[[], object] = lambda: None
+    _closed: bool = False
 
     @property
     def v_y(self) -> bool | None:
-        """Whether lateral velocity comes; it is known with the first sample, None before."""
-        return self._v_y()
+        """Whether lateral velocity comes; None where only the first sample will tell."""
+        if isinstance(self.reading, Recording):
+            return self.reading.logged_v_y is not None
+        return self.reading.v_y
 
     def __iter__(self) -> Iterator[Sample | None]:
         last = time.monotonic()
         while not self._closed:
             try:
-                one = next(self._steps)
+                one = next(self.steps)
             except StopIteration:
                 return
             except Exception:
@@ -80,7 +76,7 @@ class Source:
         """End the iteration, also one of another thread, and free what is open."""
         if not self._closed:
             self._closed = True
-            self._close()
+            self.free()
 
     def __enter__(self) -> "Source":
         return self
@@ -119,15 +115,16 @@ def open_source(
     recording, _ = read_repaired(path, vehicle, run, log_map=log_map)
     if np.any(recording.delta_r):
         raise RecordingError(f"{recording.name}: rear axle steers, which cannot be read live")
-    measured = recording.logged_v_y is not None
     words = f"{recording.name}, {recording.duration:.4g} s at {speed:g} times its speed"
-    return Source(words, _replayed(recording, speed), lambda: measured)
+    return Source(words, _replayed(recording, speed), recording)
 
 
-def _replayed(recording: Recording, speed: float) -> _Steps:
-    none = np.full(len(recording), math.nan)
-    a_y, v_y = (none if one is None else one for one in (recording.a_y, recording.logged_v_y))
-    columns = (recording.t, recording.v_x, recording.r, recording.delta_f, a_y, v_y)
+def _replayed(recording: Recording, speed: float) -> Iterator[Sample | None]:
+    none, v_y = np.full(len(recording), math.nan), recording.logged_v_y
+    columns = (
+        recording.t, recording.v_x, recording.r, recording.delta_f,
+        none if recording.a_y is None else recording.a_y, none if v_y is None else v_y,
+    )  # fmt: skip
     begin = time.monotonic()
     for k in range(len(recording)):
         sample = Sample(*(float(one[k]) for one in columns))
@@ -138,12 +135,11 @@ def _replayed(recording: Recording, speed: float) -> _Steps:
         yield sample
 
 
-def _steps(
-    receive: Callable[[], _T | None], take: Callable[[_T | None], Iterable[Sample]]
-) -> _Steps:
-    """Yield samples, and None after each packet and each wait in vain."""
+def _read(
+    receive: Callable[[], Any], take: Callable[[Any], Iterable[Sample]]
+) -> Iterator[Sample | None]:
     while True:
-        yield from take(receive())
+        yield from take(receive())  # None where nothing came
         yield None
 
 
@@ -180,7 +176,7 @@ def _udp(text: str, log_map: LogMap, counts: Counts) -> Source:
 
     host, port = bound.getsockname()[:2]
     words = f"UDP at {host}:{port}, {log_map.packet or 'JSON'}"
-    return Source(words, _steps(receive, packets.take), lambda: packets.v_y, bound.close)
+    return Source(words, _read(receive, packets.take), packets, bound.close)
 
 
 def _zenoh(text: str, log_map: LogMap, counts: Counts) -> Source:
@@ -208,13 +204,13 @@ def _zenoh(text: str, log_map: LogMap, counts: Counts) -> Source:
         if session:
             session.close()
         raise RecordingError(f"{text}: cannot be opened ({_reason(error)})") from None
-    return Source(text, _steps(receive, packets.take), lambda: packets.v_y, session.close)
+    return Source(text, _read(receive, packets.take), packets, session.close)
 
 
 def _can(text: str, log_map: LogMap, counts: Counts) -> Source:
-    kind, _, channel = text.removeprefix("can:").rpartition(":")
     can, _ = _library("can", text), _library("cantools", text)
     frames = Frames(text, log_map, counts)
+    kind, _, channel = text[4:].rpartition(":")
     kind = kind or "socketcan"
     more = {"preserve_timestamps": True} if kind == "virtual" else {}
     try:
@@ -229,7 +225,7 @@ def _can(text: str, log_map: LogMap, counts: Counts) -> Source:
             raise RecordingError(f"{text}: cannot be read ({_reason(error)})") from None
 
     words = f"CAN {kind} {channel}, {log_map.dbc}"
-    return Source(words, _steps(receive, frames.take), lambda: frames.v_y, bus.shutdown)
+    return Source(words, _read(receive, frames.take), frames, bus.shutdown)
 
 
 def _library(name: str, text: str) -> Any:

@@ -20,6 +20,7 @@ from models.recordings import read_recording, read_repaired
 from models.recordings.map import LogMap
 from models.recordings.repair import Repair
 from models.vehicle import sedan
+from tireid.live.frames import Frames
 from tireid.live.packets import Packets, Sample
 from tireid.live.sources import FORMS, open_source
 from tireid.live.state import Counts
@@ -259,8 +260,8 @@ def bus_map(folder):
     return LogMap(axes="SAE", dbc=str(path), signals=found)
 
 
-def messages(can, slow):
-    """Frames of the car: one at 50 Hz some time after the others where `slow`."""
+def messages(can, steering):
+    """Frames of the car at 100 Hz, of one instant each; the steering some time after, at a rate."""
     begin, found = 1_700_000_000.25, []
 
     def add(t, identifier, data):
@@ -270,23 +271,24 @@ def messages(can, slow):
 
     for k in range(160):
         t = begin + 0.01 * k
-        speed, yaw, side, angle = (int(one) for one in RNG.integers(-900, 900, 4))
-        if not slow or k % 2 == 0:
-            late = 0.003 if slow else 0.0
-            add(t + late, 0x18FF1000, struct.pack("<hh", angle, 0))
-        for page in (0, 1):
-            add(t, 200, struct.pack("<Bh5x", page, side))
+        speed, yaw, side = (int(one) for one in RNG.integers(-900, 900, 3))
         lateral = struct.pack("<f", 0.01 * yaw)
         add(t, 100, struct.pack("<H", 8000 + speed) + struct.pack(">h", yaw) + lateral)
+        for page in (0, 1):
+            add(t, 200, struct.pack("<Bh5x", page, side))
         add(t, 300, b"\1\2")
+    late = 0.003 if steering < 100 else 0.0
+    for k in range(int(1.6 * steering)):
+        angle = int(RNG.integers(-900, 900))
+        add(begin + late + k / steering, 0x18FF1000, struct.pack("<hh", angle, 0))
     return sorted(found, key=lambda one: one.timestamp)
 
 
-@pytest.mark.parametrize("slow", [False, True])
-def test_a_bus_gives_the_numbers_of_its_candump(slow, tmp_path):
+@pytest.mark.parametrize("steering", [100, 50, 500])
+def test_a_bus_gives_the_numbers_of_its_candump(steering, tmp_path):
     can = pytest.importorskip("can")
     pytest.importorskip("cantools")
-    log_map, counts, frames = bus_map(tmp_path), Counts(), messages(can, slow)
+    log_map, counts, frames = bus_map(tmp_path), Counts(), messages(can, steering)
     with can.Logger(str(tmp_path / "bus.log")) as log:
         for one in frames:
             log.on_message_received(one)
@@ -300,8 +302,35 @@ def test_a_bus_gives_the_numbers_of_its_candump(slow, tmp_path):
         bus.send(can.Message(frames[0].timestamp, 100, False, is_remote_frame=True, dlc=8))
         for one in frames:
             bus.send(one)
-        assert_same(first(source, 150), expected)
+        samples = first(source, 150)
     assert counts.unreadable == 1
+    if steering > 100:  # its mean, of sums that begin elsewhere
+        angles = [one.delta_f for one in samples]
+        np.testing.assert_allclose(angles, expected.delta_f[:150], rtol=0.0, atol=1e-12)
+        samples = [
+            one._replace(delta_f=value)
+            for one, value in zip(samples, expected.delta_f, strict=False)
+        ]
+    assert_same(samples, expected)
+
+
+def test_a_bus_whose_clock_jumps_back_or_whose_signal_pauses_goes_on(tmp_path):
+    can = pytest.importorskip("can")
+    pytest.importorskip("cantools")
+    log_map, frames = bus_map(tmp_path), messages(can, 100)
+    joined = Frames("can:a", log_map, Counts())
+
+    def taken(some, by):
+        return [sample for one in some for sample in by.take(one)]
+
+    taken(messages(can, 100), joined)
+    again = taken(frames, joined)  # other values, 1.6 s earlier
+    assert again == taken(frames, Frames("can:a", log_map, Counts())) and len(again) >= 158
+    without = [one for one in frames if one.arbitration_id != 0x18FF1000]
+    for one in without:
+        one.timestamp += 1.6
+    paused = [math.isnan(one.delta_f) for one in taken(without, joined)]
+    assert not any(paused[:9]) and all(paused[12:]) and len(paused) > 150
 
 
 def test_a_dbc_without_the_signal_and_an_interface_that_is_none_are_refused(tmp_path):
