@@ -7,6 +7,7 @@ axle forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is posit
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -113,10 +114,14 @@ class Signal:
         """The channels that are read, that of the sign last."""
         return (*self.channel, self.sign) if self.sign else self.channel
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is its channel in SI, but for a sign that another one has."""
+        return self == Signal(channel=self.channel[:1], unit=self.unit, sign=self.sign)
+
     def value(self, parts: Sequence[Array], quantity: str) -> Array:
         """Return the signal of its channels.   parts : each channel in SI, on one clock (n,)."""
-        plain = Signal(channel=self.channel[:1], unit=self.unit, sign=self.sign)
-        if len(parts) == 1 and self == plain:
+        if self.is_plain:
             return parts[0]
         return filled(
             parts[0].size, lambda part: self._value([one[part] for one in parts], quantity)
@@ -137,11 +142,17 @@ class Signal:
         """Return the angle of the road wheels, by ratio or table.   total : (n,), or a number."""
         if not self.table:
             return total / self.ratio
-        hand, road = np.array(self.table).T
+        hand, road, (first, last) = _curve(self.table)
         inside = np.interp(total, hand, road)
-        first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
         below, above = np.minimum(total - hand[0], 0.0), np.maximum(total - hand[-1], 0.0)
         return inside + first * below + last * above
+
+
+@lru_cache(maxsize=8)
+def _curve(table: tuple[tuple[float, float], ...]) -> tuple[Array, Array, list[float]]:
+    """Return angles of hand wheel and road wheels of a table, and the slopes at its ends."""
+    hand, road = np.array(table).T
+    return hand, road, (np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]).tolist()
 
 
 def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:

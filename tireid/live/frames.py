@@ -26,6 +26,7 @@ _NEAR = ON_STEP * _DT  # s, within which two instants are one
 _OBSERVED = 0.5  # s, of which rates are learnt
 _FEWEST = 3  # samples that tell a rate
 _LONGEST = 5.0  # s, after which a signal that did not come is missing
+_MOST = 8192  # samples of a channel that wait for others: 8 s at 1 kHz
 _BACK = 1.0  # s, from which a clock that goes back begins anew
 
 
@@ -37,7 +38,7 @@ class _Channel:
 
     def __init__(self, name: str, read: Callable[[bytes], float | None], factor: float) -> None:
         self.name, self._read, self._factor = name, read, factor
-        self.last = deque[tuple[float, float]]()  # time [s] and value, rising
+        self.last = deque[tuple[float, float]](maxlen=_MOST)  # time [s] and value, rising
         self.interval = math.nan  # between samples [s], typical
 
     def take(self, t: float, data: bytes) -> bool:

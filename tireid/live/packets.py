@@ -61,26 +61,30 @@ class Reading:
     def __init__(
         self, log_map: LogMap, signals: Mapping[str, Signal], units: Mapping[str, str]
     ) -> None:
-        self._repair, self._sign = log_map.repair, AXES[log_map.axes]
+        self._repair = log_map.repair or None
         self.channels: list[tuple[str, float]] = []  # name, and factor to SI
-        self._parts: list[tuple[str, Signal, slice]] = []
+        self._parts: list[tuple[str, Signal | None, slice, float]] = []  # None: as its channel
         for name, signal in signals.items():
             first = len(self.channels)
             for one in signal.channel:
                 unit = signal.unit if is_given(signal.unit) else units.get(one, "")
                 what = f"{column_of(name)} (channel {one!r})"
                 self.channels.append((one, to_si(unit, quantity_of(name, unit), what)))
-            self._parts.append((name, signal, slice(first, len(self.channels))))
+            changed = None if signal.is_plain else signal
+            sign = 1.0 if name == "v_x" else AXES[log_map.axes]
+            self._parts.append((name, changed, slice(first, len(self.channels)), sign))
 
     def sample(self, t: float, values: Sequence[float]) -> Sample:
         """Return the sample of an instant.   values : of each channel in SI, NaN of none."""
-        now = dict.fromkeys(("v_x", "r", "delta_f", "a_y", "v_y"), math.nan)
-        for name, signal, part in self._parts:
-            value = signal.at(values[part])
-            now[name] = value if name == "v_x" else value * self._sign
+        now = {"a_y": math.nan, "v_y": math.nan}
+        for name, signal, part, sign in self._parts:
+            value = values[part.start] if signal is None else signal.at(values[part])
+            now[name] = value * sign
         if BETA in now:
             now["v_y"] = now["v_x"] * float(np.tan(now.pop(BETA)))
-        return Sample(t, **(self._repair.at(now) if self._repair else now))
+        if self._repair:
+            now = self._repair.at(now)
+        return Sample(t, now["v_x"], now["r"], now["delta_f"], now["a_y"], now["v_y"])
 
 
 class Packets:
@@ -119,7 +123,7 @@ class Packets:
             if self._struct:
                 packet = dict(zip(self._map.fields, self._struct.unpack(data), strict=True))
             else:
-                packet = json.loads(data)
+                packet = json.loads(data.decode())
             *values, t = [_number(packet, name, path) for name, path in self._places]
         except (ValueError, TypeError, AttributeError, OverflowError, RecursionError, struct.error):
             self._counts.unreadable += 1

@@ -1,6 +1,5 @@
 """Where samples come from while a car drives: packets, a bus, or a log that is replayed."""
 
-import importlib
 import math
 import os
 import socket
@@ -16,7 +15,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from codegen.escape import displayed
-from models.extras import needs
+from models.logs.foreign import need, reason_of
 from models.logs.log import RecordingError
 from models.recordings.map import LARGEST_PACKET, LogMap
 from models.recordings.reader import read_repaired, split_log_argument
@@ -88,20 +87,14 @@ class Source:
 def open_source(
     text: str, log_map: LogMap, counts: Counts, *, vehicle: Vehicle, speed: float = 1.0
 ) -> Source:
-    """Open udp://[HOST]:PORT, can:[KIND:]CHANNEL, zenoh:KEY, or a log.
+    """Open udp://[HOST]:PORT, can:[KIND:]CHANNEL, zenoh:KEY, or a log, also LOG:RUN.
 
     Parameters
     ----------
-    text : of the source; behind a log may be ":RUN".
     log_map : how it is read.
     counts : in which packets and frames that cannot be read are counted.
     vehicle : as declared, the map's repair not yet applied: a log must fit it.
     speed : of the replay of a log; infinite waits for nothing.
-
-    Raises
-    ------
-    RecordingError
-        Where it cannot be opened, or the map declares what only a whole log allows.
     """
     opened = {"udp": _udp, "can": _can, "zenoh": _zenoh}.get(text.partition(":")[0])
     if opened and ":" in text and not Path(text).exists():
@@ -180,7 +173,7 @@ def _udp(text: str, log_map: LogMap, counts: Counts) -> Source:
 
 
 def _zenoh(text: str, log_map: LogMap, counts: Counts) -> Source:
-    zenoh = _library("zenoh", text)
+    zenoh = need(Path(text), "zenoh", "it", "live")
     packets = Packets(text, log_map, counts)
     queue, came = deque[bytes](maxlen=_QUEUE), Event()  # the oldest goes; its time shows the loss
 
@@ -203,37 +196,27 @@ def _zenoh(text: str, log_map: LogMap, counts: Counts) -> Source:
     except Exception as error:
         if session:
             session.close()
-        raise RecordingError(f"{text}: cannot be opened ({_reason(error)})") from None
+        raise RecordingError(f"{text}: cannot be opened ({reason_of(error)})") from None
     return Source(text, _read(receive, packets.take), packets, session.close)
 
 
 def _can(text: str, log_map: LogMap, counts: Counts) -> Source:
-    can, _ = _library("can", text), _library("cantools", text)
+    can = need(Path(text), "can", "it", "live")
     frames = Frames(text, log_map, counts)
-    kind, _, channel = text[4:].rpartition(":")
-    kind = kind or "socketcan"
+    kind, colon, channel = text[4:].partition(":")
+    if not colon:
+        kind, channel = "socketcan", kind
     more = {"preserve_timestamps": True} if kind == "virtual" else {}
     try:
         bus = can.Bus(channel=channel, interface=kind, can_filters=frames.filters, **more)
     except Exception as error:  # a driver may raise anything
-        raise RecordingError(f"{text}: cannot be opened ({_reason(error)})") from None
+        raise RecordingError(f"{text}: cannot be opened ({reason_of(error)})") from None
 
     def receive() -> Any:
         try:
             return bus.recv(_BURST if frames.waiting else _WAIT)
         except can.CanError as error:
-            raise RecordingError(f"{text}: cannot be read ({_reason(error)})") from None
+            raise RecordingError(f"{text}: cannot be read ({reason_of(error)})") from None
 
     words = f"CAN {kind} {channel}, {log_map.dbc}"
     return Source(words, _read(receive, frames.take), frames, bus.shutdown)
-
-
-def _library(name: str, text: str) -> Any:
-    try:
-        return importlib.import_module(name)
-    except ImportError:
-        raise RecordingError(needs(f"{text}: reading it", name, "live")) from None
-
-
-def _reason(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
