@@ -85,6 +85,15 @@ def test_what_is_written_reads_back_bit_for_bit(
     assert again == made and again.toml() == made.toml()
 
 
+@settings(max_examples=100, deadline=None)
+@given(declared=signals(), seed=st.integers(0, 2**32 - 1))
+def test_one_instant_of_a_signal_has_the_bits_of_a_log(declared, seed):
+    for name, signal in declared.items():
+        parts = np.random.default_rng(seed).normal(0.0, 2.0, (len(signal.channel), 20))
+        log = signal.value(list(parts), QUANTITIES[name])
+        assert [signal.at(instant) for instant in parts.T.tolist()] == log.tolist()
+
+
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
