@@ -102,6 +102,8 @@ class State:
 
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray):
+        if np.isfinite(value).all():
+            return value.tolist()
         return [_plain(one) for one in value.tolist()]
     if isinstance(value, list | tuple) and not hasattr(value, "_asdict"):
         return [_plain(one) for one in value]
