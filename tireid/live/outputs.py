@@ -31,6 +31,7 @@ TOPIC = "/tireid/state"
 _BACKLOG = 64  # messages that wait for a client: 13 s of them, 0.3 MB
 _CHUNK = 1 << 16  # bytes of a recording between writes: 3 s of it are lost where the power fails
 _SILENT = 5.0  # s, after which a browser that says nothing is dropped
+_PATIENCE = 1.0  # s for a server to end: a client that does not read would have it wait for ever
 _SCRIPT, _STYLE = "text/javascript", "text/css"
 _FILES = {  # all that is served, by what is asked for
     "/": ("live/page.html", "text/html; charset=utf-8"),
@@ -76,7 +77,7 @@ class Outputs:
                 name="tireid", host=host, port=port and port + 1, capabilities=[],
                 context=context, message_backlog_size=_BACKLOG,
             )  # fmt: skip
-            stack.callback(server.stop)
+            stack.callback(_stop, server)
             pages = stack.enter_context(_Pages(host, port, server.port))
         except (OSError, OverflowError, RuntimeError) as error:
             reason = str(getattr(error, "strerror", None) or error).rpartition(": ")[2]
@@ -107,6 +108,12 @@ class Outputs:
 
     def __exit__(self, *_: object) -> None:
         self._stack.close()
+
+
+def _stop(server: Any) -> None:
+    ending = Thread(target=server.stop, daemon=True)
+    ending.start()
+    ending.join(_PATIENCE)
 
 
 class _Recording:
