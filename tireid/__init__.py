@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from tireid.figures.lap import plot as _plot
     from tireid.learning import identify as identify
     from tireid.learning import replay as replay
+    from tireid.live.live import Live as Live
+    from tireid.live.state import State as State
     from tireid.run import Run as Run
 
     paths, plot = _path, _plot
@@ -73,6 +75,8 @@ _NAMES = {  # by the module that they lie in
     "mpc.path.speed": "SpeedProfile speed_profile",
     "tireid.driving.learn": "sample_recording",
     "tireid.driving.runs": "drive",
+    "tireid.live.live": "Live",
+    "tireid.live.state": "State",
     "tireid.emitting": "emit",
     "tireid.exporting": "export",
     "tireid.learning": "identify replay",
