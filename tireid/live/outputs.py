@@ -12,8 +12,8 @@ import socket
 import tempfile
 import time
 from collections import deque
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from http.server import BaseHTTPRequestHandler
 from pathlib import Path
 from socketserver import ThreadingTCPServer
@@ -51,7 +51,7 @@ class Outputs:
     """
 
     def __init__(self, serve: tuple[str, int] | None = None, record: Path | None = None) -> None:
-        self._logs: list[Any] = []  # each takes a message and its time [ns]
+        self._logs: list[Callable[[bytes, int], None]] = []  # message, and its time [ns]
         lines = []
         with ExitStack() as stack:
             if record is not None:
@@ -130,26 +130,23 @@ class _Recording:
             raise OutputError(f"{path} exists: choose another name for --record") from None
         self._writer = writer = Writer(self._file, chunk_size=_CHUNK)
         writer.start(library="tireid")
-        schema = json.dumps(State.schema()).encode()
-        number = writer.register_schema("tireid.State", "jsonschema", schema)
+        schema = State.schema()
+        number = writer.register_schema(schema["title"], "jsonschema", json.dumps(schema).encode())
         self._channel = writer.register_channel(TOPIC, "json", number)
 
     def log(self, message: bytes, now: int) -> None:
-        if not self._file.closed:
-            with self._said_where_it_ends():
-                self._writer.add_message(self._channel, now, message, now)
-                self._file.flush()
+        self._write(lambda: self._writer.add_message(self._channel, now, message, now))
 
     def close(self) -> None:
-        if not self._file.closed:
-            with self._said_where_it_ends():
-                self._writer.finish()  # type: ignore[no-untyped-call]
-                self._file.close()
+        self._write(self._writer.finish)
+        self._file.close()
 
-    @contextmanager
-    def _said_where_it_ends(self) -> Iterator[None]:
+    def _write(self, step: Callable[[], None]) -> None:
+        if self._file.closed:
+            return
         try:
-            yield
+            step()
+            self._file.flush()
         except OSError as error:
             say(f"{self._file.name} ends here, all else goes on: {error.strerror}")
             with suppress(OSError):

@@ -38,7 +38,7 @@ def made(t, **other):
         "understeer": 0.0031, "understeer_sd": np.nan, "a_y_limit": 9.1, "a_y_limit_sd": 0.3,
         "friction": 1.0, "friction_since": 0.0, "side_slip": 0.01, "side_slip_sd": 0.004,
         "steering_zero": -0.006, "steering_zero_sd": 0.0007, "v_y_bias": None, "v_y_bias_sd": None,
-        "point": Point((0.03, -0.02), (2.8e3, -1.9e3)), "counts": Counts(lost=3),
+        "point": Point(np.array([0.03, -0.02]), np.array([2e3, -1e3])), "counts": Counts(lost=3),
     }  # fmt: skip
     return State(**(values | other))
 
