@@ -32,12 +32,11 @@ _BACKLOG = 64  # messages that wait for a client: 13 s of them, 0.3 MB
 _CHUNK = 1 << 16  # bytes of a recording between writes: 3 s of it are lost where the power fails
 _SILENT = 5.0  # s, after which a browser that says nothing is dropped
 _PATIENCE = 1.0  # s for a server to end: a client that does not read would have it wait for ever
-_SCRIPT, _STYLE = "text/javascript", "text/css"
 _FILES = {  # all that is served, by what is asked for
     "/": ("live/page.html", "text/html; charset=utf-8"),
-    "/report.css": ("report.css", _STYLE),
-    "/uPlot.min.css": ("live/uplot/uPlot.min.css", _STYLE),
-    "/uPlot.iife.min.js": ("live/uplot/uPlot.iife.min.js", _SCRIPT),
+    "/report.css": ("report.css", "text/css"),
+    "/uPlot.min.css": ("live/uplot/uPlot.min.css", "text/css"),
+    "/uPlot.iife.min.js": ("live/uplot/uPlot.iife.min.js", "text/javascript"),
 }
 
 
@@ -87,9 +86,7 @@ class Outputs:
             ) from None
         Thread(target=pages.serve_forever, args=(0.1,), daemon=True).start()
         stack.callback(pages.shutdown)
-        topic = foxglove.Channel(
-            TOPIC, schema=State.schema(), message_encoding="json", context=context
-        )
+        topic = foxglove.Channel(TOPIC, schema=State.schema(), context=context)
         self._logs.append(lambda message, now: topic.log(message, log_time=now))
         name = f"[{host}]" if ":" in host else host
         return (
@@ -161,13 +158,8 @@ class _Pages(ThreadingTCPServer):
 
     def __init__(self, host: str, port: int, topic: int) -> None:
         self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        self.topic = topic
         super().__init__((host, port), _Page)
-        here = Path(__file__).parents[1]
-        self.files = {
-            path: ((here / name).read_bytes(), kind) for path, (name, kind) in _FILES.items()
-        }
-        page, kind = self.files["/"]
-        self.files["/"] = page.replace(b"%PORT%", b"%d" % topic), kind
 
     def handle_error(self, *_: object) -> None:
         """Forget a browser that went away."""
@@ -178,16 +170,16 @@ class _Page(BaseHTTPRequestHandler):
     server: _Pages
 
     def do_GET(self) -> None:
-        if self.path not in self.server.files:
-            return self.send_error(404)
-        content, kind = self.server.files[self.path]
+        if self.path not in _FILES:
+            self.send_error(404)
+            return
+        name, kind = _FILES[self.path]
+        content = (Path(__file__).parents[1] / name).read_bytes()
         self.send_response(200)
         self.send_header("Content-Type", kind)
-        self.send_header("Content-Length", str(len(content)))
         self.send_header("Cache-Control", "no-store")  # the next run may have other ports
         self.end_headers()
-        self.wfile.write(content)
-        return None
+        self.wfile.write(content.replace(b"%PORT%", b"%d" % self.server.topic))
 
     def log_message(self, *_: object) -> None:
         """Be silent."""
