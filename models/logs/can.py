@@ -79,12 +79,6 @@ class Dbc(NamedTuple):
             identifier = self.groups.get(_group_of(identifier), identifier)
         return self.messages.get(identifier)
 
-    def mask(self, identifier: int) -> int:
-        """Return the bits of an identifier that the frames of its message share."""
-        if identifier not in self.groups.values():
-            return _IDENTIFIER if identifier & EXTENDED else _SHORT
-        return 0x3FFFF00 if (identifier >> 16) & 0xFF >= 240 else 0x3FF0000
-
 
 class _Frames(NamedTuple):
     """Frames of one identifier on one bus.
@@ -554,52 +548,36 @@ def _raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
 def wanted(path: Path, names: Sequence[str]) -> tuple[Dbc, list[tuple[int, Any]]]:
     """Return a DBC, and of each signal "Frame.Signal" the identifier and the signal in it."""
     given = read_dbc(path)
-    listed = {
+    found = chosen(path, names, {
         f"{message.name}.{one.name}": (identifier, one)
         for identifier, message in given.messages.items()
         for one in message.signals
-    }
-    found = chosen(path, names, listed)
-    for identifier, signal in found:
-        message = given.messages[identifier]
-        for one in (signal, *(one for one, _ in _selectors(message, signal))):
-            if fault := given.faults.get((message.name, one.name)):
-                raise RecordingError(fault)
+    })  # fmt: skip
+    read = {given.messages[identifier].name for identifier, _ in found}
+    for (frame, _), fault in given.faults.items():
+        if frame in read:  # which is decoded as a whole
+            raise RecordingError(fault)
     return given, found
 
 
-def reader_of(message: Any, signal: Any) -> Callable[[bytes], float | None]:
-    """Return what reads a signal in its unit from a frame as `_values_of` does, bit for bit.
+def reader_of(message: Any) -> Callable[[bytes], dict[str, float]]:
+    """Return what gives the signals that a frame holds, by name, as `_values_of` does."""
+    from cantools.database.errors import DecodeError
 
-    It gives NaN where the DBC says that a value is no number, None where the frame does not hold
-    the signal.
-    """
-    raw, none = _raw_reader(signal), frozenset(_no_numbers(signal))
-    selectors = [(_raw_reader(one), ids) for one, ids in _selectors(message, signal)]
-    scale, offset = float(signal.scale), float(signal.offset)
+    known = {
+        one.name: (frozenset(_no_numbers(one)), float(one.scale), float(one.offset))
+        for one in message.signals
+    }
 
-    def read(data: bytes) -> float | None:
-        for selector, ids in selectors:
-            if selector(data) not in ids:
-                return None
-        value = raw(data)
-        return math.nan if value in none else float(value) * scale + offset
-
-    return read
-
-
-def _raw_reader(signal: Any) -> Callable[[bytes], int | float]:
-    length, (where, before) = signal.length, _place(signal)
-    order: Literal["little", "big"] = "little" if signal.byte_order == "little_endian" else "big"
-    shift = before if order == "little" else 8 * (where.stop - where.start) - before - length
-    mask, half = (1 << length) - 1, 1 << (length - 1 if signal.is_signed else length)
-    kind = struct.Struct({16: "<e", 32: "<f", 64: "<d"}[length]) if signal.is_float else None
-
-    def read(data: bytes) -> int | float:
-        bits = int.from_bytes(data[where], order) >> shift & mask
-        if kind is not None:
-            number: float = kind.unpack(bits.to_bytes(length // 8, "little"))[0]
-            return number
-        return bits - 2 * half if bits >= half else bits
+    def read(data: bytes) -> dict[str, float]:
+        try:
+            raws = message.decode(data[: message.length], decode_choices=False, scaling=False)
+        except DecodeError:  # a page that the DBC does not know
+            return {}
+        there = ((name, raw, *known[name]) for name, raw in raws.items())
+        return {
+            name: math.nan if raw in none else raw * scale + offset
+            for name, raw, none, scale, offset in there
+        }
 
     return read

@@ -79,9 +79,8 @@ class LogMap:
         the rest follows after a gap.
     low_pass : cut-off of a low pass on all signals [Hz]; None filters nothing. All pass the same
         one, of second order, which looks at no later sample: so none is late against another.
-    packet : of a live source, how numbers are packed, as Python's struct writes it ("<d4f"); empty
-        where packets are JSON.
-    fields : the channel that each of these numbers is.
+    packet, fields : of a live source, how numbers are packed, as Python's struct writes it ("<d4f";
+        empty where packets are JSON), and the channel that each is.
     wheels : what they are, where v_x is made of their speeds.
     repair : corrections of the recording and of the car, after reading.
     """
@@ -225,22 +224,17 @@ def _require_numbers(packet: str, fields: Sequence[str]) -> None:
     """Refuse a packet that is not a number for each field."""
     try:
         size = struct.calcsize(packet)
-        if not 0 < size <= LARGEST_PACKET:
-            raise struct.error(f"it has {size} bytes, 1 to {LARGEST_PACKET} are allowed")
-        values = struct.unpack(packet, bytes(size))
-    except (struct.error, UnicodeEncodeError) as error:
+        numbers = struct.unpack(packet, bytes(size)) if size <= LARGEST_PACKET else ()
+    except (struct.error, ValueError):
+        numbers = ()
+    if not numbers or not all(type(one) in (int, float) for one in numbers):
         raise RecordingError(
-            f'packet.format must be a format of Python\'s struct, as "<d4f", not '
-            f"{displayed(packet)} ({error})"
-        ) from None
-    if not all(type(value) in (int, float) for value in values):
-        raise RecordingError(
-            f'packet.format must hold numbers alone; skip other bytes by "x", not '
-            f"{displayed(packet)}"
+            'packet.format must hold numbers alone, as Python\'s struct writes them ("<d4f"; skip '
+            f"bytes by x), in at most {LARGEST_PACKET} bytes, not {displayed(packet)}"
         )
-    if len(set(fields)) < len(fields) or len(fields) != len(values):
+    if not len(set(fields)) == len(fields) == len(numbers):
         raise RecordingError(
-            f"packet.fields must name each of the {len(values)} numbers of packet.format once, "
+            f"packet.fields must name each of the {len(numbers)} numbers of packet.format once, "
             f"not {displayed(', '.join(fields))}"
         )
 

@@ -124,16 +124,13 @@ class Repair:
         changes: dict[str, Any] = dict(signals)
         return self._measured(replace(recording, **changes)), self.on(vehicle)
 
-    def at(self, signals: Mapping[str, float]) -> dict[str, float]:
-        """Return the signals of one instant as `apply` leaves them, bit for bit.
-
-        Delays, lags and the place of the accelerometer need other instants; they stay.
-        """
-        now = {name: value * self._scale(name)[0] - self._scale(name)[1]
-               for name, value in signals.items()}  # fmt: skip
+    def at(self, logged: Mapping[str, float]) -> dict[str, float]:
+        """Return the signals of an instant as `apply` does, but for what needs other instants."""
+        now = {name: value * self._scale(name)[0] for name, value in logged.items()}
         if self.sideslip:
-            factor, offset = self._scale("v_y")
-            now["v_y"] = now["v_x"] * float(np.tan(signals["v_y"] * factor)) - offset
+            speed = now["v_x"] - self._scale("v_x")[1]
+            now["v_y"] = speed * float(np.tan(now["v_y"]))
+        now = {name: value - self._scale(name)[1] for name, value in now.items()}
         if self.velocity_sensor_angle or self.velocity_sensor_x:
             c, s = math.cos(self.velocity_sensor_angle), math.sin(self.velocity_sensor_angle)
             v_x, v_y = now["v_x"], now["v_y"]

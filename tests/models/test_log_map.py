@@ -85,15 +85,6 @@ def test_what_is_written_reads_back_bit_for_bit(
     assert again == made and again.toml() == made.toml()
 
 
-@settings(max_examples=100, deadline=None)
-@given(declared=signals(), seed=st.integers(0, 2**32 - 1))
-def test_one_instant_of_a_signal_has_the_bits_of_a_log(declared, seed):
-    for name, signal in declared.items():
-        parts = np.random.default_rng(seed).normal(0.0, 2.0, (len(signal.channel), 20))
-        log = signal.value(list(parts), QUANTITIES[name])
-        assert [signal.at(instant) for instant in parts.T.tolist()] == log.tolist()
-
-
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
@@ -140,9 +131,9 @@ def test_one_instant_of_a_signal_has_the_bits_of_a_log(declared, seed):
         ("[signals.Fyf]\nchannel='a'\n", "Fyf needs its partner"),
         ("[clock]\nlongest_gap = -1\n", "longest_gap must be positive and finite, it is -1"),
         ("[packet]\nformat = '<q'\n", "packet.fields must name each of the 1 numbers"),
-        ("[packet]\nfields = ['a']\n", "packet.format must be a format of Python's struct"),
+        ("[packet]\nfields = ['a']\n", "packet.format must hold numbers alone, as Python's struct"),
         ("[packet]\nformat = '<4s'\nfields = ['a']\n", "packet.format must hold numbers alone"),
-        ("[packet]\nformat = '<99999999d'\nfields = ['a']\n", "1 to 65536 are allowed"),
+        ("[packet]\nformat = '<99999999d'\nfields = ['a']\n", "in at most 65536 bytes, not '<9999"),
         (
             "[packet]\nformat = '<2d'\nfields = ['a', 'a']\n",
             "packet.fields must name each of the 2",

@@ -4,11 +4,11 @@ import math
 import os
 import socket
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Event
+from queue import Empty, Full, Queue
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -21,67 +21,54 @@ from models.recordings.map import LARGEST_PACKET, LogMap
 from models.recordings.reader import read_repaired, split_log_argument
 from models.recordings.record import Recording
 from models.vehicle import Vehicle
-from tireid.live.frames import Frames
-from tireid.live.packets import Packets, Sample, require_live
+from tireid.live.samples import Frames, Packets, Sample, require_live
 from tireid.live.state import Counts
 
 FORMS = "udp://[HOST]:PORT, can:[KIND:]CHANNEL, zenoh:KEY, or a log"
 QUIET = 0.2  # s without a sample, after which the caller goes on all the same
-_WAIT = 0.1  # s, longest wait at a time: closing is not later
+_WAIT = 0.1  # s, longest wait at a time: the iteration ends no later
 _BURST = 2e-3  # s, within which frames of one instant come
 _QUEUE = 256  # packets of zenoh that wait, 2.5 s at 100 Hz
 
 
 @dataclass(slots=True, eq=False)
 class Source:
-    """Samples, as an iterator that ends with the log, or when the source is closed.
-
-    It gives None where there was no sample for 0.2 s.
+    """Samples, and None where there was none for 0.2 s, until a log ends or the source is closed.
 
     words : what is read, one line.   steps : samples, and None after each packet or wait.
-    reading : whose v_y says whether lateral velocity comes.   free : closes what is open.
+    told : returns whether v_y comes.   free : closes what is open.
     """
 
     words: str
     steps: Iterator[Sample | None]
-    reading: Packets | Frames | Recording
+    told: Callable[[], bool | None]
     free: Callable[[], object] = lambda: None
     _closed: bool = False
 
     @property
     def v_y(self) -> bool | None:
         """Whether lateral velocity comes; None where only the first sample will tell."""
-        if isinstance(self.reading, Recording):
-            return self.reading.logged_v_y is not None
-        return self.reading.v_y
+        return self.told()
 
     def __iter__(self) -> Iterator[Sample | None]:
         last = time.monotonic()
-        while not self._closed:
-            try:
-                one = next(self.steps)
-            except StopIteration:
+        for one in self.steps:
+            if self._closed:
                 return
-            except Exception:
-                if self._closed:  # meanwhile, by another thread
-                    return
-                raise
-            now = time.monotonic()
-            if one is not None or now - last >= QUIET:
-                last = now
+            if one is not None or time.monotonic() - last >= QUIET:
+                last = time.monotonic()
                 yield one
 
     def close(self) -> None:
-        """End the iteration, also one of another thread, and free what is open."""
-        if not self._closed:
-            self._closed = True
-            self.free()
+        """End the iteration, also that of another thread, within 0.1 s."""
+        self._closed = True
 
     def __enter__(self) -> "Source":
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+        self.free()
 
 
 def open_source(
@@ -109,23 +96,18 @@ def open_source(
     if np.any(recording.delta_r):
         raise RecordingError(f"{recording.name}: rear axle steers, which cannot be read live")
     words = f"{recording.name}, {recording.duration:.4g} s at {speed:g} times its speed"
-    return Source(words, _replayed(recording, speed), recording)
+    return Source(words, _replayed(recording, speed), lambda: recording.logged_v_y is not None)
 
 
 def _replayed(recording: Recording, speed: float) -> Iterator[Sample | None]:
-    none, v_y = np.full(len(recording), math.nan), recording.logged_v_y
-    columns = (
-        recording.t, recording.v_x, recording.r, recording.delta_f,
-        none if recording.a_y is None else recording.a_y, none if v_y is None else v_y,
-    )  # fmt: skip
-    begin = time.monotonic()
-    for k in range(len(recording)):
-        sample = Sample(*(float(one[k]) for one in columns))
-        due = begin + (sample.t - float(recording.t[0])) / speed
+    signals = recording.v_x, recording.r, recording.delta_f, recording.a_y, recording.logged_v_y
+    none, begin = np.full(len(recording), math.nan), time.monotonic()
+    for t, *values in zip(recording.t, *(none if s is None else s for s in signals), strict=True):
+        due = begin + float(t - recording.t[0]) / speed
         while (left := due - time.monotonic()) > 0.0:
             time.sleep(min(left, _WAIT))
             yield None
-        yield sample
+        yield Sample(float(t), *map(float, values))
 
 
 def _read(
@@ -138,28 +120,24 @@ def _read(
 
 def _udp(text: str, log_map: LogMap, counts: Counts) -> Source:
     try:
-        where = urlsplit(text)
-        host, port = where.hostname or "127.0.0.1", where.port
-        if port is None or where.scheme != "udp" or not text.startswith("udp://"):
+        host, port = urlsplit(text).hostname or "127.0.0.1", urlsplit(text).port
+        if port is None:
             raise ValueError
     except ValueError:
         raise RecordingError(
             f"{displayed(text)} must be udp://HOST:PORT or udp://:PORT, PORT at most 65535"
         ) from None
     packets = Packets(text, log_map, counts)
-    bound = None
-    try:
-        family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-        bound = socket.socket(family, socket.SOCK_DGRAM)
-        bound.bind(address)
-    except OSError as error:
-        if bound:
-            bound.close()
-        raise RecordingError(
-            f"{text}: port {port} of {host} cannot be opened ({error.strerror}); name another, or "
-            "end the program that has it"
-        ) from None
+    bound = socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM)
     bound.settimeout(_WAIT)
+    try:
+        bound.bind((host, port))
+    except (OSError, UnicodeError) as error:
+        bound.close()
+        raise RecordingError(
+            f"{text}: port {port} of {host} cannot be opened ({reason_of(error)}); name another, "
+            "or end the program that has it"
+        ) from None
 
     def receive() -> bytes | None:
         try:
@@ -169,35 +147,30 @@ def _udp(text: str, log_map: LogMap, counts: Counts) -> Source:
 
     host, port = bound.getsockname()[:2]
     words = f"UDP at {host}:{port}, {log_map.packet or 'JSON'}"
-    return Source(words, _read(receive, packets.take), packets, bound.close)
+    return Source(words, _read(receive, packets.take), lambda: packets.v_y, bound.close)
 
 
 def _zenoh(text: str, log_map: LogMap, counts: Counts) -> Source:
     zenoh = need(Path(text), "zenoh", "it", "live")
-    packets = Packets(text, log_map, counts)
-    queue, came = deque[bytes](maxlen=_QUEUE), Event()  # the oldest goes; its time shows the loss
+    packets, queue = Packets(text, log_map, counts), Queue[bytes](_QUEUE)
 
     def callback(sample: Any) -> None:
         payload = sample.payload
-        queue.append(payload.to_bytes() if len(payload) <= LARGEST_PACKET else b"")
-        came.set()
+        with suppress(Full):  # its time will show the loss
+            queue.put_nowait(payload.to_bytes() if len(payload) <= LARGEST_PACKET else b"")
 
     def receive() -> bytes | None:
-        came.clear()
-        if not queue:
-            came.wait(_WAIT)
-        return queue.popleft() if queue else None
+        with suppress(Empty):
+            return queue.get(timeout=_WAIT)
+        return None
 
-    session = None
     try:
         from_env = "ZENOH_CONFIG" in os.environ
         session = zenoh.open(zenoh.Config.from_env() if from_env else zenoh.Config())
         session.declare_subscriber(text.partition(":")[2], callback)
     except Exception as error:
-        if session:
-            session.close()
         raise RecordingError(f"{text}: cannot be opened ({reason_of(error)})") from None
-    return Source(text, _read(receive, packets.take), packets, session.close)
+    return Source(text, _read(receive, packets.take), lambda: packets.v_y, session.close)
 
 
 def _can(text: str, log_map: LogMap, counts: Counts) -> Source:
@@ -219,4 +192,4 @@ def _can(text: str, log_map: LogMap, counts: Counts) -> Source:
             raise RecordingError(f"{text}: cannot be read ({reason_of(error)})") from None
 
     words = f"CAN {kind} {channel}, {log_map.dbc}"
-    return Source(words, _read(receive, frames.take), frames, bus.shutdown)
+    return Source(words, _read(receive, frames.take), lambda: frames.v_y, bus.shutdown)

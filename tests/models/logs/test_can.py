@@ -78,7 +78,7 @@ def test_signals_of_any_place_and_kind_are_those_that_cantools_decodes():
         # Integers of 64 bits lose their last digits on the way to a double.
         with np.errstate(invalid="ignore"):  # floats of any bits
             values = _values_of(data, signal)
-            alone = [reader_of(message, signal)(row.tobytes()) for row in data]
+            alone = [reader_of(message)(row.tobytes())[signal.name] for row in data]
         assert np.allclose(values, scaled, rtol=1e-14, atol=1e-14, equal_nan=True)
         assert np.array_equal(values, alone, equal_nan=True)
 
@@ -134,8 +134,8 @@ def test_values_that_the_dbc_names_as_no_number_are_nan(tmp_path):
     values = channel_of(log, "Steering.Angle").values
     assert np.allclose(values, [0.5, np.nan, np.nan, 0.1, -0.5], equal_nan=True)
     message = read_dbc(tmp_path / "car.dbc").messages[100]
-    read = reader_of(message, message.get_signal_by_name("Angle"))
-    assert np.array_equal(values, [read(data) for *_, data, _ in messages], equal_nan=True)
+    alone = [reader_of(message)(data)["Angle"] for *_, data, _ in messages]
+    assert np.array_equal(values, alone, equal_nan=True)
 
 
 def test_the_same_frame_on_two_buses_is_two_channels(tmp_path):

@@ -20,8 +20,7 @@ from models.recordings import read_recording, read_repaired
 from models.recordings.map import LogMap
 from models.recordings.repair import Repair
 from models.vehicle import sedan
-from tireid.live.frames import Frames
-from tireid.live.packets import Packets, Sample
+from tireid.live.samples import Frames, Packets, Sample
 from tireid.live.sources import FORMS, open_source
 from tireid.live.state import Counts
 
@@ -121,7 +120,7 @@ def test_standard_names_need_no_map_and_arrival_is_the_time_without_a_clock():
     assert sample == Sample(0.0, 20.0, 0.2, 0.03, 4.0, 0.1)
     timeless = {name: one for name, one in PLAIN.items() if name not in ("t", "vy")}
     one, two = sent([json.dumps(timeless).encode()] * 2)
-    assert one.t == 0.0 < two.t and math.isnan(two.v_y)
+    assert 0.0 <= one.t < two.t < 20.0 and math.isnan(two.v_y)
 
 
 @pytest.mark.parametrize("packed", [False, True])
@@ -149,11 +148,14 @@ def test_a_name_that_is_missing_once_is_nan_and_one_that_never_comes_ends_the_so
     assert sample.t == 1.0 and all(map(math.isnan, sample[1:]))
     lacking = json.dumps({"t": 0.0, "vx": 1.0, "vy": 0.0, "imu": {"wz": 1.0}}).encode()
     packets = Packets("udp://:9", LogMap(), Counts())
-    with pytest.raises(RecordingError, match=r"udp://:9: no packet has delta_f, r; .*imu\.wz"):
+    with pytest.raises(RecordingError, match=r"udp://:9: no packet has delta_f, r; .*imu, t"):
         for _ in range(50):
             list(packets.take(lacking))
     with pytest.raises(RecordingError, match="no packet has r; they have"):
-        Packets("udp://:9", LogMap(packet="<3d", fields=("vx", "vy", "delta_f")), Counts())
+        packets = Packets(
+            "udp://:9", LogMap(packet="<3d", fields=("vx", "vy", "delta_f")), Counts()
+        )
+        list(packets.take(bytes(24)))
 
 
 @pytest.mark.parametrize(
@@ -165,7 +167,7 @@ def test_a_name_that_is_missing_once_is_nan_and_one_that_never_comes_ends_the_so
         (LogMap(clock="t", clock_unit="m"), "clock.unit"),
         (LogMap(repair=Repair(lag={"r": 0.1})), "repair.lag"),
         (LogMap(repair=Repair(acceleration_sensor_x=0.1)), "repair.acceleration_sensor_x"),
-        (LogMap(signals={"wheel": Signal(channel=("w",))}), "signals.wheel"),
+        (LogMap(signals={"delta_r": Signal(channel=("w",))}), "signals.delta_r"),
         (LogMap(signals={"r": Signal(channel=("w",), sign="s")}), "signals.r.sign"),
     ],
 )
@@ -326,7 +328,7 @@ def test_a_bus_whose_clock_jumps_back_or_whose_signal_pauses_goes_on(tmp_path):
 
     taken(messages(can, 100), joined)
     again = taken(frames, joined)  # other values, 1.6 s earlier
-    assert again == taken(frames, Frames("can:a", log_map, Counts())) and len(again) >= 158
+    assert again[-158:] == taken(frames, Frames("can:a", log_map, Counts()))[-158:]
     without = [one for one in frames if one.arbitration_id != 0x18FF1023]
     for one in without:
         one.timestamp += 1.6
@@ -341,9 +343,9 @@ def test_a_dbc_without_the_signal_and_an_interface_that_is_none_are_refused(tmp_
     other = log_map.with_signals({"r": Signal(channel=("Motion.Yow",))})
     with pytest.raises(RecordingError, match=r"no channel 'Motion\.Yow'; did you mean 'Motion\.Y"):
         opened("can:virtual:a", other)
-    with pytest.raises(RecordingError, match="a DBC file must be declared"):
+    with pytest.raises(RecordingError, match=r"file\.dbc of log\.toml must be declared"):
         opened("can:virtual:a", replace(log_map, dbc=""))
-    with pytest.raises(RecordingError, match=r"signals\.r and .*delta_f must be decl"):
+    with pytest.raises(RecordingError, match=r"signals\.r, .*delta_f of .* must be decl"):
         opened("can:virtual:a", replace(log_map, signals={"v_x": log_map.signals["v_x"]}))
     with pytest.raises(RecordingError, match="can:nothing:a: cannot be opened"):
         opened("can:nothing:a", log_map)
@@ -358,9 +360,7 @@ def test_a_signal_that_does_not_come_on_the_bus_is_named(tmp_path):
     ):
         for k in range(60):
             bus.send(can.Message(0.1 * k, 100, False, data=bytes(8)))
-        with pytest.raises(
-            RecordingError, match=r"no Muxed\.Side, Wheel\.Angle, only frames Motio"
-        ):
+        with pytest.raises(RecordingError, match=r"no Muxed\.Side, Wheel\.Angle; is it another"):
             first(source, 1)
 
 
