@@ -12,6 +12,7 @@ import struct
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from operator import mul
 from pathlib import Path
 from types import EllipsisType, NoneType
 from typing import Any, NamedTuple
@@ -28,6 +29,7 @@ from models.recordings.map import AXES, LARGEST_PACKET, LogMap
 from tireid.live.state import Counts
 
 _READ = ("v_x", "v_y", BETA, "r", "delta_f", "a_y")
+_JSON = json.JSONDecoder()
 _NUMBERS = {int, float, NoneType, EllipsisType}  # types, or nothing
 _TIME = "t"  # name that is the time where no other is declared
 _FIRST = 50  # packets, 0.5 s at 100 Hz, after which a name that never came is missing
@@ -71,28 +73,30 @@ class _Reading:
     ) -> None:
         self._repair = log_map.repair or None
         self.channels: list[tuple[str, float]] = []  # name, and factor to SI
-        self._parts: list[tuple[str, slice, Callable[[Sequence[float]], float]]] = []
+        self._values: dict[str, Callable[[Sequence[float]], float]] = {}
         for name, signal in signals.items():
+            sign = 1.0 if name == "v_x" else AXES[log_map.axes]
+            self._values[name] = _value_of(signal, len(self.channels), sign)
             for one in signal.channel:
                 unit = signal.unit if is_given(signal.unit) else units.get(one, "")
                 what = f"{column_of(name)} (channel {one!r})"
                 self.channels.append((one, to_si(unit, quantity_of(name, unit), what)))
-            end, sign = len(self.channels), 1.0 if name == "v_x" else AXES[log_map.axes]
-            part = slice(end - len(signal.channel), end)
-            self._parts.append((name, part, _value_of(signal, sign)))
 
     def sample(self, t: float, values: Sequence[float]) -> Sample:
         """Return the sample of an instant.   values : of each channel in SI, NaN of none."""
-        now = {name: value(values[part]) for name, part, value in self._parts}
+        now = {name: value(values) for name, value in self._values.items()}
         if BETA in now:
             now["v_y"] = now["v_x"] * float(np.tan(now.pop(BETA)))
         return Sample(t, **self._repair.at(now) if self._repair else now)
 
 
-def _value_of(signal: Signal, sign: float) -> Callable[[Sequence[float]], float]:
+def _value_of(signal: Signal, first: int, sign: float) -> Callable[[Sequence[float]], float]:
+    """Return what makes a signal of the numbers of all channels.   first : of its channels."""
+    factor, offset, ratio = signal.factor, signal.offset, signal.ratio
     if signal.table or len(signal.channel) > 1:
-        return lambda parts: sign * float(signal.value([np.array([one]) for one in parts], "")[0])
-    return lambda parts: sign * ((parts[0] * signal.factor - signal.offset) / signal.ratio)
+        part = slice(first, first + len(signal.channel))
+        return lambda x: sign * float(signal.value([np.array([one]) for one in x[part]], "")[0])
+    return lambda x: sign * ((x[first] * factor - offset) / ratio)
 
 
 class Packets:
@@ -110,8 +114,8 @@ class Packets:
         self._per_second = PER_SECOND.get(time_unit(log_map.clock_unit), 1.0)
         self._zero: float | None = None  # when packets began [s], where their arrival is the time
         self._reading = _Reading(log_map, self._signals, {})
-        names = [*(name for name, _ in self._reading.channels), log_map.clock or _TIME]
-        self._places = [(name, name.split(".")) for name in names]
+        self._places = [*(name for name, _ in self._reading.channels), log_map.clock or _TIME]
+        self._factors = [factor for _, factor in self._reading.channels]
         self.v_y = True if has_v_y(declared) else None
         self._struct = struct.Struct(log_map.packet) if log_map.packet else None
         self._looked, self._came = _FIRST - 1 if self._struct else 0, set[str]()
@@ -126,24 +130,26 @@ class Packets:
             if self._struct:
                 packet = dict(zip(self._map.fields, self._struct.unpack(data), strict=True))
             else:
-                packet = json.loads(data)
-            found = [_found(packet, name, path) for name, path in self._places]
+                text = data.decode().strip()
+                packet, end = _JSON.raw_decode(text)  # half the time of loads
+                if end < len(text) or not isinstance(packet, dict):
+                    raise ValueError
+            found = [_found(packet, name) for name in self._places]
             if not _NUMBERS.issuperset(map(type, found)):
                 raise TypeError
             *values, t = [math.nan if one is None or one is ... else float(one) for one in found]
-        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError, struct.error):
+        except (ValueError, TypeError, OverflowError, RecursionError, struct.error):
             self._counts.unreadable += 1
             return
         if self._looked < _FIRST:
             self._look(packet, found)
         t = t / self._per_second if self._zero is None else time.monotonic() - self._zero
-        channels = zip(values, self._reading.channels, strict=True)
-        yield self._reading.sample(t, [value * factor for value, (_, factor) in channels])
+        yield self._reading.sample(t, list(map(mul, values, self._factors)))
 
     def _look(self, packet: Mapping[str, Any], found: Sequence[Any]) -> None:
         """Learn what the first packets have; refuse where something that is needed never came."""
         places, clock = zip(self._places, found, strict=True), self._map.clock
-        self._came |= {name for (name, _), one in places if one is not ...}
+        self._came |= {name for name, one in places if one is not ...}
         self._looked += 1
         if self.v_y is None:
             self.v_y = column_of("v_y") in self._came
@@ -160,13 +166,13 @@ class Packets:
             )
 
 
-def _found(packet: Mapping[str, Any], name: str, path: Sequence[str]) -> Any:
+def _found(packet: Mapping[str, Any], name: str) -> Any:
     """Return what a packet has by a name, or by a path into it; ... where it has nothing."""
-    value = packet.get(name, ...)
-    if value is ... and len(path) > 1:
-        value = packet
-        for one in path:
-            value = value.get(one, ...) if isinstance(value, dict) else ...
+    if name in packet:
+        return packet[name]
+    value: Any = packet
+    for one in name.split("."):
+        value = value.get(one, ...) if isinstance(value, dict) else ...
     return value
 
 
@@ -174,16 +180,9 @@ class _Channel:
     """The last samples of a signal of a bus, in SI.   longest : age that is no gap yet [s]."""
 
     def __init__(self, name: str, factor: float, longest: float) -> None:
-        self.name, self._factor, self._longest = name, factor, longest
+        self.name, self.factor, self._longest = name, factor, longest
         self.last = deque[tuple[float, float]](maxlen=_MOST)  # time [s] and value, rising
         self.interval = math.nan  # between samples [s], typical
-
-    def add(self, t: float, value: float) -> bool:
-        """Take a value; return whether it is newer than the last."""
-        newer = not self.last or t > self.last[-1][0]
-        if newer:
-            self.last.append((t, value * self._factor))
-        return newer
 
     def at(self, t: float) -> float:
         """Return the value at an instant [s], as `models.logs.clock` has it; NaN in a gap."""
@@ -241,9 +240,8 @@ class Frames:
             yield from self._complete(math.inf)
             return
         message = self._dbc.message(frame.arbitration_id | EXTENDED * frame.is_extended_id)
-        if frame.is_error_frame or frame.is_remote_frame or message is None:
-            return
-        if message.name not in self._of:
+        no_data = frame.is_error_frame or frame.is_remote_frame
+        if no_data or message is None or message.name not in self._of:
             return
         if len(frame.data) < message.length:
             self._counts.unreadable += 1
@@ -253,15 +251,17 @@ class Frames:
         if self._zero > CALENDAR:  # as `models.logs.stamps.since`
             t = round((t - self._zero) * 1e6) / 1e6
         if not t >= self._newest - _BACK:
-            self._first = self._newest = t
+            self._first = t
             self.waiting.clear()
             for one in self._channels:
                 one.last.clear()
-        self._newest = max(self._newest, t)
+        self._newest = t
         values = self._read[message.name](frame.data)
         for name, one in self._of[message.name]:
-            if name in values and one.add(t, values[name]) and one is self._base:
-                self.waiting.append(t)
+            if name in values and not (one.last and t <= one.last[-1][0]):
+                one.last.append((t, values[name] * one.factor))
+                if one is self._base:
+                    self.waiting.append(t)
         if self._base is None and t - self._first > _OBSERVED:
             self._base = self._observed()
         yield from self._complete(t)
