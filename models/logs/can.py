@@ -574,10 +574,10 @@ def reader_of(message: Any) -> Callable[[bytes], dict[str, float]]:
             raws = message.decode(data[: message.length], decode_choices=False, scaling=False)
         except DecodeError:  # a page that the DBC does not know
             return {}
-        there = ((name, raw, *known[name]) for name, raw in raws.items())
-        return {
-            name: math.nan if raw in none else raw * scale + offset
-            for name, raw, none, scale, offset in there
-        }
+        values = {}
+        for name, raw in raws.items():
+            none, scale, offset = known[name]
+            values[name] = math.nan if raw in none else raw * scale + offset
+        return values
 
     return read

@@ -12,6 +12,7 @@ import struct
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from operator import mul
 from pathlib import Path
 from types import EllipsisType, NoneType
@@ -22,7 +23,7 @@ import numpy as np
 from models.logs.can import CALENDAR, EXTENDED, reader_of, wanted
 from models.logs.clock import FASTER, GAP_INTERVALS, ON_STEP
 from models.logs.log import RecordingError, some
-from models.logs.signals import BETA, INSTEAD, NEEDED, Signal, given_by, quantity_of
+from models.logs.signals import BETA, INSTEAD, Signal, quantity_of
 from models.logs.units import PER_SECOND, TIME, is_given, time_unit, to_si
 from models.recordings.choice import column_of, has_v_y, missing_signals
 from models.recordings.map import AXES, LARGEST_PACKET, LogMap
@@ -47,12 +48,12 @@ class Sample(NamedTuple):
     v_x: float
     r: float
     delta_f: float
-    a_y: float = math.nan
-    v_y: float = math.nan
+    a_y: float
+    v_y: float
 
 
-def require_live(log_map: LogMap) -> None:
-    """Refuse what a map declares and only a whole log allows."""
+def live_map(log_map: LogMap) -> LogMap:
+    """Return a map of the signals that are read live; refuse what only a whole log allows."""
     signals, repair = log_map.signals, log_map.repair
     declared = {
         "file.run": log_map.run, "clock.rate": log_map.rate, "filters.low_pass": log_map.low_pass,
@@ -63,6 +64,7 @@ def require_live(log_map: LogMap) -> None:
     }  # fmt: skip
     if key := next((key for key, value in declared.items() if value), None):
         raise RecordingError(f"{key} of log.toml cannot be read live, only of a log; leave it out")
+    return replace(log_map, signals={name: signals[name] for name in signals if name in _READ})
 
 
 class _Reading:
@@ -84,7 +86,8 @@ class _Reading:
 
     def sample(self, t: float, values: Sequence[float]) -> Sample:
         """Return the sample of an instant.   values : of each channel in SI, NaN of none."""
-        now = {name: value(values) for name, value in self._values.items()}
+        now = {"a_y": math.nan, "v_y": math.nan}
+        now |= {name: value(values) for name, value in self._values.items()}
         if BETA in now:
             now["v_y"] = now["v_x"] * float(np.tan(now.pop(BETA)))
         return Sample(t, **self._repair.at(now) if self._repair else now)
@@ -104,11 +107,10 @@ class Packets:
 
     def __init__(self, label: str, log_map: LogMap, counts: Counts) -> None:
         self._label, self._map, self._counts = label, log_map, counts
-        declared = {name: one for name, one in log_map.signals.items() if name in _READ}
-        self._declared, self._signals = tuple(declared), dict(declared)
-        if not set(NEEDED) <= given_by(declared):  # then standard names are read too
+        self._signals = dict(log_map.signals)
+        if not log_map.is_complete:  # then standard names are read too
             for name in _READ:
-                if name != BETA and INSTEAD.get(name) not in declared:
+                if name != BETA and INSTEAD.get(name) not in self._signals:
                     self._signals.setdefault(name, Signal(channel=(column_of(name),)))
         to_si(log_map.clock_unit, TIME, f"{label}: clock.unit")
         self._per_second = PER_SECOND.get(time_unit(log_map.clock_unit), 1.0)
@@ -116,7 +118,7 @@ class Packets:
         self._reading = _Reading(log_map, self._signals, {})
         self._places = [*(name for name, _ in self._reading.channels), log_map.clock or _TIME]
         self._factors = [factor for _, factor in self._reading.channels]
-        self.v_y = True if has_v_y(declared) else None
+        self.v_y = True if has_v_y(log_map.signals) else None
         self._struct = struct.Struct(log_map.packet) if log_map.packet else None
         self._looked, self._came = _FIRST - 1 if self._struct else 0, set[str]()
 
@@ -155,7 +157,7 @@ class Packets:
             self.v_y = column_of("v_y") in self._came
         self._zero = None if clock or _TIME in self._came else self._zero or time.monotonic()
         there = {n: one for n, one in self._signals.items() if self._came.issuperset(one.channel)}
-        needed = [n for n in (*self._declared, *missing_signals(there)) if n in self._signals]
+        needed = [n for n in (*self._map.signals, *missing_signals(there)) if n in self._signals]
         missing = {one for name in needed for one in self._signals[name].channel}
         missing = (missing | {clock}) - {"", *self._came}
         if missing and self._looked == _FIRST:
@@ -207,8 +209,7 @@ class Frames:
 
     def __init__(self, label: str, log_map: LogMap, counts: Counts) -> None:
         self._label, self._counts = label, counts
-        signals = {name: one for name, one in log_map.signals.items() if name in _READ}
-        self.v_y = has_v_y(signals)
+        signals, self.v_y = log_map.signals, has_v_y(log_map.signals)
         lacking = [f"signals.{name}" for name in missing_signals(signals)]
         if lacking := ["file.dbc"] * (not log_map.dbc) + lacking:
             raise RecordingError(

@@ -21,7 +21,7 @@ from models.recordings.map import LARGEST_PACKET, LogMap
 from models.recordings.reader import read_repaired, split_log_argument
 from models.recordings.record import Recording
 from models.vehicle import Vehicle
-from tireid.live.samples import Frames, Packets, Sample, require_live
+from tireid.live.samples import Frames, Packets, Sample, live_map
 from tireid.live.state import Counts
 
 FORMS = "udp://[HOST]:PORT, can:[KIND:]CHANNEL, zenoh:KEY, or a log"
@@ -85,8 +85,7 @@ def open_source(
     """
     opened = {"udp": _udp, "can": _can, "zenoh": _zenoh}.get(text.partition(":")[0])
     if opened and ":" in text and not Path(text).exists():
-        require_live(log_map)
-        return opened(text, log_map, counts)
+        return opened(text, live_map(log_map), counts)
     if not speed > 0.0:
         raise RecordingError(f"speed must be positive, it is {speed:g}")
     path, run = split_log_argument(text)
