@@ -75,7 +75,7 @@ def test_what_is_written_reads_back_bit_for_bit(
         order="mend" if gap < 2.0 else "refuse",
         low_pass=low_pass,
         packet="<d2f" if gap > 1.0 else "",
-        fields=("t", *words) if gap > 1.0 else (),
+        fields=("t".join(words), *words) if gap > 1.0 else (),
         wheels=wheels,
         repair=repair,
     )
