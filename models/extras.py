@@ -5,6 +5,7 @@ EXTRAS = {
     "can": ("cantools", "python-can"), "onnx": ("onnx", "onnxruntime", "'casadi>=3.8.2'"),
     "cluster": ("dask", "distributed"),
     "fleet": ("pyarrow", "dask", "distributed", "fsspec"),
+    "live": ("cantools", "python-can", "foxglove-sdk", "mcap", "eclipse-zenoh"),
 }  # fmt: skip
 
 
