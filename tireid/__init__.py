@@ -47,6 +47,8 @@ if TYPE_CHECKING:
     from tireid.figures.lap import plot as _plot
     from tireid.learning import identify as identify
     from tireid.learning import replay as replay
+    from tireid.live.live import Live as Live
+    from tireid.live.state import State as State
     from tireid.run import Run as Run
 
     paths, plot = _path, _plot
@@ -76,6 +78,8 @@ _NAMES = {  # by the module that they lie in
     "tireid.emitting": "emit",
     "tireid.exporting": "export",
     "tireid.learning": "identify replay",
+    "tireid.live.live": "Live",
+    "tireid.live.state": "State",
     "tireid.run": "Run",
 }
 _HOMES = {name: f"{module}:{name}" for module, names in _NAMES.items() for name in names.split()}
