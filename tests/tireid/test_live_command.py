@@ -152,8 +152,8 @@ def test_the_sample_drive_is_sent_in_its_own_time_and_again(monkeypatch, capsys,
     command = f"tireid live udp://:{port} --vehicle {tmp_path / 'car.toml'} --serve 127.0.0.1:8765"
     assert command in capsys.readouterr().err
     assert ti.Vehicle.from_toml(tmp_path / "car.toml") == ti.sedan()
-    assert set(packets[0]) == {"t", "v_x", "v_y", "r", "delta_f", "a_y"}
-    assert [one["v_y"] for one in packets[11:22]] == [one["v_y"] for one in packets[:11]]
+    assert set(packets[0]) == {"t", "vx", "vy", "r", "delta_f", "ay"}
+    assert [one["vy"] for one in packets[11:22]] == [one["vy"] for one in packets[:11]]
     times = [one["t"] for one in packets]
     assert times[:11] == pytest.approx([0.01 * k for k in range(11)])
     assert times[11] == pytest.approx(0.2) and all(a < b for a, b in pairwise(times))

@@ -72,15 +72,16 @@ def run(options: argparse.Namespace) -> None:
         source = open_source(
             options.source, given_map(options), live.counts, vehicle=vehicle, speed=options.speed
         )
-        live.prepare(source.v_y)  # before packets come, which would have to wait
+        if source.v_y is not None:  # before packets come, which would have to wait
+            live.prepare(v_y=source.v_y)
         stack.enter_context(source)
         outputs = stack.enter_context(Outputs(serve=serve, record=record))
         for line in (source.words, *outputs.words.splitlines()):
             say(line)
         _follow(live, source, outputs, store)
     last = live.state()
-    counted = ", ".join(filter(None, [f"{live.counts.samples} samples", _counted(live.counts)]))
-    tell(counted if last is None else f"{counted}; {_line(last)}")
+    known = _counted(live.counts) or "nothing came" if last is None else _line(last)
+    tell(f"{live.counts.samples} samples; {known}")
 
 
 def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -> None:
@@ -90,7 +91,11 @@ def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -
         for sample in source:
             now = time.monotonic()
             newest = now if sample is not None else newest
-            state = live.state(now - newest) if sample is None else live.feed(*sample)
+            if sample is None:
+                state = live.state(now - newest)
+            else:
+                v_y = sample.v_y if source.v_y else None
+                state = live.feed(*sample[:-1], v_y=v_y)
             if state is not None:
                 outputs.send(state)
             judged = before if state is None else (state.valid, bool(state.alarm))
@@ -98,12 +103,15 @@ def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -
                 before, said = judged, now
                 counted = _counted(live.counts) or "nothing comes"
                 say(f"no sample yet: {counted}" if state is None else _line(state))
-                if store is not None:
-                    store.offer(live.tires())
+                _offer(store, live)
             if stopped:
                 break
-    if store is not None:
-        store.offer(live.tires())
+    _offer(store, live)
+
+
+def _offer(store: Store | None, live: Live) -> None:
+    if store is not None and (tires := live.tires()) is not None:
+        store.offer(tires)
 
 
 @contextmanager

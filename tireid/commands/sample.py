@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from models.recordings import Recording, write_recording
+from models.recordings.choice import column_of
 from tireid.commands.options import (
     add_force,
     add_options,
@@ -27,7 +28,7 @@ from tireid.output import require_free
 from tireid.progress import say
 
 _PAUSE = 1.0  # s between two drives, as of a car that is put back: a gap for who listens
-_SIGNALS = ("t", "v_x", "r", "delta_f", "a_y", "v_y")
+_SENT = ("t", "v_x", "v_y", "r", "delta_f", "a_y")  # by the names of columns
 
 
 def declare(new: Any) -> None:
@@ -67,7 +68,8 @@ def run(options: argparse.Namespace) -> None:
     if to is not None:
         car = shlex.quote(str(options.car or options.vehicle or "car.toml"))
         say(
-            f"sending {recording.name} to {options.udp}, a JSON packet of {', '.join(_SIGNALS)} "
+            f"sending {recording.name} to {options.udp}, a JSON packet of "
+            f"{', '.join(map(column_of, _SENT))} "
             f"each {recording.dt:g} s, until Ctrl-C; in another terminal: tireid live "
             f"udp://:{to[1]} --vehicle {car} --serve 127.0.0.1:8765"
         )
@@ -77,7 +79,8 @@ def run(options: argparse.Namespace) -> None:
 
 def _send(recording: Recording, to: tuple[str, int]) -> None:
     """Send packets in their own time, for ever: t goes on rising from one drive to the next."""
-    rows = np.stack([getattr(recording, name) for name in _SIGNALS], axis=1).tolist()
+    rows = np.stack([getattr(recording, name) for name in _SENT], axis=1).tolist()
+    names = [column_of(name) for name in _SENT]
     whole, begun = recording.duration + _PAUSE, time.monotonic()
     with socket.socket(
         socket.AF_INET6 if ":" in to[0] else socket.AF_INET, socket.SOCK_DGRAM
@@ -86,5 +89,5 @@ def _send(recording: Recording, to: tuple[str, int]) -> None:
             for t, *values in rows:
                 t += whole * drive
                 time.sleep(max(begun + t - time.monotonic(), 0.0))
-                packet = dict(zip(_SIGNALS, (round(t, 6), *values), strict=True))
+                packet = dict(zip(names, (round(t, 6), *values), strict=True))
                 out.sendto(json.dumps(packet).encode(), to)
