@@ -11,7 +11,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-import numpy as np
+from identifier.measured import with_doubt
 
 from tireid.commands.options import (
     add_log_map,
@@ -137,8 +137,7 @@ def _line(state: State) -> str:
     """Return what a driver reads of a state, in one line."""
     known = "valid" if state.valid else f"not valid: {state.reason} ({state.origin} tires)"
     parts = [f"t = {state.t:.1f} s, {known}"]
-    k, sd = np.divide(state.stiffness, 1e3), np.divide(state.stiffness_sd, 1e3)
-    both = (f"{one:.3g} ± {its:.2g}" for one, its in zip(k, sd, strict=True))
+    both = map(with_doubt, 1e-3 * state.stiffness, 1e-3 * state.stiffness_sd)
     parts.append(f"stiffness {' / '.join(both)} kN/rad")
     if state.friction is not None:
         parts.append(f"friction {state.friction:.2f}")
