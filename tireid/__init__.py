@@ -75,6 +75,8 @@ _NAMES = {  # by the module that they lie in
     "mpc.path.speed": "SpeedProfile speed_profile",
     "tireid.driving.learn": "sample_recording",
     "tireid.driving.runs": "drive",
+    "tireid.live.live": "Live",
+    "tireid.live.state": "State",
     "tireid.emitting": "emit",
     "tireid.exporting": "export",
     "tireid.learning": "identify replay",

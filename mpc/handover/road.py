@@ -208,17 +208,19 @@ class RoadWatch:
     base : the tire as it was learnt.
     """
 
-    def __init__(self, base: PredictionTire, judge: Judge, rules: Rules) -> None:
+    def __init__(self, base: PredictionTire, rules: Rules) -> None:
         self.road, self.baseline = Road(base), 1.0
-        self._judge, self._rules, self._suspected_at = judge, rules, -math.inf
+        self._rules, self._suspected_at = rules, -math.inf
 
-    def look(self, in_use: PredictionTire, window: Window, t: float, trusted: float) -> Look:
+    def look(
+        self, judge: Judge, in_use: PredictionTire, window: Window, t: float, trusted: float
+    ) -> Look:
         """Take a look: a loss counts where two in a row show it, one in a turn-in may err.
 
         window : of samples that last for the last moments.   t : time [s].
         trusted : slip up to which a tire must be one [rad].
         """
-        rules, judge = self._rules, self._judge
+        rules = self._rules
         now = judge.chi_square(in_use, window.last(judge.lookback(rules.last_moments)))
         change = look_at_road(
             self.road, in_use, window, t=t, baseline=self.baseline, trusted=trusted, judge=judge,

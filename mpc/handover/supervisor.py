@@ -125,7 +125,7 @@ class Supervisor:
         self._learnt_every = max(1, round(self.rules.learnt_every / dt))
         self._samples, self._dt = 0, dt
         self._sample, self._lost = (0.0, 0.0, 0.0, 0.0), 0
-        self._watch = RoadWatch(in_use, self.judge, self.rules)
+        self._watch = RoadWatch(in_use, self.rules)
         self._first, self._weighed, self._friction = largest_push(in_use), in_use, 1.0
         # What was steered with and what was learnt, and since when [s], to go back to.
         self._steered = [(-math.inf, in_use, self._watch.road)]
@@ -236,7 +236,7 @@ class Supervisor:
         if self._window.duration < judge.lookback(rules.last_moments):
             return self._keep("too few samples")
         trusted = self._excitation.trusted_slip(self.target)
-        look = self._watch.look(self.target, self._window, self.t, trusted)
+        look = self._watch.look(judge, self.target, self._window, self.t, trusted)
         if look.suspected:
             return self._keep("friction is perhaps lost")
         if (change := look.change) is not None:

@@ -72,8 +72,7 @@ class Clock:
             if h > max(LONGEST_GAP * (1.0 + 1e-6), _GAP * usual):
                 yield self._begin(t, values, gap=True)
                 return
-            if h < _MISSING * usual:
-                self._usual = h if h < usual / _MISSING else usual + _USUAL * (h - usual)
+            self._usual = usual + _USUAL * (min(h, _MISSING * usual) - usual)
             yield from self._between(t, values)
 
     def _begin(self, t: float, values: Array, *, gap: bool = False, jump: bool = False) -> Instant:

@@ -1,125 +1,113 @@
 """What is known of a car while it drives, at one instant, as it is sent on."""
 
 import math
-from dataclasses import dataclass, field, fields
-from typing import Any, NamedTuple
+from dataclasses import asdict, dataclass
+from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
 from codegen.arrays import Array
 
-LIVE, STORED = ORIGINS = ("live", "stored")
-SLIP = np.linspace(0.0, 0.2, 41)  # [rad], at which curves are told
+LIVE, STORED = "live", "stored"  # whose numbers a state gives
+SLIP = np.linspace(0.0, 0.2, 41)  # [rad], of the curves
 
 
 class Point(NamedTuple):
-    """Means since the last state: slip, and axle force by the motion; front and rear each."""
+    """Mean slip [rad] and axle force by the motion [N], front and rear (2,), since a state."""
 
-    slip: tuple[float, float]
-    force: tuple[float, float]
+    slip: Array
+    force: Array
 
 
 @dataclass(slots=True)
 class Counts:
-    """What became of the samples.
+    """What became of samples, and of packets that could not be read."""
 
-    Parameters
-    ----------
-    samples : that were taken.
-    refused : that held no number, or one that no car reaches.
-    lost : that are missing between two that came.
-    doubled : of the time of the one before.
-    late : of an earlier time than one before them.
-    jumps : of the clock, at which the states began anew.
-    unreadable : packets that could not be read.
-    """
-
-    samples: int = 0
-    refused: int = 0
-    lost: int = 0
-    doubled: int = 0
-    late: int = 0
-    jumps: int = 0
-    unreadable: int = 0
+    samples: Annotated[int, "that were taken"] = 0
+    refused: Annotated[int, "that held no number, or one that no car reaches"] = 0
+    lost: Annotated[int, "that are missing between two that came"] = 0
+    doubled: Annotated[int, "of the time of the one before"] = 0
+    late: Annotated[int, "of an earlier time than one before them"] = 0
+    jumps: Annotated[int, "of the clock, at which the states began anew"] = 0
+    unreadable: Annotated[int, "packets that hold no sample"] = 0
 
 
-def _told(unit: str, meaning: str, kind: str = "number", size: int = 0) -> Any:
-    """Return a field of a state, as the schema says it; size 2: front and rear; 41: of curves."""
-    return field(metadata={"unit": unit, "meaning": meaning, "kind": kind, "size": size})
+Number = float | None  # None where it is not known
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class State:
-    """What is known at one instant; arrays are of both axles, front first.
+    """What is known at one instant; rows are axles, front first; slip has the paper's sign."""
 
-    None where a number is not known. Slip has the paper's sign: force rises with it.
-    """
-
-    t: float = _told("s", "time of the newest sample, by its own clock")
-    age: float = _told("s", "of the newest sample")
-    valid: bool = _told("-", "whether the tires of this drive may be trusted now", "boolean")
-    reason: str = _told("-", "why not, in words; empty where they may", "string")
-    origin: str = _told("-", "which tires are told: live, or stored ones", "string")
-    alarm: str = _told("-", "what a driver should know at once; empty: nothing", "string")
-    slip: Array = _told("rad", "slip angles of the curves", size=41)
-    force: Array = _told("N", "axle force at these slips, a row an axle", size=82)
-    force_sd: Array = _told("N", "its standard deviation", size=82)
-    known_slip: Array = _told("rad", "slip up to which an axle is known", size=2)
-    stiffness: Array = _told("N/rad", "cornering stiffness of an axle", size=2)
-    stiffness_sd: Array = _told("N/rad", "its standard deviation", size=2)
-    grip: Array = _told("static axle loads", "largest force of an axle", size=2)
-    grip_sd: Array = _told("static axle loads", "its standard deviation", size=2)
-    understeer: float = _told("rad s^2/m", "understeer gradient at small a_y")
-    understeer_sd: float = _told("rad s^2/m", "its standard deviation")
-    a_y_limit: float = _told("m/s^2", "lateral acceleration of steady turning at the limit")
-    a_y_limit_sd: float = _told("m/s^2", "its standard deviation")
-    friction: float | None = _told("-", "of the road, over that of the reference tires")
-    friction_since: float | None = _told("s", "time at which it last changed")
-    side_slip: float | None = _told("rad", "atan(v_y/v_x) at the center of gravity, left positive")
-    side_slip_sd: float | None = _told("rad", "its standard deviation")
-    steering_zero: float = _told("rad", "zero of the steering today, added to what is read")
-    steering_zero_sd: float = _told("rad", "its standard deviation")
-    v_y_bias: float | None = _told("m/s", "bias of v_y today, taken off what is read")
-    v_y_bias_sd: float | None = _told("m/s", "its standard deviation")
-    point: Point | None = _told("rad, N", "mean slip and force since the last state", "object")
-    counts: Counts = _told("-", "what became of the samples", "object")
+    t: Annotated[float, "time of the newest sample, by its clock [s]"]
+    age: Annotated[float, "of the newest sample [s]"]
+    valid: Annotated[bool, "whether the tires of this drive may be trusted now"]
+    reason: Annotated[str, "why not; empty where they may"]
+    origin: Annotated[str, "which tires are given: live, or stored"]
+    alarm: Annotated[str, "what the driver should know at once; empty: nothing"]
+    slip: Annotated[Array, "slip angles of the curves (41,) [rad]"]
+    force: Annotated[Array, "axle forces at these (2, 41) [N]"]
+    force_sd: Annotated[Array, "their standard deviations (2, 41) [N]"]
+    known_slip: Annotated[Array, "slip up to which an axle is known (2,) [rad]"]
+    stiffness: Annotated[Array, "cornering stiffness (2,) [N/rad]"]
+    stiffness_sd: Annotated[Array, "its standard deviation (2,) [N/rad]"]
+    grip: Annotated[Array, "largest force (2,) [static axle loads]"]
+    grip_sd: Annotated[Array, "its standard deviation (2,) [static axle loads]"]
+    understeer: Annotated[float, "understeer gradient at small a_y [rad s²/m]"]
+    understeer_sd: Annotated[float, "its standard deviation [rad s²/m]"]
+    a_y_limit: Annotated[float, "largest a_y of steady turning [m/s²]"]
+    a_y_limit_sd: Annotated[float, "its standard deviation [m/s²]"]
+    friction: Annotated[Number, "of the road, over that of the reference tires [-]"]
+    friction_since: Annotated[Number, "time of its last change [s]"]
+    side_slip: Annotated[Number, "atan2(v_y, v_x) at the center of gravity [rad]"]
+    side_slip_sd: Annotated[Number, "its standard deviation [rad]"]
+    steering_zero: Annotated[float, "today, added to what the steering reads [rad]"]
+    steering_zero_sd: Annotated[float, "its standard deviation [rad]"]
+    v_y_bias: Annotated[Number, "today, taken off what v_y reads [m/s]"]
+    v_y_bias_sd: Annotated[Number, "its standard deviation [m/s]"]
+    point: Annotated[Point | None, "mean slip [rad] and force [N] since the last state"]
+    counts: Annotated[Counts, "what became of the samples"]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain numbers and words, ready for JSON; null where nothing is known."""
-        return {one.name: _plain(getattr(self, one.name)) for one in fields(self)}
+        """Return it as plain numbers and words, ready for JSON; None where nothing is known."""
+        return {name: _plain(getattr(self, name)) for name in self.__slots__}
 
     @classmethod
     def schema(cls) -> dict[str, Any]:
-        """Return the JSON schema (draft 2020-12) of `to_dict`; units stand in the descriptions."""
-        return {
-            "$schema": "https://json-schema.org/draft/2020-12/schema",
-            "title": "tireid.State",
-            "type": "object",
-            "properties": {one.name: _property(one.metadata) for one in fields(cls)},
-            "required": [one.name for one in fields(cls)],
-        }
+        """Return the JSON schema of `to_dict`, draft 2020-12; units are in the descriptions."""
+        return {"$schema": "https://json-schema.org/draft/2020-12/schema", **_schema(cls)}
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, np.ndarray):
-        return [_plain(one) for one in value.tolist()]
-    if isinstance(value, list | tuple) and not hasattr(value, "_asdict"):
-        return [_plain(one) for one in value]
+    if isinstance(value, Counts):
+        return asdict(value)
     if isinstance(value, Point):
         return {name: _plain(both) for name, both in value._asdict().items()}
-    if isinstance(value, Counts):
-        return {one.name: getattr(value, one.name) for one in fields(value)}
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list):
+        return [_plain(one) for one in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _property(of: Any) -> dict[str, Any]:
-    said = {"description": f"{of['meaning']} [{of['unit']}]"}
-    if of["kind"] != "number":
-        return {"type": [of["kind"], "null"] if of["kind"] == "object" else of["kind"], **said}
-    number: dict[str, Any] = {"type": ["number", "null"]}
-    row = {"type": "array", "items": number}
-    if not of["size"]:
-        return {**number, **said}
-    if of["size"] == 2 * SLIP.size:
-        return {"type": "array", "items": row, **said}
-    return {**row, **said}
+def _schema(of: type) -> dict[str, Any]:
+    """Return the schema of a dataclass whose fields say what they are."""
+    fields = get_type_hints(of, include_extras=True)
+    properties = {}
+    for name, (kind, meaning) in ((name, get_args(one)) for name, one in fields.items()):
+        number: dict[str, Any] = {"type": ["number", "null"]}
+        row = {"type": "array", "items": number}
+        pair = {"type": ["object", "null"], "properties": {"slip": row, "force": row}}
+        given = {
+            float: {"type": "number"}, Number: number, bool: {"type": "boolean"},
+            int: {"type": "integer"}, str: {"type": "string"}, Point | None: pair,
+            Array: {"type": "array", "items": row} if "(2, 41)" in meaning else row,
+        }  # fmt: skip
+        known = _schema(kind) if kind is Counts else given[kind]
+        properties[name] = {**known, "description": meaning}
+    return {
+        "title": of.__name__,
+        "type": "object",
+        "properties": properties,
+        "required": list(properties),
+    }

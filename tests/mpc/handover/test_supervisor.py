@@ -10,7 +10,7 @@ from identifier.methods import make_method
 from identifier.run import OnlineIdentifier
 from models.friction import Friction, FrictionChange
 from models.maneuvers import RandomSteer
-from mpc.handover import supervisor as supervisor_module
+from mpc.handover import road as road_module
 from mpc.handover.judge import ChiSquare, Judge
 from mpc.handover.road import Change
 from mpc.handover.rules import Rules, Verdict
@@ -51,7 +51,7 @@ def test_friction_is_lost_where_two_looks_in_a_row_say_so(
         there = Change(Verdict.FRICTION, road._replace(ratio=0.5), tire, 10.0, 1.0)
         return there if len(seen) in looks else None
 
-    monkeypatch.setattr(supervisor_module, "look_at_road", looked)
+    monkeypatch.setattr(road_module, "look_at_road", looked)
     watched(supervisor, dry[1].between(0.0, 3.0))
     assert len(seen) > max(looks)
     assert (Verdict.FRICTION in [d.verdict for d in supervisor.decisions]) == lost
@@ -150,7 +150,7 @@ def test_the_baseline_follows_what_is_seen_slowly_and_not_a_change(
     """A low-pass over `baseline_time` from 1 on, of at most four times itself, never below 1."""
     baseline = []
     monkeypatch.setattr(
-        supervisor_module, "look_at_road", lambda *_, **given: baseline.append(given["baseline"])
+        road_module, "look_at_road", lambda *_, **given: baseline.append(given["baseline"])
     )
     supervisor = supervisor_of(car, learnt, rules=Rules(learning_time=1e3))
     supervisor.judge = Given(supervisor.target, mean)
@@ -179,7 +179,7 @@ def test_a_learnt_tire_is_taken_by_evidence_in_parts_of_the_baseline(
 ):
     """4 better over seconds, no more than 2 worse in the last moments; on a bad road thrice it."""
     supervisor = supervisor_of(car, learnt, rules=Rules(baseline_time=0.05))
-    monkeypatch.setattr(supervisor_module, "look_at_road", lambda *_, **given: None)
+    monkeypatch.setattr(road_module, "look_at_road", lambda *_, **given: None)
     supervisor.judge = Given(
         supervisor.target, baseline, better=baseline * better, worse_lately=baseline * worse_lately
     )
