@@ -80,8 +80,6 @@ _NAMES = {  # by the module that they lie in
     "tireid.emitting": "emit",
     "tireid.exporting": "export",
     "tireid.learning": "identify replay",
-    "tireid.live.live": "Live",
-    "tireid.live.state": "State",
     "tireid.run": "Run",
 }
 _HOMES = {name: f"{module}:{name}" for module, names in _NAMES.items() for name in names.split()}

@@ -12,7 +12,6 @@ from types import FrameType
 from typing import Any
 
 from identifier.measured import with_doubt
-
 from tireid.commands.options import (
     add_log_map,
     add_options,
