@@ -38,7 +38,7 @@ def declare(new: Any) -> None:
         "tireid sample --udp sends the packets of a simulated one.",
     )
     text = (
-        "udp://:PORT (JSON, or a struct that log.toml describes), can:INTERFACE (with --dbc), "
+        "udp://:PORT (JSON, or a struct that log.toml describes), can:CHANNEL (with --dbc), "
         "zenoh:KEY, or a log, which is replayed in its own time"
     )
     parser.add_argument("source", metavar="SOURCE", help=text)
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> None:
     vehicle = read_vehicle(options, tire, options.weights)
     with ExitStack() as stack:
         store = stack.enter_context(closing(Store(options.store))) if options.store else None
-        live = Live(vehicle, tire, resume=store and store.stored())
+        live = Live(vehicle, tire, resume=None if store is None else store.stored())
         source = open_source(
             options.source, given_map(options), live.counts, vehicle=vehicle, speed=options.speed
         )
