@@ -5,6 +5,7 @@ import os
 import re
 import signal
 import socket
+import struct
 import subprocess
 import sys
 from itertools import pairwise
@@ -13,10 +14,11 @@ from pathlib import Path
 import pytest
 
 import tireid as ti
-from models.recordings import write_recording
+from models.recordings import LogMap, write_recording
 from tests.tireid.conftest import refusal, typed
 from tireid.commands import sample as sending
-from tireid.live.state import State
+from tireid.live.packets import Packets
+from tireid.live.state import Counts, State
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -189,6 +191,28 @@ def test_what_sample_sends_in_one_terminal_live_reads_in_another(drive):
         assert sender.wait(60) == 0
     assert process.returncode == 0, err
     assert re.match(r"\d+ samples; t = ", out)
+
+
+def test_every_log_toml_on_the_page_reads_what_the_page_says(tmp_path):
+    page = (ROOT / "docs" / "live.md").read_text(encoding="utf-8")
+    named, packed, bus = re.findall(r"^```toml\n(.*?)^```$", page, re.M | re.S)
+    (plain,) = re.findall(r'^\{"t": .*\}$', page, re.M)
+    sent = {"stamp": 1500, "twist": {"vx": 20.0, "vy": -0.1}, "gyro_z": 9.0, "hand_wheel": 14.6}
+    counts = Counts()
+    for text, packet in (
+        ("", plain.encode()),
+        (named, json.dumps(sent).encode()),
+        (packed, struct.pack("<d5f", 1.5, 20.0, -0.125, 0.25, 0.0625, 6.25)),
+    ):
+        (tmp_path / "log.toml").write_text(text)
+        reader = Packets("udp", LogMap.from_toml(tmp_path / "log.toml"), counts)
+        t, v_x, r, delta_f, a_y, v_y = reader.sample(packet)
+        assert 1.0 < t < 13.0 and 19.0 < v_x < 21.0 and -0.2 < v_y < 0.0, text
+        assert 0.1 < r < 0.4 and 0.01 < delta_f < 0.1 and (text == named or a_y > 6.0), text
+    assert counts.unreadable == 0
+    (tmp_path / "log.toml").write_text(bus)
+    signals = LogMap.from_toml(tmp_path / "log.toml").signals
+    assert signals["delta_f"].ratio == 14.6 and len(signals) == 4
 
 
 def test_the_schema_on_the_page_is_that_of_a_state():
