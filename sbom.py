@@ -4,6 +4,7 @@ It lies in the wheel as `*.dist-info/sboms/tireid.cdx.json` (PEP 770): what tire
 the versions and with the hashes that it was tested with. `python sbom.py` prints it.
 """
 
+import hashlib
 import json
 import re
 import tomllib
@@ -52,13 +53,31 @@ def locked(text: str) -> Iterator[dict[str, Any]]:
         }
 
 
+def bundled() -> dict[str, Any]:
+    """Return the component that lies in the wheel itself: the library of the live page's charts."""
+    script = (ROOT / "tireid/live/uplot/uPlot.iife.min.js").read_bytes()
+    version = script.partition(b"(v")[2].partition(b")")[0].decode()
+    return {
+        "type": "library",
+        "bom-ref": f"pkg:npm/uplot@{version}",
+        "name": "uplot",
+        "version": version,
+        "purl": f"pkg:npm/uplot@{version}",
+        "hashes": [{"alg": "SHA-256", "content": hashlib.sha256(script).hexdigest()}],
+        "licenses": [{"license": {"id": "MIT"}}],
+        "properties": [{"name": "needed by", "value": "tireid"}],
+    }
+
+
 def parts_list() -> dict[str, Any]:
     """Return the parts list of the project, ready for JSON; the same lock gives the same bytes."""
     lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    parts = list(locked(lock))
+    parts = [*locked(lock), bundled()]
     own = f"pkg:pypi/{project['name']}@{project['version']}"
-    direct = {re.split(r"[<>=\[ ]", text)[0].lower() for text in project["dependencies"]}
+    direct = {re.split(r"[<>=\[ ]", text)[0].lower() for text in project["dependencies"]} | {
+        "uplot"
+    }
     needs = {own: sorted(p["bom-ref"] for p in parts if p["name"] in direct)}
     for part in parts:
         callers = [p["value"] for p in part["properties"] if p["name"] == "needed by"]

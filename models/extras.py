@@ -3,9 +3,9 @@
 EXTRAS = {
     "parquet": ("pyarrow",), "mat": ("h5py",), "mdf": ("asammdf",), "ros": ("rosbags",),
     "can": ("cantools", "python-can"), "onnx": ("onnx", "onnxruntime", "'casadi>=3.8.2'"),
+    "live": ("foxglove-sdk", "mcap", "eclipse-zenoh", "python-can", "cantools"),
     "cluster": ("dask", "distributed"),
     "fleet": ("pyarrow", "dask", "distributed", "fsspec"),
-    "live": ("cantools", "python-can", "foxglove-sdk", "mcap", "eclipse-zenoh"),
 }  # fmt: skip
 
 

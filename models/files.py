@@ -29,6 +29,8 @@ def write_atomically(path: str | PathLike[str], content: str | bytes | Iterable[
         part = Path(scratch) / target.name  # in the same folder, thus on the same disk
         with naming(target), part.open("wb") as file:
             file.writelines([whole] if isinstance(whole, bytes) else whole)
+            file.flush()
+            os.fsync(file.fileno())  # else a new name for an empty file where the power fails
         part.replace(target)
 
 

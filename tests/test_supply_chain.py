@@ -1,5 +1,6 @@
 """What is installed is what the lock lists, and the parts list says so."""
 
+import hashlib
 import json
 import re
 import runpy
@@ -77,15 +78,20 @@ def test_the_parts_list_holds_the_lock():
     assert (parts["bomFormat"], parts["specVersion"]) == ("CycloneDX", "1.6")
     lock = (ROOT / "requirements.lock").read_text()
     listed = {(one["name"], one["version"]) for one in parts["components"]}
-    assert listed == set(ENTRY.findall(lock))
-    hashes = {h["content"] for one in parts["components"] for h in one["hashes"]}
+    charts = next(one for one in parts["components"] if one["name"] == "uplot")  # in the wheel
+    script = (ROOT / "tireid/live/uplot/uPlot.iife.min.js").read_bytes()
+    assert charts["hashes"][0]["content"] == hashlib.sha256(script).hexdigest()
+    assert f"(v{charts['version']})".encode() in script[:100]
+    assert "tireid/live/uplot/LICENSE" in PROJECT["license-files"]
+    assert listed == {*ENTRY.findall(lock), ("uplot", charts["version"])}
+    hashes = {h["content"] for one in parts["components"] if one != charts for h in one["hashes"]}
     assert hashes == set(re.findall(r"sha256:([0-9a-f]{64})", lock))
     names = {one["bom-ref"]: one["name"] for one in parts["components"]}
     needs = {
         names.get(one["ref"], "tireid"): {names[ref] for ref in one["dependsOn"]}
         for one in parts["dependencies"]
     }
-    assert needs["tireid"] == {name for name, _ in wanted([])}
+    assert needs["tireid"] == {name for name, _ in wanted([])} | {"uplot"}
     assert "numpy" in needs["scipy"]
 
 

@@ -14,7 +14,7 @@ import re
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -29,7 +29,7 @@ from models.limits import limits
 from models.logs.foreign import need, one_line
 from models.logs.grouped import GroupedLog, Samples
 from models.logs.growing import Growing
-from models.logs.log import Listed, RecordingError, few
+from models.logs.log import Listed, RecordingError, chosen, few
 from models.logs.magic import HEAD, frames_in
 from models.logs.mdf import is_bus, opened
 from models.logs.stamps import nanoseconds, since, typical_rate
@@ -51,11 +51,11 @@ CALENDAR = 1e8  # [s]: times above count from 1970
 
 _FRAME = "CAN_DataFrame"  # of MDF
 _NO_DATA = ("CAN_RemoteFrame", "CAN_ErrorFrame")
-_EXTENDED = 1 << 31  # marks an identifier of 29 bits
+EXTENDED = 1 << 31  # marks an identifier of 29 bits
 _OBJECT = struct.Struct("<4sHHII")  # of BLF: mark, size and version of the header, size, type
 _FILE_SIZE = struct.Struct("<Q")  # of BLF, at byte 16 of its header
 
-_Key = tuple[str, int]  # bus, identifier with _EXTENDED
+_Key = tuple[str, int]  # bus, identifier with EXTENDED
 
 
 def _group_of(identifier: int) -> int:
@@ -63,9 +63,9 @@ def _group_of(identifier: int) -> int:
     return group if (group >> 8) & 0xFF >= 240 else group & 0x3FF00  # else it has a receiver
 
 
-class _Dbc(NamedTuple):
+class Dbc(NamedTuple):
     """What a DBC tells.
-    messages: by identifier, with `_EXTENDED`; groups: of J1939 -> identifier in the DBC; faults: by
+    messages: by identifier, with `EXTENDED`; groups: of J1939 -> identifier in the DBC; faults: by
     names of frame and signal what is wrong with it, a line each.
     """
 
@@ -75,9 +75,15 @@ class _Dbc(NamedTuple):
 
     def message(self, identifier: int) -> Any:
         """Return the message of a frame; None where the DBC does not know it."""
-        if identifier not in self.messages and identifier & _EXTENDED:
+        if identifier not in self.messages and identifier & EXTENDED:
             identifier = self.groups.get(_group_of(identifier), identifier)
         return self.messages.get(identifier)
+
+    def mask(self, identifier: int) -> int:
+        """Return the bits of an identifier that the frames of its message share."""
+        if identifier not in self.groups.values():
+            return _IDENTIFIER if identifier & EXTENDED else _SHORT
+        return 0x3FFFF00 if (identifier >> 16) & 0xFF >= 240 else 0x3FF0000
 
 
 class _Frames(NamedTuple):
@@ -102,7 +108,7 @@ class _Part(NamedTuple):
 _Log = tuple[dict[_Key, _Frames], Counter[str]]  # and how many others it has, by what they are
 
 
-def _gather(path: Path, kind: str, given: _Dbc) -> _Log:
+def _gather(path: Path, kind: str, given: Dbc) -> _Log:
     found: dict[_Key, tuple[Growing, Growing]] = {}
     others: Counter[str] = Counter({"unknown": 0, "cut short": 0})
     count = 0
@@ -141,7 +147,7 @@ def _of_messages(path: Path, kind: str, others: Counter[str]) -> Iterator[_Part]
             if one.is_error_frame or one.is_remote_frame:
                 others["error and remote"] += 1
             else:
-                identifier = one.arbitration_id | _EXTENDED * one.is_extended_id
+                identifier = one.arbitration_id | EXTENDED * one.is_extended_id
                 found.setdefault((str(one.channel), identifier), []).append(one)
         for key, frames in found.items():
             t, sizes = np.array([(one.timestamp, len(one.data)) for one in frames]).T
@@ -311,8 +317,8 @@ def _of_group(file: Any, names: set[str], number: int, first: int, count: int) -
     data = np.asarray(signal("DataBytes").samples, dtype=np.uint8).reshape(count, -1)
     raw = identifiers.samples.astype(np.int64)
     ids = raw & _IDENTIFIER
-    is_long = whole("IDE", (raw & _EXTENDED != 0) | (ids > _SHORT)) != 0
-    ids, buses = np.where(is_long, ids | _EXTENDED, ids), whole("BusChannel", 0)
+    is_long = whole("IDE", (raw & EXTENDED != 0) | (ids > _SHORT)) != 0
+    ids, buses = np.where(is_long, ids | EXTENDED, ids), whole("BusChannel", 0)
     sizes = np.minimum(whole("DataLength", data.shape[1]), data.shape[1])
     t = np.asarray(identifiers.timestamps, dtype=np.float64)
     for identifier, bus in np.unique([ids, buses], axis=1).T.tolist():
@@ -378,7 +384,7 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
             f"{path}: has frames of a bus; give the DBC file of their signals, "
             'in the [file] of log.toml: dbc = "car.dbc"'
         )
-    given = _read_dbc(dbc)
+    given = read_dbc(dbc)
     with one_line(path, "a CAN log"):
         with path.open("rb") as file:
             kind = frames_in(file.read(HEAD))
@@ -407,7 +413,7 @@ def open_(path: Path, dbc: Path | None = None) -> GroupedLog[_Place]:
     )
 
 
-def _channels(given: _Dbc, message: Any, frames: _Frames) -> Iterator[tuple[Listed, _Place]]:
+def _channels(given: Dbc, message: Any, frames: _Frames) -> Iterator[tuple[Listed, _Place]]:
     """Yield the signals that are sent in the frames of a message."""
     groups: dict[tuple[tuple[str, tuple[int, ...]], ...], _Group] = {}
     for signal in message.signals:
@@ -431,7 +437,7 @@ def _channels(given: _Dbc, message: Any, frames: _Frames) -> Iterator[tuple[List
             yield listed, (group, signal, given.faults.get((message.name, signal.name), ""))
 
 
-def _read_dbc(path: Path) -> _Dbc:
+def read_dbc(path: Path) -> Dbc:
     """Return the messages of a DBC and what is wrong with their signals."""
     with one_line(path, "a DBC file"):
         raw = read_bytes(path, RecordingError)
@@ -442,7 +448,7 @@ def _read_dbc(path: Path) -> _Dbc:
         database = need(path, "cantools.database", "DBC", "can")
         found = database.load_string(text, database_format="dbc", strict=False)
         messages = {
-            message.frame_id | (_EXTENDED if message.is_extended_frame else 0): message
+            message.frame_id | (EXTENDED if message.is_extended_frame else 0): message
             for message in found.messages
             if message.length and message.signals
         }
@@ -459,9 +465,9 @@ def _read_dbc(path: Path) -> _Dbc:
     groups = {
         _group_of(key): key
         for key, one in messages.items()
-        if key & _EXTENDED and (j1939 or one.protocol == "j1939" or key & 0xFF == _FROM_ALL)
+        if key & EXTENDED and (j1939 or one.protocol == "j1939" or key & 0xFF == _FROM_ALL)
     }
-    return _Dbc(messages, groups, faults)
+    return Dbc(messages, groups, faults)
 
 
 def _fault(message: Any, signal: Any) -> str:
@@ -513,10 +519,13 @@ def _values_of(data: NDArray[np.uint8], signal: Any) -> Array:
     """
     raw = _raw_values(data, signal)
     values = raw.astype(np.float64) * float(signal.scale) + float(signal.offset)
-    named = (signal.choices or {}).items()
-    none = [value for value, name in named if _NO_NUMBER.search(str(name).replace("_", " "))]
-    values[np.isin(raw, none)] = np.nan
+    values[np.isin(raw, _no_numbers(signal))] = np.nan
     return values
+
+
+def _no_numbers(signal: Any) -> list[int]:
+    named = (signal.choices or {}).items()
+    return [value for value, name in named if _NO_NUMBER.search(str(name).replace("_", " "))]
 
 
 def _raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
@@ -537,3 +546,60 @@ def _raw_values(data: NDArray[np.uint8], signal: Any) -> NDArray[Any]:
         return raw
     shift = 64 - length
     return np.asarray((raw << np.uint64(shift)).view(np.int64) >> np.int64(shift))
+
+
+# The same of one frame at a time, as it comes from a bus.
+
+
+def wanted(path: Path, names: Sequence[str]) -> tuple[Dbc, list[tuple[int, Any]]]:
+    """Return a DBC, and of each signal "Frame.Signal" the identifier and the signal in it."""
+    given = read_dbc(path)
+    listed = {
+        f"{message.name}.{one.name}": (identifier, one)
+        for identifier, message in given.messages.items()
+        for one in message.signals
+    }
+    found = chosen(path, names, listed)
+    for identifier, signal in found:
+        message = given.messages[identifier]
+        for one in (signal, *(one for one, _ in _selectors(message, signal))):
+            if fault := given.faults.get((message.name, one.name)):
+                raise RecordingError(fault)
+    return given, found
+
+
+def reader_of(message: Any, signal: Any) -> Callable[[bytes], float | None]:
+    """Return what reads a signal in its unit from a frame as `_values_of` does, bit for bit.
+
+    It gives NaN where the DBC says that a value is no number, None where the frame does not hold
+    the signal.
+    """
+    raw, none = _raw_reader(signal), frozenset(_no_numbers(signal))
+    selectors = [(_raw_reader(one), ids) for one, ids in _selectors(message, signal)]
+    scale, offset = float(signal.scale), float(signal.offset)
+
+    def read(data: bytes) -> float | None:
+        for selector, ids in selectors:
+            if selector(data) not in ids:
+                return None
+        value = raw(data)
+        return math.nan if value in none else float(value) * scale + offset
+
+    return read
+
+
+def _raw_reader(signal: Any) -> Callable[[bytes], int | float]:
+    length, (where, before) = signal.length, _place(signal)
+    order: Literal["little", "big"] = "little" if signal.byte_order == "little_endian" else "big"
+    shift = before if order == "little" else 8 * (where.stop - where.start) - before - length
+    mask, half = (1 << length) - 1, 1 << (length - 1 if signal.is_signed else length)
+    kind = struct.Struct({16: "<e", 32: "<f", 64: "<d"}[length]) if signal.is_float else None
+
+    def read(data: bytes) -> int | float:
+        bits = int.from_bytes(data[where], order) >> shift & mask
+        if kind is not None:
+            number: float = kind.unpack(bits.to_bytes(length // 8, "little"))[0]
+            return number
+        return bits - 2 * half if bits >= half else bits
+
+    return read

@@ -23,7 +23,7 @@ from models.logs.can import CALENDAR
 from models.logs.log import Channel
 from models.logs.stamps import since
 
-_GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
+GAP_INTERVALS = 2.5  # own intervals of a channel, more of which without a sample are a gap
 _SLOWER = 0.4  # share of empty cells from which a channel is taken to be slower than its rows
 _FAR = 5.0  # largest steps between samples, beyond which an extreme is no value of the signal
 _ROUND = 5e-5  # by which two digits, or a power of two, are missed
@@ -32,7 +32,8 @@ _NONE = 1e30  # that no sensor gives
 # of two makes them a signal, which may have been in km/h, degrees or g.
 _WORDS = np.array([2.0**k - less for k in range(7, 33) for less in (0, 1, 2)] + [999, 9999, 99999])
 _UNITS = np.array([1.0, 3.6, 180.0 / np.pi, 1.0 / 9.81])
-_ON_STEP = 0.01  # share of a step within which an instant is that of a sample
+ON_STEP = 0.01  # share of a step within which an instant is that of a sample
+FASTER = 1.5  # samples a step, of which more are averaged
 
 
 class Segment(NamedTuple):
@@ -114,7 +115,7 @@ def gaps(t: Array, longest: float) -> NDArray[np.intp]:
     """Return the index of each sample that comes after a gap.
     t : rising time stamps [s], (n,).   longest : time without a sample that is none yet [s].
     """
-    limit = max(longest * (1.0 + 1e-6), _GAP_INTERVALS * typical_step(t))
+    limit = max(longest * (1.0 + 1e-6), GAP_INTERVALS * typical_step(t))
     found = [
         part.start + 1 + np.flatnonzero(np.diff(t[part.start : part.stop + 1]) > limit)
         for part in blocks(max(t.size - 1, 0))
@@ -181,7 +182,7 @@ def _covered(times: Sequence[Array], longest: float) -> list[tuple[float, float]
     for t in times:
         cuts = gaps(t, longest)
         begins.append(t[np.concatenate([[0], cuts])])
-        ends.append(t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - _ON_STEP) * _interval(t))
+        ends.append(t[np.concatenate([cuts - 1, [t.size - 1]])] + (1.0 - ON_STEP) * _interval(t))
     edges = np.concatenate(begins + ends)
     order = np.argsort(edges, kind="stable")
     there = np.cumsum(np.where(order < edges.size // 2, 1, -1))
@@ -201,15 +202,15 @@ def sampled(raw: Raw, grid: Array, dt: float) -> Array:
 
 def _sampled(raw: Raw, grid: Array, dt: float, interval: float) -> Array:
     """Return the same at some instants, of a signal with a typical interval [s]."""
-    last = np.searchsorted(raw.t, grid + _ON_STEP * dt, side="right") - 1
-    if interval < dt / 1.5:
-        first = np.searchsorted(raw.t, grid - dt + _ON_STEP * dt, side="right")
+    last = np.searchsorted(raw.t, grid + ON_STEP * dt, side="right") - 1
+    if interval < dt / FASTER:
+        first = np.searchsorted(raw.t, grid - dt + ON_STEP * dt, side="right")
         first, begin = np.minimum(first, last), min(int(first[0]), int(last[0]))
         total = np.concatenate([[0.0], np.cumsum(raw.values[begin : int(last[-1]) + 1])])
         return np.asarray((total[last + 1 - begin] - total[first - begin]) / (last + 1 - first))
     before = np.maximum(last - 1, 0)
     now, step = raw.values[last], raw.t[last] - raw.t[before]
     ahead = np.maximum(grid - raw.t[last], 0.0)
-    goes_on = (last > 0) & (step <= _GAP_INTERVALS * interval) & (ahead > _ON_STEP * dt)
+    goes_on = (last > 0) & (step <= GAP_INTERVALS * interval) & (ahead > ON_STEP * dt)
     share = np.minimum(ahead, step) / np.where(step > 0.0, step, 1.0)
     return np.where(goes_on, now + share * (now - raw.values[before]), now)

@@ -51,7 +51,7 @@ def one_line(path: Path, format: str) -> Iterator[None]:
         except (RecordingError, MemoryError):  # which says nothing of the file
             raise
         except Exception as error:  # libraries raise anything of a file that is not theirs
-            said = f"is not {format}, or is damaged or cut off ({_reason(error)})"
+            said = f"is not {format}, or is damaged or cut off ({reason_of(error)})"
             _forget(error)
             if isinstance(error, FileNotFoundError) and not path.exists():
                 said = "there is no such file"
@@ -71,7 +71,8 @@ def _forget(error: BaseException | None) -> None:
     gc.collect()
 
 
-def _reason(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
+    """Return what a library says is wrong, short and on one line."""
     text = " ".join(str(error).split()) or type(error).__name__
     if not text.isprintable():
         return displayed(text[:_LONGEST_REASON]).strip("'\"")

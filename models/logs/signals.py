@@ -7,6 +7,8 @@ axle forces [N]; sideslip β [rad] stands in for v_y = v_x tan β. Left is posit
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -112,25 +114,45 @@ class Signal:
         """The channels that are read, that of the sign last."""
         return (*self.channel, self.sign) if self.sign else self.channel
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is its channel in SI, but for a sign that another one has."""
+        return self == Signal(channel=self.channel[:1], unit=self.unit, sign=self.sign)
+
     def value(self, parts: Sequence[Array], quantity: str) -> Array:
         """Return the signal of its channels.   parts : each channel in SI, on one clock (n,)."""
-        plain = Signal(channel=self.channel[:1], unit=self.unit, sign=self.sign)
-        if len(parts) == 1 and self == plain:
+        if self.is_plain:
             return parts[0]
         return filled(
             parts[0].size, lambda part: self._value([one[part] for one in parts], quantity)
         )
 
+    def at(self, parts: Sequence[float]) -> float:
+        """Return `value` of one instant, which is no force, bit for bit."""
+        total = parts[0]
+        for one in parts[1:]:  # as numpy adds; sum() may compensate
+            total += one
+        return float(self._road_wheel(total / len(parts) * self.factor - self.offset))
+
     def _value(self, parts: Sequence[Array], quantity: str) -> Array:
         total = (np.sum if quantity == FORCE else np.mean)(parts, axis=0)
-        total = total * self.factor - self.offset
-        if self.table:
-            hand, road = np.array(self.table).T
-            inside: Array = np.interp(total, hand, road)
-            first, last = np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]
-            below, above = np.minimum(total - hand[0], 0.0), np.maximum(total - hand[-1], 0.0)
-            return np.asarray(inside + first * below + last * above)
-        return np.asarray(total / self.ratio)
+        return np.asarray(self._road_wheel(total * self.factor - self.offset))
+
+    def _road_wheel(self, total: Any) -> Any:
+        """Return the angle of the road wheels, by ratio or table.   total : (n,), or a number."""
+        if not self.table:
+            return total / self.ratio
+        hand, road, (first, last) = _curve(self.table)
+        inside = np.interp(total, hand, road)
+        below, above = np.minimum(total - hand[0], 0.0), np.maximum(total - hand[-1], 0.0)
+        return inside + first * below + last * above
+
+
+@lru_cache(maxsize=8)
+def _curve(table: tuple[tuple[float, float], ...]) -> tuple[Array, Array, list[float]]:
+    """Return angles of hand wheel and road wheels of a table, and the slopes at its ends."""
+    hand, road = np.array(table).T
+    return hand, road, (np.diff(road)[[0, -1]] / np.diff(hand)[[0, -1]]).tolist()
 
 
 def signed(amounts: Array, t: Array, sign_t: Array, sign: Array) -> Array:

@@ -13,6 +13,7 @@ r = 0.004
 
 import math
 import re
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -39,6 +40,7 @@ from models.recordings.wheels import Wheels
 from models.schema import Table, changed, read_toml, toml_table
 
 LONGEST_GAP = 0.1  # [s]
+LARGEST_PACKET = 1 << 16  # bytes, of a live source; a datagram has less
 
 AXES = {"ISO": 1.0, "SAE": -1.0}  # sign of all but v_x and a_x: y left and z up, or both turned
 _REFUSE, CUT = "refuse", "cut"  # what becomes of cells without a value
@@ -51,6 +53,7 @@ _SECTIONS = {
         "holes": "holes", "order": "order",
     },
     "filters": {"low_pass": "low_pass"},
+    "packet": {"format": "packet", "fields": "fields"},
 }  # fmt: skip
 
 
@@ -76,6 +79,9 @@ class LogMap:
         the rest follows after a gap.
     low_pass : cut-off of a low pass on all signals [Hz]; None filters nothing. All pass the same
         one, of second order, which looks at no later sample: so none is late against another.
+    packet : of a live source, how numbers are packed, as Python's struct writes it ("<d4f"); empty
+        where packets are JSON.
+    fields : the channel that each of these numbers is.
     wheels : what they are, where v_x is made of their speeds.
     repair : corrections of the recording and of the car, after reading.
     """
@@ -91,6 +97,8 @@ class LogMap:
     holes: str = _REFUSE
     order: str = _REFUSE
     low_pass: float | None = None
+    packet: str = ""
+    fields: tuple[str, ...] = ()
     wheels: Wheels = field(default_factory=Wheels)
     repair: Repair = field(default_factory=Repair)
 
@@ -113,6 +121,8 @@ class LogMap:
         for name, signal in self.signals.items():
             if signal.unit:
                 to_si(signal.unit, quantity_of(name, signal.unit), f"signals.{name}")
+        if self.packet or self.fields:
+            _require_numbers(self.packet, self.fields)
 
     def opened(self, path: str | PathLike[str]) -> LogFile:
         """Open a log, its time as the map tells it."""
@@ -209,6 +219,30 @@ class LogMap:
         path : of the file; what is there is replaced.
         """
         write_atomically(path, self.toml(Path(path).parent))
+
+
+def _require_numbers(packet: str, fields: Sequence[str]) -> None:
+    """Refuse a packet that is not a number for each field."""
+    try:
+        size = struct.calcsize(packet)
+        if not 0 < size <= LARGEST_PACKET:
+            raise struct.error(f"it has {size} bytes, 1 to {LARGEST_PACKET} are allowed")
+        values = struct.unpack(packet, bytes(size))
+    except (struct.error, UnicodeEncodeError) as error:
+        raise RecordingError(
+            f'packet.format must be a format of Python\'s struct, as "<d4f", not '
+            f"{displayed(packet)} ({error})"
+        ) from None
+    if not all(type(value) in (int, float) for value in values):
+        raise RecordingError(
+            f'packet.format must hold numbers alone; skip other bytes by "x", not '
+            f"{displayed(packet)}"
+        )
+    if len(set(fields)) < len(fields) or len(fields) != len(values):
+        raise RecordingError(
+            f"packet.fields must name each of the {len(values)} numbers of packet.format once, "
+            f"not {displayed(', '.join(fields))}"
+        )
 
 
 _RULES = {

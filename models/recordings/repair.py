@@ -124,6 +124,23 @@ class Repair:
         changes: dict[str, Any] = dict(signals)
         return self._measured(replace(recording, **changes)), self.on(vehicle)
 
+    def at(self, signals: Mapping[str, float]) -> dict[str, float]:
+        """Return the signals of one instant as `apply` leaves them, bit for bit.
+
+        Delays, lags and the place of the accelerometer need other instants; they stay.
+        """
+        now = {name: value * self._scale(name)[0] - self._scale(name)[1]
+               for name, value in signals.items()}  # fmt: skip
+        if self.sideslip:
+            factor, offset = self._scale("v_y")
+            now["v_y"] = now["v_x"] * float(np.tan(signals["v_y"] * factor)) - offset
+        if self.velocity_sensor_angle or self.velocity_sensor_x:
+            c, s = math.cos(self.velocity_sensor_angle), math.sin(self.velocity_sensor_angle)
+            v_x, v_y = now["v_x"], now["v_y"]
+            now["v_x"] = c * v_x - s * v_y
+            now["v_y"] = c * v_y + s * v_x - self.velocity_sensor_x * now["r"]
+        return now
+
     def _scale(self, name: str) -> tuple[float, float]:
         return self.factor.get(name, 1.0), self.offset.get(name, 0.0)
 

@@ -43,7 +43,7 @@ def signals(draw):
 @given(
     told=signals(),
     axes=st.sampled_from(["ISO", "SAE"]),
-    words=st.lists(names, min_size=2, max_size=2),
+    words=st.lists(names, min_size=2, max_size=2, unique=True),
     gap=positive,
     low_pass=st.none() | positive,
     wheels=st.builds(
@@ -74,6 +74,8 @@ def test_what_is_written_reads_back_bit_for_bit(
         holes="cut" if gap > 1.0 else "refuse",
         order="mend" if gap < 2.0 else "refuse",
         low_pass=low_pass,
+        packet="<d2f" if gap > 1.0 else "",
+        fields=("t", *words) if gap > 1.0 else (),
         wheels=wheels,
         repair=repair,
     )
@@ -83,10 +85,22 @@ def test_what_is_written_reads_back_bit_for_bit(
     assert again == made and again.toml() == made.toml()
 
 
+@settings(max_examples=100, deadline=None)
+@given(declared=signals(), seed=st.integers(0, 2**32 - 1))
+def test_one_instant_of_a_signal_has_the_bits_of_a_log(declared, seed):
+    for name, signal in declared.items():
+        parts = np.random.default_rng(seed).normal(0.0, 2.0, (len(signal.channel), 20))
+        log = signal.value(list(parts), QUANTITIES[name])
+        assert [signal.at(instant) for instant in parts.T.tolist()] == log.tolist()
+
+
 @pytest.mark.parametrize(
     ("text", "rule"),
     [
-        ("[files]\n", "files is unknown, known are file, clock, filters, signals, wheels, repair"),
+        (
+            "[files]\n",
+            "files is unknown, known are file, clock, filters, packet, signals, wheels, repair",
+        ),
         ("[file]\naxis = 'ISO'\n", "file.axis is unknown, known are axes, run, dbc"),
         ("[file]\naxes = 'NED'\n", "axes must be one of ISO, SAE, not 'NED'"),
         ("[signals.vy]\nchannel = 'a'\n", "signals.vy is unknown, known are v_x, v_y, beta"),
@@ -125,6 +139,14 @@ def test_what_is_written_reads_back_bit_for_bit(
         ("[signals.v_y]\nchannel='a'\n[signals.beta]\nchannel='b'\n", "beta replaces v_y"),
         ("[signals.Fyf]\nchannel='a'\n", "Fyf needs its partner"),
         ("[clock]\nlongest_gap = -1\n", "longest_gap must be positive and finite, it is -1"),
+        ("[packet]\nformat = '<q'\n", "packet.fields must name each of the 1 numbers"),
+        ("[packet]\nfields = ['a']\n", "packet.format must be a format of Python's struct"),
+        ("[packet]\nformat = '<4s'\nfields = ['a']\n", "packet.format must hold numbers alone"),
+        ("[packet]\nformat = '<99999999d'\nfields = ['a']\n", "1 to 65536 are allowed"),
+        (
+            "[packet]\nformat = '<2d'\nfields = ['a', 'a']\n",
+            "packet.fields must name each of the 2",
+        ),
         ("[filters]\nlow_pass = 0\n", "low_pass must be positive and finite, it is 0"),
         ("[repair]\nmass = 1\n", "repair.mass is unknown"),
         ("[repair.vehicle]\nmass = -1\n", "vehicle.mass must be positive"),

@@ -289,3 +289,18 @@ def test_behind_a_low_pass_a_straight_line_stays_one_to_its_ends(drive):
     line = replace(drive, r=3.0 * drive.t + 1.0)
     repaired, _ = Repair(lag={"r": 0.1}).apply(line, CAR)
     np.testing.assert_allclose(repaired.r, line.r + 0.3, atol=1e-10)
+
+
+@pytest.mark.parametrize("sideslip", [False, True])
+def test_one_instant_is_repaired_to_the_bits_of_a_log(drive, sideslip):
+    repair = Repair(
+        sideslip=sideslip,
+        factor={"v_x": 1.01, "v_y": 0.9, "a_y": -1.0},
+        offset={"v_y": 0.03, "r": 0.01, "delta_f": -0.002},
+        velocity_sensor_x=0.7,
+        velocity_sensor_angle=-0.02,
+    )
+    repaired, _ = repair.apply(drive, CAR)
+    for k in range(0, len(drive), 37):
+        now = repair.at({name: float(getattr(drive, name)[k]) for name in CHANNELS})
+        assert now == {name: getattr(repaired, name)[k] for name in CHANNELS}

@@ -42,6 +42,7 @@ MISSED = 0.24  # of the force by the motion, rms: twice a verdict's, which takes
 NOISE = 0.03  # m/s, of v_y as coupled receivers have it
 _LOST = 0.9  # of the friction of the reference, below which there is an alarm
 _REFERENCE = 10.0  # s for which tires were valid live, before they are the reference
+_PUSH = 1.5  # m/s² of braking or driving, beyond which another friction is not looked for
 _LOST_SAMPLES = 5  # in a row, after which the road is looked at anew
 
 
@@ -309,6 +310,10 @@ class Live:
         """Look at the road, with the zeros of the sensors as they are today."""
         watch, model = self._watch, self._model
         if watch is None or model is None or self._window.duration < self._least:
+            return
+        v_x, v_y, r, _ = self._window.last(self._least).T
+        push = (v_x[-1] - v_x[0]) / (self._least - self.dt) - float(np.mean(v_y * r))
+        if abs(push) > _PUSH:
             return
         base = _with_zeros(watch.road.base, model)
         watch.road = watch.road._replace(base=base)

@@ -84,6 +84,8 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Point):
         return {name: _plain(both) for name, both in value._asdict().items()}
     if isinstance(value, np.ndarray):
+        if np.isfinite(value).all():
+            return value.tolist()
         value = value.tolist()
     if isinstance(value, list):
         return [_plain(one) for one in value]

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from models.logs.can import _group_of, _raw_values, _values_of
+from models.logs.can import _group_of, _raw_values, _values_of, read_dbc, reader_of
 from models.logs.door import open_log
 from tests.models.logs.conftest import channel_of, refusal
 from tests.models.logs.drive_in_every_format import DBC, write_can, write_mdf_bus
@@ -78,7 +78,9 @@ def test_signals_of_any_place_and_kind_are_those_that_cantools_decodes():
         # Integers of 64 bits lose their last digits on the way to a double.
         with np.errstate(invalid="ignore"):  # floats of any bits
             values = _values_of(data, signal)
+            alone = [reader_of(message, signal)(row.tobytes()) for row in data]
         assert np.allclose(values, scaled, rtol=1e-14, atol=1e-14, equal_nan=True)
+        assert np.array_equal(values, alone, equal_nan=True)
 
 
 def steering(k):
@@ -131,6 +133,9 @@ def test_values_that_the_dbc_names_as_no_number_are_nan(tmp_path):
     log = open_log(write(tmp_path / "log.blf", messages), dbc(tmp_path))
     values = channel_of(log, "Steering.Angle").values
     assert np.allclose(values, [0.5, np.nan, np.nan, 0.1, -0.5], equal_nan=True)
+    message = read_dbc(tmp_path / "car.dbc").messages[100]
+    read = reader_of(message, message.get_signal_by_name("Angle"))
+    assert np.array_equal(values, [read(data) for *_, data, _ in messages], equal_nan=True)
 
 
 def test_the_same_frame_on_two_buses_is_two_channels(tmp_path):

@@ -1,0 +1,222 @@
+"""Where samples come from while a car drives: packets, a bus, or a log that is replayed."""
+
+import math
+import os
+import socket
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Event
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+
+from codegen.escape import displayed
+from models.logs.foreign import need, reason_of
+from models.logs.log import RecordingError
+from models.recordings.map import LARGEST_PACKET, LogMap
+from models.recordings.reader import read_repaired, split_log_argument
+from models.recordings.record import Recording
+from models.vehicle import Vehicle
+from tireid.live.frames import Frames
+from tireid.live.packets import Packets, Sample, require_live
+from tireid.live.state import Counts
+
+FORMS = "udp://[HOST]:PORT, can:[KIND:]CHANNEL, zenoh:KEY, or a log"
+QUIET = 0.2  # s without a sample, after which the caller goes on all the same
+_WAIT = 0.1  # s, longest wait at a time: closing is not later
+_BURST = 2e-3  # s, within which frames of one instant come
+_QUEUE = 256  # packets of zenoh that wait, 2.5 s at 100 Hz
+
+
+@dataclass(slots=True, eq=False)
+class Source:
+    """Samples, as an iterator that ends with the log, or when the source is closed.
+
+    It gives None where there was no sample for 0.2 s.
+
+    words : what is read, one line.   steps : samples, and None after each packet or wait.
+    reading : whose v_y says whether lateral velocity comes.   free : closes what is open.
+    """
+
+    words: str
+    steps: Iterator[Sample | None]
+    reading: Packets | Frames | Recording
+    free: Callable[[], object] = lambda: None
+    _closed: bool = False
+
+    @property
+    def v_y(self) -> bool | None:
+        """Whether lateral velocity comes; None where only the first sample will tell."""
+        if isinstance(self.reading, Recording):
+            return self.reading.logged_v_y is not None
+        return self.reading.v_y
+
+    def __iter__(self) -> Iterator[Sample | None]:
+        last = time.monotonic()
+        while not self._closed:
+            try:
+                one = next(self.steps)
+            except StopIteration:
+                return
+            except Exception:
+                if self._closed:  # meanwhile, by another thread
+                    return
+                raise
+            now = time.monotonic()
+            if one is not None or now - last >= QUIET:
+                last = now
+                yield one
+
+    def close(self) -> None:
+        """End the iteration, also one of another thread, and free what is open."""
+        if not self._closed:
+            self._closed = True
+            self.free()
+
+    def __enter__(self) -> "Source":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def open_source(
+    text: str, log_map: LogMap, counts: Counts, *, vehicle: Vehicle, speed: float = 1.0
+) -> Source:
+    """Open udp://[HOST]:PORT, can:[KIND:]CHANNEL, zenoh:KEY, or a log, also LOG:RUN.
+
+    Parameters
+    ----------
+    log_map : how it is read.
+    counts : in which packets and frames that cannot be read are counted.
+    vehicle : as declared, the map's repair not yet applied: a log must fit it.
+    speed : of the replay of a log; infinite waits for nothing.
+    """
+    opened = {"udp": _udp, "can": _can, "zenoh": _zenoh}.get(text.partition(":")[0])
+    if opened and ":" in text and not Path(text).exists():
+        require_live(log_map)
+        return opened(text, log_map, counts)
+    if not speed > 0.0:
+        raise RecordingError(f"speed must be positive, it is {speed:g}")
+    path, run = split_log_argument(text)
+    if not path.exists():
+        raise RecordingError(f"{displayed(text)} is no file and no source; sources are {FORMS}")
+    recording, _ = read_repaired(path, vehicle, run, log_map=log_map)
+    if np.any(recording.delta_r):
+        raise RecordingError(f"{recording.name}: rear axle steers, which cannot be read live")
+    words = f"{recording.name}, {recording.duration:.4g} s at {speed:g} times its speed"
+    return Source(words, _replayed(recording, speed), recording)
+
+
+def _replayed(recording: Recording, speed: float) -> Iterator[Sample | None]:
+    none, v_y = np.full(len(recording), math.nan), recording.logged_v_y
+    columns = (
+        recording.t, recording.v_x, recording.r, recording.delta_f,
+        none if recording.a_y is None else recording.a_y, none if v_y is None else v_y,
+    )  # fmt: skip
+    begin = time.monotonic()
+    for k in range(len(recording)):
+        sample = Sample(*(float(one[k]) for one in columns))
+        due = begin + (sample.t - float(recording.t[0])) / speed
+        while (left := due - time.monotonic()) > 0.0:
+            time.sleep(min(left, _WAIT))
+            yield None
+        yield sample
+
+
+def _read(
+    receive: Callable[[], Any], take: Callable[[Any], Iterable[Sample]]
+) -> Iterator[Sample | None]:
+    while True:
+        yield from take(receive())  # None where nothing came
+        yield None
+
+
+def _udp(text: str, log_map: LogMap, counts: Counts) -> Source:
+    try:
+        where = urlsplit(text)
+        host, port = where.hostname or "127.0.0.1", where.port
+        if port is None or where.scheme != "udp" or not text.startswith("udp://"):
+            raise ValueError
+    except ValueError:
+        raise RecordingError(
+            f"{displayed(text)} must be udp://HOST:PORT or udp://:PORT, PORT at most 65535"
+        ) from None
+    packets = Packets(text, log_map, counts)
+    bound = None
+    try:
+        family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
+        bound = socket.socket(family, socket.SOCK_DGRAM)
+        bound.bind(address)
+    except OSError as error:
+        if bound:
+            bound.close()
+        raise RecordingError(
+            f"{text}: port {port} of {host} cannot be opened ({error.strerror}); name another, or "
+            "end the program that has it"
+        ) from None
+    bound.settimeout(_WAIT)
+
+    def receive() -> bytes | None:
+        try:
+            return bound.recv(LARGEST_PACKET)
+        except (TimeoutError, ConnectionError):  # Windows: an answer to a sender did not arrive
+            return None
+
+    host, port = bound.getsockname()[:2]
+    words = f"UDP at {host}:{port}, {log_map.packet or 'JSON'}"
+    return Source(words, _read(receive, packets.take), packets, bound.close)
+
+
+def _zenoh(text: str, log_map: LogMap, counts: Counts) -> Source:
+    zenoh = need(Path(text), "zenoh", "it", "live")
+    packets = Packets(text, log_map, counts)
+    queue, came = deque[bytes](maxlen=_QUEUE), Event()  # the oldest goes; its time shows the loss
+
+    def callback(sample: Any) -> None:
+        payload = sample.payload
+        queue.append(payload.to_bytes() if len(payload) <= LARGEST_PACKET else b"")
+        came.set()
+
+    def receive() -> bytes | None:
+        came.clear()
+        if not queue:
+            came.wait(_WAIT)
+        return queue.popleft() if queue else None
+
+    session = None
+    try:
+        from_env = "ZENOH_CONFIG" in os.environ
+        session = zenoh.open(zenoh.Config.from_env() if from_env else zenoh.Config())
+        session.declare_subscriber(text.partition(":")[2], callback)
+    except Exception as error:
+        if session:
+            session.close()
+        raise RecordingError(f"{text}: cannot be opened ({reason_of(error)})") from None
+    return Source(text, _read(receive, packets.take), packets, session.close)
+
+
+def _can(text: str, log_map: LogMap, counts: Counts) -> Source:
+    can = need(Path(text), "can", "it", "live")
+    frames = Frames(text, log_map, counts)
+    kind, colon, channel = text[4:].partition(":")
+    if not colon:
+        kind, channel = "socketcan", kind
+    more = {"preserve_timestamps": True} if kind == "virtual" else {}
+    try:
+        bus = can.Bus(channel=channel, interface=kind, can_filters=frames.filters, **more)
+    except Exception as error:  # a driver may raise anything
+        raise RecordingError(f"{text}: cannot be opened ({reason_of(error)})") from None
+
+    def receive() -> Any:
+        try:
+            return bus.recv(_BURST if frames.waiting else _WAIT)
+        except can.CanError as error:
+            raise RecordingError(f"{text}: cannot be read ({reason_of(error)})") from None
+
+    words = f"CAN {kind} {channel}, {log_map.dbc}"
+    return Source(words, _read(receive, frames.take), frames, bus.shutdown)
