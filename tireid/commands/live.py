@@ -4,11 +4,9 @@ import argparse
 import math
 import signal
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing
 from dataclasses import asdict
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
 from identifier.measured import with_doubt
@@ -29,6 +27,7 @@ from tireid.live.state import Counts, State
 from tireid.progress import say, tell
 
 _EVERY = 10.0  # s between two lines while nothing changes
+_ENDS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
 def declare(new: Any) -> None:
@@ -75,6 +74,9 @@ def run(options: argparse.Namespace) -> None:
             live.prepare(v_y=source.v_y)
         stack.enter_context(source)
         outputs = stack.enter_context(Outputs(serve=serve, record=record))
+        for number in (getattr(signal, one) for one in _ENDS if hasattr(signal, one)):
+            before = signal.signal(number, lambda *_: source.close())  # cuts no state in two
+            stack.callback(signal.signal, number, before)
         for line in (source.words, *outputs.words.splitlines()):
             say(line)
         _follow(live, source, outputs, store)
@@ -84,52 +86,26 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -> None:
-    """Pass on what is known, until the source ends or a signal comes."""
+    """Pass on what is known, until the source ends or is closed."""
     newest, said, before = time.monotonic(), -math.inf, None
-    with _signals() as stopped:
-        for sample in source:
-            now = time.monotonic()
-            newest = now if sample is not None else newest
-            if sample is None:
-                state = live.state(now - newest)
-            else:
-                v_y = sample.v_y if source.v_y else None
-                state = live.feed(*sample[:-1], v_y=v_y)
-            if state is not None:
-                outputs.send(state)
-            judged = before if state is None else (state.valid, bool(state.alarm))
-            if judged != before or (now - said > _EVERY and (state or not live.counts.samples)):
-                before, said = judged, now
-                counted = _counted(live.counts) or "nothing comes"
-                say(f"no sample yet: {counted}" if state is None else _line(state))
-                _offer(store, live)
-            if stopped:
-                break
-    _offer(store, live)
-
-
-def _offer(store: Store | None, live: Live) -> None:
-    if store is not None and (tires := live.tires()) is not None:
-        store.offer(tires)
-
-
-@contextmanager
-def _signals() -> Iterator[list[int]]:
-    """Gather signals that ask for an end, so that none cuts a state in two; a second one may."""
-    stopped: list[int] = []
-
-    def stop(number: int, _: FrameType | None) -> None:
-        stopped.append(number)
-        signal.signal(number, before[number])
-
-    names = ("SIGINT", "SIGTERM", "SIGHUP")
-    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-    before = {number: signal.signal(number, stop) for number in numbers}
-    try:
-        yield stopped
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+    for sample in source:
+        now = time.monotonic()
+        if sample is None:
+            state = live.state(now - newest)
+        else:
+            newest, v_y = now, sample.v_y if source.v_y else None
+            state = live.feed(*sample[:-1], v_y=v_y)
+        if state is not None:
+            outputs.send(state)
+        judged = before if state is None else (state.valid, bool(state.alarm))
+        if judged != before or (now - said > _EVERY and (state or not live.counts.samples)):
+            before, said = judged, now
+            counted = _counted(live.counts) or "nothing comes"
+            say(f"no sample yet: {counted}" if state is None else _line(state))
+            if store is not None:
+                store.offer(live.tires())
+    if store is not None:
+        store.offer(live.tires())
 
 
 def _line(state: State) -> str:

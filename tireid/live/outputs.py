@@ -221,9 +221,10 @@ class Store:
         """Return the tires of an earlier run; None where there are none."""
         return self._stored
 
-    def offer(self, tires: TireModel) -> None:
-        """Have tires written when it is time, unless newer ones come first."""
-        self._newest.append(tires)
+    def offer(self, tires: TireModel | None) -> None:
+        """Have tires, if any, written when it is time, unless newer ones come first."""
+        if tires is not None:
+            self._newest.append(tires)
 
     def close(self) -> None:
         """Write the last tires that were offered."""
