@@ -63,6 +63,18 @@ def test_what_is_recorded_is_every_state_of_the_drive(drive, tmp_path, capsys):
     assert "choose another name" in refusal(capsys, words(drive, "--record", file))
 
 
+def test_the_next_drive_goes_on_from_the_store(drive, tmp_path, capsys):
+    first_lines = []
+    for _ in range(2):
+        assert typed(*words(drive, "--speed", "inf", "--store", tmp_path / "store")) == 0
+        first_lines += re.findall(r"stiffness .+ ± (.+) / .+ ± (.+) kN", capsys.readouterr().err)[
+            :1
+        ]
+    fresh, resumed = (list(map(float, both)) for both in first_lines)
+    assert all(after < 0.2 * before for before, after in zip(fresh, resumed, strict=True))
+    assert ti.sedan().moves_as(ti.TireModel.load(tmp_path / "store" / "tires.json").vehicle)
+
+
 @pytest.mark.parametrize(
     ("source", "more", "line"),
     [
