@@ -218,7 +218,7 @@ def test_every_log_toml_on_the_page_reads_what_the_page_says(tmp_path):
     ):
         (tmp_path / "log.toml").write_text(text)
         reader = Packets("udp", LogMap.from_toml(tmp_path / "log.toml"), counts)
-        t, v_x, r, delta_f, a_y, v_y = next(reader.take(packet))
+        ((t, v_x, r, delta_f, a_y, v_y),) = reader.take(packet)
         assert t in (12.34, 1.5) and 19.0 < v_x < 21.0 and -0.2 < v_y < 0.0, text
         assert 0.1 < r < 0.4 and 0.01 < delta_f < 0.1 and (text == named or a_y > 6.0), text
     assert counts.unreadable == 0

@@ -70,8 +70,7 @@ def run(options: argparse.Namespace) -> None:
         source = open_source(
             options.source, given_map(options), live.counts, vehicle=vehicle, speed=options.speed
         )
-        if source.v_y is not None:  # before packets come, which would have to wait
-            live.prepare(v_y=source.v_y)
+        live.prepare(v_y=source.v_y is not False)  # before packets come, which would have to wait
         stack.enter_context(source)
         outputs = stack.enter_context(Outputs(serve=serve, record=record))
         for number in (getattr(signal, one) for one in _ENDS if hasattr(signal, one)):
@@ -93,8 +92,10 @@ def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -
         if sample is None:
             state = live.state(now - newest)
         else:
-            newest, v_y = now, sample.v_y if source.v_y else None
-            state = live.feed(*sample[:-1], v_y=v_y)
+            newest = now
+            if live.measures_v_y and not source.v_y:  # as the first sample shows
+                live.prepare(v_y=False)
+            state = live.feed(*sample)
         if state is not None:
             outputs.send(state)
         judged = before if state is None else (state.valid, bool(state.alarm))

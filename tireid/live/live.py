@@ -55,7 +55,8 @@ _NO_POINT = np.zeros((3, 2))
 class Live:
     """Identifies the tires of a car while it drives, and says what is known of it.
 
-    Attributes: counts, of what became of the samples; identifier, None before the first.
+    Attributes: counts, of what became of the samples; identifier, None before the first;
+    measures_v_y.
 
     Parameters
     ----------
@@ -80,6 +81,7 @@ class Live:
         self.vehicle, self.counts, self._tire, self._resume = vehicle, Counts(), tire, resume
         self.identifier: OnlineIdentifier | None = None
         self._method: Any = None
+        self.measures_v_y = False
         self._stored = None if tire is None else _numbers(tire)
         self._live: dict[str, Any] = {}
         self._model: AxleModel | None = None
@@ -122,7 +124,7 @@ class Live:
             )
         self.identifier = OnlineIdentifier(method, self.vehicle, DT, start)
         self.identifier.prepare()
-        self._method, self._start, self._measures_v_y = method, start, v_y
+        self._method, self._start, self.measures_v_y = method, start, v_y
         self._holds = getattr(method, "held", False)
 
     def feed(
@@ -195,7 +197,7 @@ class Live:
             return
         self.counts.samples += 1
         self._lost = 0
-        if not self._measures_v_y:
+        if not self.measures_v_y:
             found = {name: float(value.flat[0]) for name, value in identifier.outputs.items()}
             v_y = found["v_y"] if found["side_slip_observable"] > 0.0 else math.nan
             self._v_y_sd = found["v_y_sd"]
@@ -207,7 +209,7 @@ class Live:
             return
         self._window.add((v_x, v_y, r, delta))
         if model is not None:
-            if self._measures_v_y:
+            if self.measures_v_y:
                 self._v_y = float(model.sensors.v_y(v_y, r, v_x) - model.offset[1])
             slip = -np.arctan((self._v_y + self._arms * r) / v_x)
             slip[0] += model.sensors.steering(delta) + model.offset[0]
@@ -277,7 +279,7 @@ class Live:
                 reasons.append(f"the doubt of the {axle} axle is {share} of what it was at first")
         explains = bool(((peak >= RULES.force) & (missed <= MISSED)).all())
         side_slip_sd = self._v_y_sd / self._v_x
-        if not self._measures_v_y and not side_slip_sd <= RULES.side_slip:
+        if not self.measures_v_y and not side_slip_sd <= RULES.side_slip:
             reasons.append(f"side slip is known to {math.degrees(side_slip_sd):.2g} deg")
         assert self.identifier is not None
         reached = self._method.limits.active(self.identifier.state())
@@ -308,7 +310,7 @@ class Live:
             alarm = f"friction {friction:.2f} of the reference, since {since:.1f} s"
         stored = bool(reason) and self._stored is not None
         bias_sd = math.sqrt(model.covariance[1, -1, -1])
-        v_y_sd = math.hypot(bias_sd, NOISE) if self._measures_v_y else self._v_y_sd
+        v_y_sd = math.hypot(bias_sd, NOISE) if self.measures_v_y else self._v_y_sd
         slides = age <= OLD and not self._lost and math.isfinite(self._v_x * self._v_y)
         point = self._points[-1] if age <= OLD else _NO_POINT
         return State(
@@ -326,8 +328,8 @@ class Live:
             side_slip_sd=v_y_sd / self._v_x if slides else None,
             steering_zero=float(model.offset[0]),
             steering_zero_sd=math.sqrt(model.covariance[0, -1, -1]),
-            v_y_bias=float(model.offset[1]) if self._measures_v_y else None,
-            v_y_bias_sd=bias_sd if self._measures_v_y else None,
+            v_y_bias=float(model.offset[1]) if self.measures_v_y else None,
+            v_y_bias_sd=bias_sd if self.measures_v_y else None,
             point=None if point is _NO_POINT else Point(point[0], point[1] * self._loads),
             counts=replace(self.counts),
         )
