@@ -28,7 +28,7 @@ from models.rules import require_kind
 from models.vehicle import GRAVITY, Vehicle
 from mpc.handover.certificate import LARGEST_SLIP
 from mpc.handover.judge import Judge, Window
-from mpc.handover.road import RoadWatch, at_friction
+from mpc.handover.road import RoadWatch, at_friction, fit_friction
 from mpc.handover.rules import Rules
 from mpc.tires import PredictionTire, prediction_tire
 from tireid.live.clock import Clock, Instant
@@ -109,7 +109,7 @@ class Live:
         return RoadWatch(prediction_tire(tires, self.vehicle), RULES_OF_ROAD)
 
     def prepare(self, *, v_y: bool) -> None:
-        """Compile the recursion before the first sample comes.
+        """Compile what is needed before the first sample comes.
 
         Parameters
         ----------
@@ -124,6 +124,10 @@ class Live:
             )
         self.identifier = OnlineIdentifier(method, self.vehicle, DT, start)
         self.identifier.prepare()
+        straight = np.tile([2.0 * method.min_speed, 0.0, 0.0, 0.0], (round(self._moments / DT), 1))
+        tire = prediction_tire(self.identifier.model(), self.vehicle)
+        fit_friction(self._judge, tire, straight)  # compiles what looks at the road
+        self._judge.chi_square(tire, straight)
         self._method, self._start, self.measures_v_y = method, start, v_y
         self._holds = getattr(method, "held", False)
 
