@@ -130,8 +130,8 @@ class Store:
     def stored(self) -> TireModel | None:
         return self._stored
 
-    def offer(self, tires: TireModel) -> None:
-        self._newest = tires
+    def offer(self, tires: TireModel | None) -> None:
+        self._newest = self._newest if tires is None else tires
 
     def close(self) -> None:
         self._end.set()
