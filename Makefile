@@ -33,7 +33,7 @@ tests bare heavy bench: export OPENBLAS_NUM_THREADS := 1
 tests bare: export TIREID_OPTIMIZE := 1,0
 
 # As on a fresh machine, which has Python and gcc: tests that ask for other tools (cmake, clang, compilers for Arm
-# and Windows, QEMU, ...), with these hidden. Each passes, or is skipped and says what it needs.
+# and Windows, QEMU, Chromium, ...), with these hidden. Each passes, or is skipped and says what it needs.
 bare: $(VENV)/.test
 	$(PY) -m tests.optional_tools $(PY) -m pytest -n auto --dist worksteal -m "not heavy" \
 		$$(cat tests/optional_tools.txt)

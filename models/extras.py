@@ -3,7 +3,7 @@
 EXTRAS = {
     "parquet": ("pyarrow",), "mat": ("h5py",), "mdf": ("asammdf",), "ros": ("rosbags",),
     "can": ("cantools", "python-can"), "onnx": ("onnx", "onnxruntime", "'casadi>=3.8.2'"),
-    "live": ("foxglove-sdk", "mcap", "eclipse-zenoh", "python-can", "cantools"),
+    "live": ("foxglove-sdk", "eclipse-zenoh", "python-can", "cantools"),
     "cluster": ("dask", "distributed"),
     "fleet": ("pyarrow", "dask", "distributed", "fsspec"),
 }  # fmt: skip

@@ -16,7 +16,7 @@ from typing import Any
 
 TOOLS = (
     *("arm-none-eabi-*", "qemu-*", "x86_64-w64-mingw32-*", "clang*"),
-    *("cmake", "ctest", "cppcheck", "g++*", "c++"),
+    *("cmake", "ctest", "cppcheck", "g++*", "c++", "chromium*"),
 )
 # Files of tests that ask for one of them, a path a line: `make bare` runs these on such a PATH.
 LIST = Path(__file__).with_name("optional_tools.txt")

@@ -32,7 +32,7 @@ def test_needs_python_and_gcc():
 
 TOOLS = (
     "/usr/bin/arm-none-eabi-size", "qemu-system-arm", "x86_64-w64-mingw32-gcc", "clang-14",
-    "clang-format", "cmake", "ctest", "cppcheck", "g++",
+    "clang-format", "cmake", "ctest", "cppcheck", "g++", "/usr/bin/chromium",
 )  # fmt: skip
 
 

@@ -63,7 +63,7 @@ def test_every_package_that_is_imported_is_declared():
     texts = [text for package in ORDER for text in texts_of(package).values()]
     names = {name.split(".")[0] for text in texts for name in imported(text)}
     declared = {name.replace("-", "_") for name, _ in wanted(PROJECT["optional-dependencies"])}
-    declared |= {"PIL", "foxglove"}
+    declared |= {"PIL", "foxglove"}  # of pillow and foxglove-sdk
     assert {"pillow", "foxglove_sdk"} <= declared
     known = set(sys.stdlib_module_names) | declared
     assert {"casadi", "scipy"} <= names

@@ -75,7 +75,7 @@ def test_folders_are_named_by_out_and_nothing_is_replaced_without_force():
         assert action.default == (None if asked else Path(f"tireid-{name}"))
         assert not action.required
         assert name in options["--force"]
-    assert set(COMMANDS) - set(options["--out"]) == {"channels", "init", "sample"}  # one file each
+    assert set(COMMANDS) - set(options["--out"]) == {"channels", "init", "live", "sample"}  # files
 
 
 def test_what_learns_is_named_alike_wherever_one_method_learns():

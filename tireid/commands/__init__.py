@@ -25,6 +25,7 @@ COMMANDS: Mapping[str, str] = {
     "doctor": "faults of a log or of its car's file, and a log.toml that repairs them",
     "plan": "maneuvers ranked by what they tell of the tires",
     "identify": "tire curves from a log, with error bars and a verdict",
+    "live": "tires, side slip and alarm while the car drives: a page, Foxglove, MCAP",
     "predict": "axle forces of another drive by stored tire curves, and their error",
     "compare": "all methods on the same logs, side by side",
     "check": "what is proven of an identifier: limits, margins, bounds; or its gains, designed",

@@ -149,6 +149,14 @@ def model_of_day(options: Namespace) -> TireModel | None:
     return model.of_day(day)
 
 
+def host_and_port(text: str, option: str) -> tuple[str, int]:
+    """Return what HOST:PORT names; without a host this machine, which others do not reach."""
+    host, _, port = text.rpartition(":")
+    if not (port.isascii() and port.isdigit() and int(port) < 65536):
+        raise ValueError(f"{option} wants HOST:PORT, a port of 0 to 65535, not {text!r}")
+    return host.strip("[]") or "127.0.0.1", int(port)
+
+
 def require_toml(path: Path) -> None:
     if path.suffix.lower() != ".toml":
         raise ValueError(f"{path}: the name must end in .toml")

@@ -1,24 +1,15 @@
 """What comes out of a live run: a topic, a page that shows it, a recording, and stored tires.
 
-Nobody who reads is waited for: a client that stops reading loses its oldest messages. The page
-holds no data. The topic can be read by whoever reaches its port, and written by nobody; a browser
-on this machine lets pages of any site reach it, as it lets the app of Foxglove.
+A client that stops reading loses its oldest messages. Any site in a browser here can read them.
 """
 
-import json
 import logging
-import os
-import socket
-import tempfile
-import time
-from collections import deque
-from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from http.server import BaseHTTPRequestHandler
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from io import FileIO
 from pathlib import Path
-from socketserver import ThreadingTCPServer
 from threading import Event, Thread
-from typing import Any, Self
+from typing import Any
 
 from identifier.frozen import FrozenModelError
 from identifier.tire_model import TireModel
@@ -29,214 +20,131 @@ from tireid.progress import say
 
 TOPIC = "/tireid/state"
 _BACKLOG = 64  # messages that wait for a client: 13 s of them, 0.3 MB
-_CHUNK = 1 << 16  # bytes of a recording between writes: 3 s of it are lost where the power fails
-_SILENT = 5.0  # s, after which a browser that says nothing is dropped
+_CHUNK = 1 << 16  # bytes of a recording between writes: 3 s of it are lost where the run is killed
 _PATIENCE = 1.0  # s for a server to end: a client that does not read would have it wait for ever
-_FILES = {  # all that is served, by what is asked for
-    "/": ("live/page.html", "text/html; charset=utf-8"),
-    "/report.css": ("report.css", "text/css"),
-    "/uPlot.min.css": ("live/uplot/uPlot.min.css", "text/css"),
-    "/uPlot.iife.min.js": ("live/uplot/uPlot.iife.min.js", "text/javascript"),
-}
+_PARTS = ("../report.css", "uplot/uPlot.min.css", "uplot/uPlot.iife.min.js")  # of the page
 
 
-class Outputs:
-    """Sends states to a topic with a page, and to a file.
+class Outputs(ExitStack):
+    """Sends states to a topic with a page, and to a new MCAP file; `words` says where.
 
-    Parameters
-    ----------
-    serve : host and port of the page; the topic is at the next port. Port 0: any two free ones.
-    record : MCAP file to write; it must not exist.
+    The page has the port that is given, the topic the next one. Port 0: any two free ones.
     """
 
     def __init__(self, serve: tuple[str, int] | None = None, record: Path | None = None) -> None:
-        self._logs: list[Callable[[bytes, int], None]] = []  # message, and its time [ns]
-        lines = []
-        with ExitStack() as stack:
-            if record is not None:
-                recording = _Recording(record)
-                stack.callback(recording.close)
-                self._logs.append(recording.log)
-                lines.append(f"record {record}")
-            if serve is not None:
-                lines.append(self._serve(*serve, stack))
-            self._stack = stack.pop_all()
-        self.words = "\n".join(lines)
-
-    def _serve(self, host: str, port: int, stack: ExitStack) -> str:
+        super().__init__()
+        self.words, self._topic = "", None
+        if serve is None and record is None:
+            return
         try:
             import foxglove
         except ImportError:
-            raise ImportError(needs("--serve", "the package foxglove-sdk", "live")) from None
-        # Whatever a client does wrong is an error there, a line each.
-        logging.getLogger("foxglove.websocket").setLevel(logging.CRITICAL)
-        self._context = context = foxglove.Context()  # the channel ends with it
+            raise ImportError(needs("--serve or --record", "foxglove-sdk", "live")) from None
+        logging.getLogger("foxglove").setLevel(logging.CRITICAL)  # not what clients do wrong
+        self._context = context = foxglove.Context()  # which the topic needs
+        with ExitStack() as stack:
+            if record is not None:
+                options = foxglove.mcap.MCAPWriteOptions(chunk_size=_CHUNK)
+                file = stack.enter_context(_File(record, "x"))
+                recording: Any = foxglove.open_mcap(file, context=context, writer_options=options)
+                stack.callback(lambda: file.closed or recording.close())
+                self.words = f"record {record}\n"
+            if serve is not None:
+                self._serve(*serve, stack, foxglove.start_server)
+            self.enter_context(stack.pop_all())
+        self._topic = foxglove.Channel(TOPIC, schema=State.schema(), context=context)
+
+    def _serve(self, host: str, port: int, stack: ExitStack, start: Any) -> None:
         try:
-            server = foxglove.start_server(
+            server = start(
                 name="tireid", host=host, port=port and port + 1, capabilities=[],
-                context=context, message_backlog_size=_BACKLOG,
+                context=self._context, message_backlog_size=_BACKLOG,
             )  # fmt: skip
-            stack.callback(_stop, server)
-            pages = stack.enter_context(_Pages(host, port, server.port))
+            ending = Thread(target=server.stop, daemon=True)
+            stack.callback(ending.join, _PATIENCE)
+            stack.callback(ending.start)
+            page = type("Page", (_Page,), {"topic": server.port})
+            pages = stack.enter_context(ThreadingHTTPServer((host, port), page))
         except (OSError, OverflowError, RuntimeError) as error:
-            reason = str(getattr(error, "strerror", None) or error).rpartition(": ")[2]
-            raise OutputError(
-                f"--serve {host}:{port}: ports {port} and {port + 1} of {host} must be free: "
-                f"{reason.partition(' (os')[0]}; choose another, as --serve 127.0.0.1:8775"
-            ) from None
-        Thread(target=pages.serve_forever, args=(0.1,), daemon=True).start()
+            rule = f"--serve {host}:{port} needs free ports {port} and {port + 1} of this machine"
+            raise OutputError(f"{rule}: {error}; choose another, as 127.0.0.1:8775") from None
+        Thread(target=pages.serve_forever, daemon=True).start()
         stack.callback(pages.shutdown)
-        topic = foxglove.Channel(TOPIC, schema=State.schema(), context=context)
-        self._logs.append(lambda message, now: topic.log(message, log_time=now))
-        name = f"[{host}]" if ":" in host else host
-        return (
-            f"page http://{name}:{pages.server_address[1]}/, "
-            f"topic {TOPIC} at ws://{name}:{server.port} (Foxglove)"
-        )
+        self.words += f"page http://{host}:{pages.server_port}/, Foxglove ws://{host}:{server.port}"
 
     def send(self, state: State) -> None:
-        """Send a state to all."""
-        message, now = json.dumps(state.to_dict(), allow_nan=False).encode(), time.time_ns()
-        for log in self._logs:
-            log(message, now)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
+        if self._topic is not None:
+            self._topic.log(state.to_dict())
 
 
-def _stop(server: Any) -> None:
-    ending = Thread(target=server.stop, daemon=True)
-    ending.start()
-    ending.join(_PATIENCE)
+class _File(FileIO):
+    """Where it cannot be written any more that is said once, and all else goes on."""
 
-
-class _Recording:
-    """An MCAP file. Where it cannot be written any more that is said once, and all else goes on."""
-
-    def __init__(self, path: Path) -> None:
+    def write(self, data: Any) -> int:
         try:
-            from mcap.writer import Writer
-        except ImportError:
-            raise ImportError(needs("--record", "the package mcap", "live")) from None
-        try:
-            self._file = path.open("xb")
-        except FileExistsError:
-            raise OutputError(f"{path} exists: choose another name for --record") from None
-        self._writer = writer = Writer(self._file, chunk_size=_CHUNK)
-        writer.start(library="tireid")
-        schema = State.schema()
-        number = writer.register_schema(schema["title"], "jsonschema", json.dumps(schema).encode())
-        self._channel = writer.register_channel(TOPIC, "json", number)
-
-    def log(self, message: bytes, now: int) -> None:
-        self._write(lambda: self._writer.add_message(self._channel, now, message, now))
-
-    def close(self) -> None:
-        self._write(self._writer.finish)
-        self._file.close()
-
-    def _write(self, step: Callable[[], None]) -> None:
-        if self._file.closed:
-            return
-        try:
-            step()
-            self._file.flush()
+            return super().write(data)
         except OSError as error:
-            say(f"{self._file.name} ends here, all else goes on: {error.strerror}")
-            with suppress(OSError):
-                self._file.close()
-
-
-class _Pages(ThreadingTCPServer):
-    """Serves the page; each browser has its thread, so that a slow one delays nobody."""
-
-    allow_reuse_address = os.name != "nt"
-    daemon_threads = True
-
-    def __init__(self, host: str, port: int, topic: int) -> None:
-        self.address_family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        self.topic = topic
-        super().__init__((host, port), _Page)
-
-    def handle_error(self, *_: object) -> None:
-        """Forget a browser that went away."""
+            say(f"{self.name} ends here, all else goes on: {error.strerror}")
+            self.close()
+            raise
 
 
 class _Page(BaseHTTPRequestHandler):
-    timeout = _SILENT
-    server: _Pages
+    timeout = 5.0  # s, after which a browser that says nothing is dropped
+    topic = 0  # its port
+
+    def handle(self) -> None:
+        with suppress(OSError):  # a browser that went away
+            super().handle()
 
     def do_GET(self) -> None:
-        if self.path not in _FILES:
+        if self.path != "/":
             self.send_error(404)
             return
-        name, kind = _FILES[self.path]
-        content = (Path(__file__).parents[1] / name).read_bytes()
+        page = (Path(__file__).parent / "page.html").read_text("utf-8")
+        for part in _PARTS:
+            page = page.replace(f"%{part}%", (Path(__file__).parent / part).read_text("utf-8"))
         self.send_response(200)
-        self.send_header("Content-Type", kind)
-        self.send_header("Cache-Control", "no-store")  # the next run may have other ports
+        self.send_header("Content-Type", "text/html")
         self.end_headers()
-        self.wfile.write(content.replace(b"%PORT%", b"%d" % self.server.topic))
+        self.wfile.write(page.replace("%PORT%", str(self.topic)).encode())
 
     def log_message(self, *_: object) -> None:
         """Be silent."""
 
 
 class Store:
-    """Tires in a folder, from one run to the next; a thread of its own writes the newest.
-
-    Parameters
-    ----------
-    folder : is made where there is none.
-    every : time between two writes [s].
-
-    Raises
-    ------
-    FrozenModelError
-        Where the folder holds tires that cannot be read; they stay as they are.
-    """
+    """Tires in a folder, from one run to the next; a thread writes the newest each minute."""
 
     def __init__(self, folder: Path, every: float = 60.0) -> None:
+        folder.mkdir(parents=True, exist_ok=True)
         self._path = folder / "tires.json"
         try:
-            folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryFile(dir=folder):
-                pass
-        except OSError as error:
-            reason = f"cannot be written: {error.strerror}; choose another folder"
-            raise OutputError(f"--store {folder}: {reason}") from None
-        try:
-            self._stored = TireModel.load(self._path) if os.path.lexists(self._path) else None
+            self._stored = TireModel.load(self._path) if self._path.exists() else None
         except FrozenModelError as error:
             raise FrozenModelError(f"{error}; move it away or choose another --store") from None
-        self._newest: deque[TireModel] = deque(maxlen=1)
-        self._end = Event()
+        self._newest, self._end = self._stored, Event()
         self._thread = Thread(target=self._write, args=(every,), daemon=True)
         self._thread.start()
 
     def stored(self) -> TireModel | None:
-        """Return the tires of an earlier run; None where there are none."""
         return self._stored
 
-    def offer(self, tires: TireModel) -> None:
-        """Have tires written when it is time, unless newer ones come first."""
-        self._newest.append(tires)
+    def offer(self, tires: TireModel | None) -> None:
+        self._newest = self._newest if tires is None else tires
 
     def close(self) -> None:
-        """Write the last tires that were offered."""
         self._end.set()
         self._thread.join()
 
     def _write(self, every: float) -> None:
-        ends = False
+        written, ends = self._stored, False
         while not ends:
             ends = self._end.wait(every)
-            with suppress(IndexError):
-                tires = self._newest.pop()
+            newest = self._newest
+            if newest is not None and newest is not written:
                 try:
-                    tires.save(self._path)
+                    newest.save(self._path)
                 except OSError as error:
                     say(f"{self._path} stays as it was, it cannot be written: {error.strerror}")
+            written = newest

@@ -101,7 +101,7 @@ def _schema(of: type) -> dict[str, Any]:
         row = {"type": "array", "items": number}
         pair = {"type": ["object", "null"], "properties": {"slip": row, "force": row}}
         given = {
-            float: {"type": "number"}, Number: number, bool: {"type": "boolean"},
+            float: number, Number: number, bool: {"type": "boolean"},
             int: {"type": "integer"}, str: {"type": "string"}, Point | None: pair,
             Array: {"type": "array", "items": row} if "(2, 41)" in meaning else row,
         }  # fmt: skip

@@ -1,0 +1,126 @@
+"""`tireid live SOURCE`: the tires while the car drives, on a page, in a file, on the terminal."""
+
+import argparse
+import math
+import signal
+import time
+from contextlib import ExitStack, closing
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from identifier.measured import with_doubt
+from tireid.commands.options import (
+    add_log_map,
+    add_options,
+    add_vehicle,
+    add_weights,
+    given_map,
+    host_and_port,
+    read_vehicle,
+    stored_model,
+)
+from tireid.live.live import Live
+from tireid.live.outputs import Outputs, Store
+from tireid.live.sources import Source, open_source
+from tireid.live.state import Counts, State
+from tireid.progress import say, tell
+
+_EVERY = 10.0  # s between two lines while nothing changes
+_ENDS = ("SIGINT", "SIGTERM", "SIGHUP")
+
+
+def declare(new: Any) -> None:
+    parser = new(
+        description="Identify the tires while the car drives, and say what is known of them five "
+        "times a second: to a browser, Foxglove and an MCAP file. Ctrl-C ends it. No car here? "
+        "tireid sample --udp sends the packets of a simulated one.",
+    )
+    text = (
+        "udp://:PORT (JSON, or a struct that log.toml describes), can:CHANNEL (with --dbc), "
+        "zenoh:KEY, or a log, which is replayed in its own time"
+    )
+    parser.add_argument("source", metavar="SOURCE", help=text)
+    add_vehicle(parser, required=True)
+    add_weights(parser, "tires that are served until those of this drive are known")
+    text = "serve a page for a browser here, and a socket for Foxglove at the next port"
+    add_options(parser, str, {"--serve HOST:PORT": text})
+    table = {
+        "--record FILE": "write all states to this .mcap, a new one",
+        "--store FOLDER": "store the tires of the drive there, and begin with the last ones stored",
+    }
+    add_options(parser, Path, table)
+    text = "times its own time that a log is replayed with; inf: as fast as it goes (1)"
+    add_options(parser, float, {"--speed X": (1.0, text)})
+    add_log_map(parser)
+
+
+def run(options: argparse.Namespace) -> None:
+    if not options.speed > 0.0:
+        raise ValueError(f"--speed must be positive, it is {options.speed:g}")
+    serve = host_and_port(options.serve, "--serve") if options.serve else None
+    record: Path | None = options.record
+    if record is not None and record.suffix.lower() != ".mcap":
+        raise ValueError(f"--record {record}: the name must end in .mcap")
+    tire = stored_model(options.weights)
+    vehicle = read_vehicle(options, tire, options.weights)
+    with ExitStack() as stack:
+        store = stack.enter_context(closing(Store(options.store))) if options.store else None
+        live = Live(vehicle, tire, resume=None if store is None else store.stored())
+        source = open_source(
+            options.source, given_map(options), live.counts, vehicle=vehicle, speed=options.speed
+        )
+        live.prepare(v_y=source.v_y is not False)  # before packets come, which would have to wait
+        stack.enter_context(source)
+        outputs = stack.enter_context(Outputs(serve=serve, record=record))
+        for number in (getattr(signal, one) for one in _ENDS if hasattr(signal, one)):
+            before = signal.signal(number, lambda *_: source.close())  # cuts no state in two
+            stack.callback(signal.signal, number, before)
+        for line in (source.words, *outputs.words.splitlines()):
+            say(line)
+        _follow(live, source, outputs, store)
+    last = live.state()
+    known = _counted(live.counts) or "nothing came" if last is None else _line(last)
+    tell(f"{live.counts.samples} samples; {known}")
+
+
+def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -> None:
+    """Pass on what is known, until the source ends or is closed."""
+    newest, said, before = time.monotonic(), -math.inf, None
+    for sample in source:
+        now = time.monotonic()
+        if sample is None:
+            state = live.state(now - newest)
+        else:
+            newest = now
+            if live.measures_v_y and not source.v_y:  # as the first sample shows
+                live.prepare(v_y=False)
+            state = live.feed(*sample)
+        if state is not None:
+            outputs.send(state)
+        judged = before if state is None else (state.valid, bool(state.alarm))
+        if judged != before or (now - said > _EVERY and (state or not live.counts.samples)):
+            before, said = judged, now
+            counted = _counted(live.counts) or "nothing comes"
+            say(f"no sample yet: {counted}" if state is None else _line(state))
+            if store is not None:
+                store.offer(live.tires())
+    if store is not None:
+        store.offer(live.tires())
+
+
+def _line(state: State) -> str:
+    """Return what a driver reads of a state, in one line."""
+    known = "valid" if state.valid else f"not valid: {state.reason} ({state.origin} tires)"
+    parts = [f"t = {state.t:.1f} s, {known}"]
+    both = map(with_doubt, 1e-3 * state.stiffness, 1e-3 * state.stiffness_sd)
+    parts.append(f"stiffness {' / '.join(both)} kN/rad")
+    if state.friction is not None:
+        parts.append(f"friction {state.friction:.2f}")
+    alarm = f"ALARM: {state.alarm}" if state.alarm else ""
+    return "; ".join(filter(None, [*parts, _counted(state.counts), alarm]))
+
+
+def _counted(counts: Counts) -> str:
+    """Return what went wrong with samples, by counts that are not zero."""
+    return ", ".join(f"{n} {name}" for name, n in asdict(counts).items() if n and name != "samples")
