@@ -17,7 +17,7 @@ import tireid as ti
 from models.recordings import LogMap, write_recording
 from tests.tireid.conftest import refusal, typed
 from tireid.commands import sample as sending
-from tireid.live.packets import Packets
+from tireid.live.samples import Packets
 from tireid.live.state import Counts, State
 
 ROOT = Path(__file__).resolve().parents[2]
