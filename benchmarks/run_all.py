@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[1]
 BENCHMARKS = (
     "speed", "estimate", "bands", "recorded_cars", "without_v_y", "verdicts", "doctor",
     "sensor_faults", "road_friction", "paper_gains", "export_cost", "mpc_speed", "mpc_worth",
-    "mpc_friction_drop", "lap",
+    "mpc_friction_drop", "lap", "live",
 )  # fmt: skip
 
 
