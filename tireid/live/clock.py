@@ -67,7 +67,7 @@ class Clock:
         elif not self._last:
             yield self._begin(t, values)
         else:
-            usual = self._usual or min(h, _BACK)
+            usual = self._usual or min(max(h, self._dt), _BACK)
             if h > _MISSING * usual:
                 counts.lost += round(min(h / usual, _MOST)) - 1
             if h > max(LONGEST_GAP * (1.0 + 1e-6), min(_GAP * usual, _BACK)):

@@ -42,7 +42,7 @@ RULES_OF_ROAD = Rules(every=LOOK * DT, friction_evidence=16.0)
 OLD = 1.0  # s, age from which a sample says nothing of now
 LATELY = 30.0  # s, in which the tires must have shown force
 NEEDED = 4.0  # s with force at both axles, before tires are identified
-STUCK = 5  # states of turning through which v_y was one number, and so was not measured
+STUCK = 10  # states of turning through which v_y was one number, and so was not measured
 MISSED = 2.0 * LARGEST_MODEL_ERROR  # of the force, rms; noise is in it: .10 on 99 % of random cars
 NOISE = 0.03  # m/s, of v_y as coupled receivers have it
 LOST = 0.9  # of the friction of the reference, below which there is an alarm
@@ -76,7 +76,8 @@ class Live:
         require_kind(Vehicle, "as of Vehicle.from_toml or sedan", vehicle=vehicle)
         for one in filter(None, (tire, resume)):
             if not vehicle.moves_as(one.vehicle):
-                raise ValueError(f"the tires are of {one.vehicle.name!r}, not of {vehicle.name!r}")
+                names = f"{one.vehicle.name!r} as declared then, not of {vehicle.name!r} as it is now"
+                raise ValueError(f"the tires are of {names}: begin without them")
         self.vehicle, self.counts, self._tire, self._resume = vehicle, Counts(), tire, resume
         self.identifier: OnlineIdentifier | None = None
         self._method: Any = None
@@ -227,9 +228,8 @@ class Live:
         push = (v_x[-1] - v_x[0]) / (self._moments - DT) - float(np.mean(v_y * r))
         if abs(push) > PUSH:
             return
-        base = _with_zeros(watch.road.base, model)
-        watch.road = watch.road._replace(base=base)
-        in_use = at_friction(base, watch.road.ratio)
+        watch.road = watch.road._replace(base=_with_zeros(watch.road.base, model))
+        in_use = at_friction(watch.road.base, watch.road.ratio)
         t = DT * self._steps  # on no clock that jumps
         if watch.look(self._judge, in_use, self._window, t, LARGEST_SLIP).change is not None:
             self._friction_since = self._t
