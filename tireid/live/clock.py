@@ -21,7 +21,7 @@ _BACK = 1.0  # s, from which a clock that goes back begins anew: less is a sampl
 _FAST = 1.5  # samples a step, from which means are taken
 _MISSING = 1.5  # usual intervals, beyond which a sample was lost
 _GAP = 2.5  # usual intervals, beyond which nothing is known of the way there, as beyond _BACK
-_MOST = 1e9  # lost samples of a gap, however odd the clock
+_FAR = 60.0  # s, from which a clock that goes on jumped: no samples were lost
 _USUAL = 0.05  # weight of a new interval in the usual one
 
 
@@ -68,8 +68,10 @@ class Clock:
             yield self._begin(t, values)
         else:
             usual = self._usual or min(max(h, self._dt), _BACK)
-            if h > _MISSING * usual:
-                counts.lost += round(min(h / usual, _MOST)) - 1
+            if h >= _FAR:
+                counts.jumps += 1
+            elif h > _MISSING * usual:
+                counts.lost += round(h / usual) - 1
             if h > max(LONGEST_GAP * (1.0 + 1e-6), min(_GAP * usual, _BACK)):
                 yield self._begin(t, values, gap=True)
                 return

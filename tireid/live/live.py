@@ -76,7 +76,7 @@ class Live:
         require_kind(Vehicle, "as of Vehicle.from_toml or sedan", vehicle=vehicle)
         for one in filter(None, (tire, resume)):
             if not vehicle.moves_as(one.vehicle):
-                names = f"{one.vehicle.name!r} as declared then, not of {vehicle.name!r} as it is now"
+                names = f"{one.vehicle.name!r} as declared then, not of {vehicle.name!r} as now"
                 raise ValueError(f"the tires are of {names}: begin without them")
         self.vehicle, self.counts, self._tire, self._resume = vehicle, Counts(), tire, resume
         self.identifier: OnlineIdentifier | None = None

@@ -235,6 +235,7 @@ def test_stamps_of_a_clock_that_was_not_set_hold_nothing_up(car, log):
     for t in (1.7e308, -1.7e308, 1.7e308):
         live.feed(t, 20.0, 0.0, 0.0, 0.0, 0.0)
     assert len(fed(live, later, part=slice(500, 1000))) == 25
+    assert (live.counts.lost, live.counts.jumps) == (0, 5)  # to the epoch, on, back, on, back
 
 
 def test_numbers_that_are_none_for_long_are_said_in_states(car, log):
