@@ -20,7 +20,8 @@ _ON_GRID = 0.01  # of a step
 _BACK = 1.0  # s, from which a clock that goes back begins anew: less is a sample that is late
 _FAST = 1.5  # samples a step, from which means are taken
 _MISSING = 1.5  # usual intervals, beyond which a sample was lost
-_GAP = 2.5  # usual intervals, beyond which nothing is known of the way there
+_GAP = 2.5  # usual intervals, beyond which nothing is known of the way there, as beyond _BACK
+_FAR = 60.0  # s, from which a clock that goes on jumped: no samples were lost
 _USUAL = 0.05  # weight of a new interval in the usual one
 
 
@@ -66,10 +67,12 @@ class Clock:
         elif not self._last:
             yield self._begin(t, values)
         else:
-            usual = self._usual or h
-            if h > _MISSING * usual:
+            usual = self._usual or min(max(h, self._dt), _BACK)
+            if h >= _FAR:
+                counts.jumps += 1
+            elif h > _MISSING * usual:
                 counts.lost += round(h / usual) - 1
-            if h > max(LONGEST_GAP * (1.0 + 1e-6), _GAP * usual):
+            if h > max(LONGEST_GAP * (1.0 + 1e-6), min(_GAP * usual, _BACK)):
                 yield self._begin(t, values, gap=True)
                 return
             self._usual = usual + _USUAL * (min(h, _MISSING * usual) - usual)

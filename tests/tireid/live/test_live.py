@@ -156,9 +156,12 @@ def test_straight_ahead_for_long_nothing_is_valid_any_more(car, log):
 @pytest.fixture(scope="module")
 def dropped(car):
     """A drive on a road that loses half of its friction at `DROP`."""
-    steer = Slalom(amplitude=0.05, frequency=0.4, onset=0.5, rate_limit=1.0, duration=29.0)
-    road = Friction(changes=(FrictionChange(scale=0.5, at_time=DROP),))
-    run = Plant(car).simulate(steer, speed=20.0, friction=road)
+    return slalom(car, FrictionChange(scale=0.5, at_time=DROP))
+
+
+def slalom(car, *changes, duration=29.0):
+    steer = Slalom(amplitude=0.05, frequency=0.4, onset=0.5, rate_limit=1.0, duration=duration)
+    run = Plant(car).simulate(steer, speed=20.0, friction=Friction(changes=changes))
     return run.recording(NOISY, np.random.default_rng(1))
 
 
@@ -214,6 +217,54 @@ def test_a_clock_that_jumps_back_begins_states_anew_and_keeps_the_tires(car, log
     assert live.counts.jumps == 1 and first.t < before.t
     np.testing.assert_allclose(first.stiffness, before.stiffness, rtol=0.02)
     assert first.stiffness_sd[0] < 1.2 * before.stiffness_sd[0]
+
+
+def test_a_clock_that_jumps_back_in_an_alarm_is_no_end_of_it(car, dropped):
+    live = Live(car)
+    assert fed(live, dropped)[-1].alarm
+    states = fed(live, dropped, part=slice(0, 300))
+    assert live.counts.jumps == 1 and states[-1].t < 3.0
+
+
+def test_stamps_of_a_clock_that_was_not_set_hold_nothing_up(car, log):
+    """The first stamp 0 and the others those of an epoch; then one that no float reaches twice."""
+    live = Live(car)
+    live.feed(0.0, 20.0, 0.0, 0.0, 0.0, 0.0)
+    later = replace(log, t=log.t + 1.7e9)
+    assert len(fed(live, later, part=slice(0, 500))) == 25
+    for t in (1.7e308, -1.7e308, 1.7e308):
+        live.feed(t, 20.0, 0.0, 0.0, 0.0, 0.0)
+    assert len(fed(live, later, part=slice(500, 1000))) == 25
+    assert (live.counts.lost, live.counts.jumps) == (0, 5)  # to the epoch, on, back, on, back
+
+
+def test_numbers_that_are_none_for_long_are_said_in_states(car, log):
+    live = Live(car)
+    t = fed(live, log)[-1].t
+    given = [live.feed(t + 0.01 * k, 20.0, math.nan, 0.0, 0.0, 0.0) for k in range(1, 201)]
+    last = [state for state in given if state][-1]
+    assert (last.valid, last.side_slip) == (False, None) and "no numbers" in last.reason
+
+
+def test_a_v_y_that_never_changes_is_never_valid(car, log):
+    """As odometry of wheels sends it."""
+    states = fed(Live(car), replace(log, v_y=np.zeros(len(log))))
+    assert not any(state.valid for state in states) and "v_y never changes" in states[-1].reason
+
+
+def test_tires_that_miss_a_share_of_the_force_are_not_valid(car):
+    """Those of a wet road, on a dry one, where they change too slowly."""
+    wet, dry = Live(car), slalom(car, duration=14.0)
+    assert fed(wet, slalom(car, FrictionChange(scale=0.5, at_time=0.0), duration=20.0))[-1].valid
+    states, true = fed(Live(car, resume=wet.tires()), dry), fed(Live(car), dry)[-1].force[:, 8]
+    assert all((abs(one.force[:, 8] / true - 1.0) < 0.15).all() for one in states if one.valid)
+
+
+def test_without_v_y_a_car_that_stands_is_as_valid_as_before(car, log):
+    live = Live(car)
+    last = fed(live, log, v_y=False)[-1]
+    given = [live.feed(last.t + 0.01 * k, 0.0, 0.0, 0.0, 0.0) for k in range(1, 101)]
+    assert last.valid and [state for state in given if state][-1].reason == ""
 
 
 def test_what_was_identified_before_is_gone_on_from(car, log):
