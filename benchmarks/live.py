@@ -247,7 +247,7 @@ def joined(case: tuple[str, str, int]) -> float:
     ----------
     case : both floors, and the first sample of the second.
     """
-    (floor, other), first = case[:2], case[2]
+    floor, other, first = case
     path = DATA / "dart_imu.csv.gz"
     before = read_recording(path, floor).taken(slice(2000, 2000 + LEARNING))
     after = read_recording(path, other).taken(slice(first, first + AFTER))
