@@ -1,6 +1,7 @@
 """`tireid live` and `tireid sample --udp`: what a person types, and what comes of it."""
 
 import json
+import math
 import os
 import re
 import signal
@@ -16,8 +17,11 @@ import pytest
 import tireid as ti
 from models.recordings import LogMap, write_recording
 from tests.tireid.conftest import refusal, typed
+from tireid.commands import live as command
 from tireid.commands import sample as sending
-from tireid.live.samples import Packets
+from tireid.live.live import Live
+from tireid.live.samples import Packets, Sample
+from tireid.live.sources import Source
 from tireid.live.state import Counts, State
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -129,6 +133,24 @@ def until(text, process):
         if text in line:
             return
     pytest.fail(f"no {text!r} in {''.join(said)!r}")
+
+
+@pytest.mark.parametrize("first", [0, 30])
+def test_times_that_stand_still_are_said_again_and_states_grow_old(
+    first, capsys, monkeypatch, tmp_path
+):
+    now, sent = iter(range(10**6)), []
+    monkeypatch.setattr(command.time, "monotonic", lambda: 0.05 * next(now))
+    times = [0.01 * min(k, first) for k in range(2000)]
+    steps = (Sample(t, 20.0, 0.0, 0.0, math.nan, 0.0) for t in times)
+    outputs = type("", (), {"send": staticmethod(sent.append)})
+    live = Live(ti.sedan())
+    command._follow(live, Source("", steps, lambda: True), outputs, None)
+    said = capsys.readouterr().err
+    assert said.count("doubled") >= 3
+    assert ("nothing is known yet: 1" in said) != bool(first)
+    if first:
+        assert sent[-1].age > 20.0 and "nothing came" in sent[-1].reason
 
 
 @pytest.mark.skipif(os.name == "nt", reason="sends signals of POSIX")

@@ -21,6 +21,8 @@ _BACK = 1.0  # s, from which a clock that goes back begins anew: less is a sampl
 _FAST = 1.5  # samples a step, from which means are taken
 _MISSING = 1.5  # usual intervals, beyond which a sample was lost
 _GAP = 2.5  # usual intervals, beyond which nothing is known of the way there
+_LONGEST = 1.0  # s, beyond which that holds of any interval, the first one too
+_SAME = 1e-6  # s, below which two times are one: what waits for the next instant stays bounded
 _USUAL = 0.05  # weight of a new interval in the usual one
 
 
@@ -56,7 +58,7 @@ class Clock:
         values : NaN where there is none.
         """
         h, counts = t - self._last[-1][0] if self._last else math.inf, self._counts
-        if h == 0.0:
+        if abs(h) < _SAME:
             counts.doubled += 1
         elif -_BACK < h < 0.0:
             counts.late += 1
@@ -69,7 +71,7 @@ class Clock:
             usual = self._usual or h
             if h > _MISSING * usual:
                 counts.lost += round(h / usual) - 1
-            if h > max(LONGEST_GAP * (1.0 + 1e-6), _GAP * usual):
+            if h > min(max(LONGEST_GAP * (1.0 + 1e-6), _GAP * usual), _LONGEST):
                 yield self._begin(t, values, gap=True)
                 return
             self._usual = usual + _USUAL * (min(h, _MISSING * usual) - usual)

@@ -24,6 +24,7 @@ from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import AXLES, STIFFNESS, TireModel, require_band
 from identifier.verdict.judging import RULES
 from identifier.verdict.verdict import LARGEST_MODEL_ERROR, PERCENT
+from models.recordings.map import LONGEST_GAP
 from models.rules import require_kind
 from models.vehicle import GRAVITY, Vehicle
 from mpc.handover.certificate import LARGEST_SLIP
@@ -40,6 +41,8 @@ LOOK = 10  # instants between two looks at the road; twice as much evidence as d
 # no time (48 random cars, friction halved: 94 % found within 1 s of sliding, 0 false), and half of
 # the false alarms on recordings
 RULES_OF_ROAD = Rules(every=LOOK * DT, friction_evidence=16.0)
+LATEST = 1e11  # s, no clock in seconds goes further: ms since 1970 are more
+LARGEST = 1e9  # of a signal in SI, beyond which it is no number
 OLD = 1.0  # s, age from which a sample says nothing of now
 LATELY = 30.0  # s, in which the tires must have shown force
 NEEDED = 4.0  # s with force at both axles, before tires are identified
@@ -96,12 +99,13 @@ class Live:
         self._points = deque[Array](maxlen=round(LATELY / (EVERY * DT)))
         self._states_with_force = np.zeros(2)
         self._complaint = "nothing was driven yet"
+        self._steps, self._breaks = 0, 0  # instants; gaps and jumps since the last state
         self._begin()
 
     def _begin(self) -> None:
         """Forget the last moments."""
         self._window.clear()
-        self._steps, self._lost, self._v_y_sd = 0, 0, math.nan
+        self._lost, self._v_y_sd = 0, math.nan
         self._v_x = self._v_y = math.nan  # newest, errors of the sensor of v_y taken off [m/s]
         self._rows: list[Array] = []  # since the last state: slip, force, impulse [s], v_x r/g
 
@@ -159,15 +163,16 @@ class Live:
         ValueError
             Where the first sample has neither v_y nor a_y.
         """
-        if not math.isfinite(t):
+        if not abs(t) < LATEST:
             self.counts.refused += 1
             return None
         if self.identifier is None:
             if v_y is None and a_y is None:
                 raise ValueError("v_y or a_y is needed, the sample has neither")
             self.prepare(v_y=v_y is not None)
-        state = None
-        for instant in self._clock.add(t, np.array([v_x, v_y, r, delta_f, a_y], dtype=np.float64)):
+        state, values = None, np.array([v_x, v_y, r, delta_f, a_y], dtype=np.float64)
+        values[np.abs(values) > LARGEST] = math.nan
+        for instant in self._clock.add(t, values):
             self._take(instant)
             self._steps += 1
             if self._steps % LOOK == LOOK // 2:  # not beside a state
@@ -189,6 +194,7 @@ class Live:
             for _ in range(self._method.plausibility.rest(DT)):
                 identifier.update(np.full(2, math.nan), np.zeros(2), math.nan)
             self._begin()
+        self._breaks += instant.gap or instant.jump
         self._t = instant.t
         v_x, v_y, r, delta, a_y = instant.values.tolist()
         refused = identifier.counts.refused
@@ -240,6 +246,7 @@ class Live:
         identifier, rows = self.identifier, self._rows
         assert identifier is not None
         point, self._rows = _NO_POINT, []
+        breaks, self._breaks = self._breaks, 0
         if len(rows) > EVERY // 2:
             slip, force, _, turning = np.mean(rows, axis=0)
             rate = (rows[-1][2] - rows[0][2]) / (DT * (len(rows) - 1))
@@ -253,6 +260,8 @@ class Live:
             return
         self._model, self._live = model, _numbers(model)
         explains, self._complaint = self._judged(model)
+        if breaks > EVERY // 2:
+            self._complaint = f"samples are over {LONGEST_GAP:g} s apart (clock.unit?)"
         if not explains:
             self._explained_since = self._t
         elif self._t - self._explained_since >= REFERENCE and self._friction in (None, 1.0):

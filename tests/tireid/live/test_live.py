@@ -207,6 +207,38 @@ def test_bad_numbers_are_counted_and_the_rest_goes_on(car, log):
     assert before.valid
 
 
+@pytest.mark.parametrize(
+    "times",
+    [
+        [-1.7e308, 1.7e308, 1.0],
+        [0.0, 5e-324, 2.0],
+        [0.0, 1e4, 1e4 + 0.01],  # no time yet, then one
+        [1e-9 * k for k in range(3000)],  # of a wrong unit
+    ],
+)
+def test_no_time_stops_it_or_makes_samples_that_never_were(car, times):
+    live = Live(car)
+    for t in times:
+        live.feed(t, 20.0, 0.0, 0.0, v_y=0.0)
+    assert live.counts.samples <= 3 and len(live._clock._last) <= 3
+
+
+def test_huge_numbers_are_none(car):
+    live = Live(car)
+    for k in range(40):
+        live.feed(0.01001 * k, 20.0, (-1) ** k * 1e308, 0.0, v_y=(-1) ** k * 1.7e308)
+    assert live.counts.refused >= 39 and live.counts.samples == 0
+
+
+@pytest.mark.parametrize("times", [lambda k: 10.0 * k, lambda k: 0.01 * k + k % 2 * 1e3])
+def test_samples_that_do_not_follow_each_other_are_said_to_be_so(car, log, times):
+    live = Live(car)
+    assert fed(live, log)[-1].valid
+    states = [live.feed(1e4 + times(k), 20.0, 0.0, 0.0, v_y=0.0) for k in range(60)]
+    (*_, last) = filter(None, states)
+    assert not last.valid and "0.1 s apart" in last.reason and live.tires() is None
+
+
 def test_a_clock_that_jumps_back_begins_states_anew_and_keeps_the_tires(car, log):
     live = Live(car)
     before = fed(live, log)[-1]
