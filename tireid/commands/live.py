@@ -92,7 +92,7 @@ def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -
         now = time.monotonic()
         state = None
         if sample is not None:
-            if live.measures_v_y and not source.v_y:  # as the first sample shows
+            if live.measures_v_y and source.v_y is False:  # as the first sample shows
                 live.prepare(v_y=False)
             state = live.feed(*sample)
         if counts.samples + counts.refused > came:

@@ -145,6 +145,9 @@ class Packets:
             return
         if self._looked < _FIRST:
             self._look(packet, found)
+        if all(one is ... for one in found):
+            self._counts.unreadable += 1
+            return
         t = t / self._per_second if self._zero is None else time.monotonic() - self._zero
         yield self._reading.sample(t, list(map(mul, values, self._factors)))
 
@@ -153,13 +156,13 @@ class Packets:
         places, clock = zip(self._places, found, strict=True), self._map.clock
         self._came |= {name for name, one in places if one is not ...}
         self._looked += 1
-        if self.v_y is None:
-            self.v_y = column_of("v_y") in self._came
         self._zero = None if clock or _TIME in self._came else self._zero or time.monotonic()
         there = {n: one for n, one in self._signals.items() if self._came.issuperset(one.channel)}
         needed = [n for n in (*self._map.signals, *missing_signals(there)) if n in self._signals]
         missing = {one for name in needed for one in self._signals[name].channel}
         missing = (missing | {clock}) - {"", *self._came}
+        if self.v_y is None and not missing:
+            self.v_y = column_of("v_y") in self._came
         if missing and self._looked == _FIRST:
             raise RecordingError(
                 f"{self._label}: no packet has {some(sorted(missing))}; they have "
