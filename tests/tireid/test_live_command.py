@@ -166,6 +166,17 @@ def test_a_termination_ends_it_with_a_file_that_is_whole(drive, tmp_path):
         assert reader.make_reader(file).get_summary().statistics.message_count >= 1
 
 
+def test_a_second_interrupt_cuts_no_end_short(drive, capsys, monkeypatch, tmp_path):
+    class Ending(command.Outputs):
+        def __exit__(self, *why):
+            signal.raise_signal(signal.SIGINT)
+            return super().__exit__(*why)
+
+    monkeypatch.setattr(command, "Outputs", Ending)
+    assert typed(*words(drive, "--speed", "inf", "--store", tmp_path)) == 0
+    assert "1001 samples" in capsys.readouterr().out and (tmp_path / "tires.json").exists()
+
+
 def test_the_sample_drive_is_sent_in_its_own_time_and_again(monkeypatch, capsys, tmp_path):
     short = ti.sample_recording().between(0.0, 0.1)
     monkeypatch.setattr(sending, "sample_recording", lambda vehicle, seed: short)

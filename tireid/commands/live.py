@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--record {record}: the name must end in .mcap")
     tire = stored_model(options.weights)
     vehicle = read_vehicle(options, tire, options.weights)
-    with ExitStack() as stack:
+    with ExitStack() as signals, ExitStack() as stack:  # a second one cuts no end short
         store = stack.enter_context(closing(Store(options.store))) if options.store else None
         live = Live(vehicle, tire, resume=None if store is None else store.stored())
         source = open_source(
@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> None:
         outputs = stack.enter_context(Outputs(serve=serve, record=record))
         for number in (getattr(signal, one) for one in _ENDS if hasattr(signal, one)):
             before = signal.signal(number, lambda *_: source.close())  # cuts no state in two
-            stack.callback(signal.signal, number, before)
+            signals.callback(signal.signal, number, before)
         for line in (source.words, *outputs.words.splitlines()):
             say(line)
         _follow(live, source, outputs, store)
