@@ -214,6 +214,7 @@ def test_the_sample_drive_is_sent_in_its_own_time_and_again(monkeypatch, capsys,
         (["log.csv", "--udp", "127.0.0.1:9000"], "give either LOG"),
         (["--udp", "127.0.0.1"], "--udp wants HOST:PORT"),
         (["--udp", "127.0.0.1:-1"], "--udp wants HOST:PORT"),
+        (["--udp", "a b:9"], "--udp a b:9: nothing can be sent there"),
     ],
 )
 def test_a_drive_is_either_written_or_sent(more, line, capsys, monkeypatch, tmp_path):

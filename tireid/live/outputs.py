@@ -70,7 +70,9 @@ class Outputs(ExitStack):
             raise OutputError(f"{rule}: {error}; choose another, as 127.0.0.1:8775") from None
         Thread(target=pages.serve_forever, daemon=True).start()
         stack.callback(pages.shutdown)
-        self.words += f"page http://{host}:{pages.server_port}/, Foxglove ws://{host}:{server.port}\n"
+        self.words += (
+            f"page http://{host}:{pages.server_port}/, Foxglove ws://{host}:{server.port}\n"
+        )
 
     def send(self, state: State) -> None:
         if self._topic is not None:

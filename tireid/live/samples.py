@@ -120,7 +120,10 @@ class Packets:
         self._factors = [factor for _, factor in self._reading.channels]
         self.v_y = True if has_v_y(log_map.signals) else None
         self._struct = struct.Struct(log_map.packet) if log_map.packet else None
-        self._looked, self._came = _FIRST - 1 if self._struct else 0, set[str]()
+        self._looked, self._came = 0, set[str]()
+        if self._struct:  # its packets are known
+            self._looked, fields = _FIRST - 1, dict.fromkeys(log_map.fields)
+            self._look(fields, [_found(fields, name) for name in self._places])
 
     def take(self, data: bytes | None) -> Iterator[Sample]:
         """Yield the sample of a packet; none of one that cannot be read, which is counted."""
@@ -247,7 +250,7 @@ class Frames:
         no_data = frame.is_error_frame or frame.is_remote_frame
         if no_data or message is None or message.name not in self._of:
             return
-        if len(frame.data) < message.length:
+        if len(frame.data) < message.length or not math.isfinite(frame.timestamp):
             self._counts.unreadable += 1
             return
         t = frame.timestamp

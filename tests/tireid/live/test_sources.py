@@ -164,10 +164,7 @@ def test_a_name_that_is_missing_once_is_nan_and_one_that_never_comes_ends_the_so
         for _ in range(50):
             list(packets.take(lacking))
     with pytest.raises(RecordingError, match="no packet has r; they have"):
-        packets = Packets(
-            "udp://:9", LogMap(packet="<3d", fields=("vx", "vy", "delta_f")), Counts()
-        )
-        list(packets.take(bytes(24)))
+        Packets("udp://:9", LogMap(packet="<3d", fields=("vx", "vy", "delta_f")), Counts())
 
 
 @pytest.mark.parametrize(
@@ -342,6 +339,8 @@ def test_a_bus_whose_clock_jumps_back_or_whose_signal_pauses_goes_on(tmp_path):
     taken(messages(can, 100), joined)
     again = taken(frames, joined)  # other values, 1.6 s earlier
     assert again[-158:] == taken(frames, Frames("can:a", log_map, Counts()))[-158:]
+    timeless = can.Message(math.inf, 100, False, data=bytes(8))
+    assert not taken([timeless], joined)
     without = [one for one in frames if one.arbitration_id != 0x18FF1023]
     for one in without:
         one.timestamp += 1.6
