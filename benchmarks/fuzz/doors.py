@@ -48,6 +48,7 @@ PREDICT = "predict --out out"
 PLAN = "plan --speed 12 --time 3 --out out"
 FILTER = "--method lagged_ekf"
 DRIVE = "drive --path path.csv --speed 12m/s --film none --out out"
+LIVE = "live log.csv --vehicle car.toml --speed inf"
 FLEET = "fleet learn log.csv --vehicle car.toml --jobs 1 --out out"
 DOORS = (
     # recordings
@@ -113,6 +114,10 @@ DOORS = (
     _door("emit network", 1, "emit network.json --tir out.tir", "network.json"),
     # fleets
     _door("fleet learn", 3, FLEET, "log.csv car.toml"),
+    # live, of a replayed log
+    _door("live csv", 3, LIVE, "log.csv"),
+    _door("live logger", 2, f"{LIVE.replace('log.csv', 'logger.csv')} --log log.toml", "log.toml"),
+    _door("live axle", 2, f"{LIVE} --weights axle.json", "axle.json"),
     # paths
     _door("drive path", 10, f"{DRIVE} --tires linear", "path.csv"),
     # words

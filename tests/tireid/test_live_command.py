@@ -1,6 +1,7 @@
 """`tireid live` and `tireid sample --udp`: what a person types, and what comes of it."""
 
 import json
+import math
 import os
 import re
 import signal
@@ -16,8 +17,11 @@ import pytest
 import tireid as ti
 from models.recordings import LogMap, write_recording
 from tests.tireid.conftest import refusal, typed
+from tireid.commands import live as command
 from tireid.commands import sample as sending
-from tireid.live.samples import Packets
+from tireid.live.live import Live
+from tireid.live.samples import Packets, Sample
+from tireid.live.sources import Source
 from tireid.live.state import Counts, State
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -131,6 +135,24 @@ def until(text, process):
     pytest.fail(f"no {text!r} in {''.join(said)!r}")
 
 
+@pytest.mark.parametrize("first", [0, 30])
+def test_times_that_stand_still_are_said_again_and_states_grow_old(
+    first, capsys, monkeypatch, tmp_path
+):
+    now, sent = iter(range(10**6)), []
+    monkeypatch.setattr(command.time, "monotonic", lambda: 0.05 * next(now))
+    times = [0.01 * min(k, first) for k in range(2000)]
+    steps = (Sample(t, 20.0, 0.0, 0.0, math.nan, 0.0) for t in times)
+    outputs = type("", (), {"send": staticmethod(sent.append)})
+    live = Live(ti.sedan())
+    command._follow(live, Source("", steps, lambda: True), outputs, None)
+    said = capsys.readouterr().err
+    assert said.count("doubled") >= 3
+    assert ("nothing is known yet: 1" in said) != bool(first)
+    if first:
+        assert sent[-1].age > 20.0 and "nothing came" in sent[-1].reason
+
+
 @pytest.mark.skipif(os.name == "nt", reason="sends signals of POSIX")
 def test_a_termination_ends_it_with_a_file_that_is_whole(drive, tmp_path):
     reader = pytest.importorskip("mcap.reader", reason="needs the package mcap")
@@ -142,6 +164,17 @@ def test_a_termination_ends_it_with_a_file_that_is_whole(drive, tmp_path):
     assert re.match(r"\d+ samples; t = ", out)
     with (tmp_path / "drive.mcap").open("rb") as file:
         assert reader.make_reader(file).get_summary().statistics.message_count >= 1
+
+
+def test_a_second_interrupt_cuts_no_end_short(drive, capsys, monkeypatch, tmp_path):
+    class Ending(command.Outputs):
+        def __exit__(self, *why):
+            signal.raise_signal(signal.SIGINT)
+            return super().__exit__(*why)
+
+    monkeypatch.setattr(command, "Outputs", Ending)
+    assert typed(*words(drive, "--speed", "inf", "--store", tmp_path)) == 0
+    assert "1001 samples" in capsys.readouterr().out and (tmp_path / "tires.json").exists()
 
 
 def test_the_sample_drive_is_sent_in_its_own_time_and_again(monkeypatch, capsys, tmp_path):
@@ -181,6 +214,7 @@ def test_the_sample_drive_is_sent_in_its_own_time_and_again(monkeypatch, capsys,
         (["log.csv", "--udp", "127.0.0.1:9000"], "give either LOG"),
         (["--udp", "127.0.0.1"], "--udp wants HOST:PORT"),
         (["--udp", "127.0.0.1:-1"], "--udp wants HOST:PORT"),
+        (["--udp", "a b:9"], "--udp a b:9: nothing can be sent there"),
     ],
 )
 def test_a_drive_is_either_written_or_sent(more, line, capsys, monkeypatch, tmp_path):

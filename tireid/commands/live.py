@@ -20,7 +20,7 @@ from tireid.commands.options import (
     read_vehicle,
     stored_model,
 )
-from tireid.live.live import Live
+from tireid.live.live import OLD, Live
 from tireid.live.outputs import Outputs, Store
 from tireid.live.sources import Source, open_source
 from tireid.live.state import Counts, State
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--record {record}: the name must end in .mcap")
     tire = stored_model(options.weights)
     vehicle = read_vehicle(options, tire, options.weights)
-    with ExitStack() as stack:
+    with ExitStack() as signals, ExitStack() as stack:  # a second one cuts no end short
         store = stack.enter_context(closing(Store(options.store))) if options.store else None
         live = Live(vehicle, tire, resume=None if store is None else store.stored())
         source = open_source(
@@ -75,7 +75,7 @@ def run(options: argparse.Namespace) -> None:
         outputs = stack.enter_context(Outputs(serve=serve, record=record))
         for number in (getattr(signal, one) for one in _ENDS if hasattr(signal, one)):
             before = signal.signal(number, lambda *_: source.close())  # cuts no state in two
-            stack.callback(signal.signal, number, before)
+            signals.callback(signal.signal, number, before)
         for line in (source.words, *outputs.words.splitlines()):
             say(line)
         _follow(live, source, outputs, store)
@@ -86,23 +86,28 @@ def run(options: argparse.Namespace) -> None:
 
 def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -> None:
     """Pass on what is known, until the source ends or is closed."""
-    newest, said, before = time.monotonic(), -math.inf, None
+    newest = sent = time.monotonic()
+    said, before, came, counts = -math.inf, None, 0, live.counts
     for sample in source:
         now = time.monotonic()
-        if sample is None:
-            state = live.state(now - newest)
-        else:
-            newest = now
-            if live.measures_v_y and not source.v_y:  # as the first sample shows
+        state = None
+        if sample is not None:
+            if live.measures_v_y and source.v_y is False:  # as the first sample shows
                 live.prepare(v_y=False)
             state = live.feed(*sample)
+        if counts.samples + counts.refused > came:
+            came, newest = counts.samples + counts.refused, now
+        if sample is None or (state is None and now - sent > OLD):
+            state = live.state(now - newest)
         if state is not None:
             outputs.send(state)
+            sent = now
         judged = before if state is None else (state.valid, bool(state.alarm))
-        if judged != before or (now - said > _EVERY and (state or not live.counts.samples)):
+        due = state or not counts.samples or now - sent > _EVERY
+        if judged != before or (due and now - said > _EVERY):
             before, said = judged, now
-            counted = _counted(live.counts) or "nothing comes"
-            say(f"no sample yet: {counted}" if state is None else _line(state))
+            counted = _counted(counts) or "nothing comes"
+            say(f"nothing is known yet: {counted}" if state is None else _line(state))
             if store is not None:
                 store.offer(live.tires())
     if store is not None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from models.logs.foreign import reason_of
 from models.recordings import Recording, write_recording
 from models.recordings.choice import column_of
 from tireid.commands.options import (
@@ -73,8 +74,12 @@ def run(options: argparse.Namespace) -> None:
             f"each {recording.dt:g} s, until Ctrl-C; in another terminal: tireid live "
             f"udp://:{to[1]} --vehicle {car} --serve 127.0.0.1:8765"
         )
-        with suppress(KeyboardInterrupt):
-            _send(recording, to)
+        try:
+            with suppress(KeyboardInterrupt):
+                _send(recording, to)
+        except OSError as error:
+            what = f"--udp {options.udp}: nothing can be sent there ({reason_of(error)})"
+            raise ValueError(f"{what}; give another, as 127.0.0.1:9000") from None
 
 
 def _send(recording: Recording, to: tuple[str, int]) -> None:

@@ -22,6 +22,7 @@ _FAST = 1.5  # samples a step, from which means are taken
 _MISSING = 1.5  # usual intervals, beyond which a sample was lost
 _GAP = 2.5  # usual intervals, beyond which nothing is known of the way there, as beyond _BACK
 _FAR = 60.0  # s, from which a clock that goes on jumped: no samples were lost
+_SAME = 1e-6  # s, below which two times are one: what waits for the next instant stays bounded
 _USUAL = 0.05  # weight of a new interval in the usual one
 
 
@@ -57,7 +58,7 @@ class Clock:
         values : NaN where there is none.
         """
         h, counts = t - self._last[-1][0] if self._last else math.inf, self._counts
-        if h == 0.0:
+        if abs(h) < _SAME:
             counts.doubled += 1
         elif -_BACK < h < 0.0:
             counts.late += 1

@@ -24,6 +24,7 @@ from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import AXLES, STIFFNESS, TireModel, require_band
 from identifier.verdict.judging import RULES
 from identifier.verdict.verdict import LARGEST_MODEL_ERROR, PERCENT
+from models.recordings.map import LONGEST_GAP
 from models.rules import require_kind
 from models.vehicle import GRAVITY, Vehicle
 from mpc.handover.certificate import LARGEST_SLIP
@@ -39,6 +40,8 @@ EVERY = 20  # instants between two states
 LOOK = 10  # instants between two looks at the road; with twice the evidence that drives ask for
 # recordings have half the false alarms, and of 48 halved frictions 94 % are still found within 1 s
 RULES_OF_ROAD = Rules(every=LOOK * DT, friction_evidence=16.0)
+LATEST = 1e11  # s, no clock in seconds goes further: ms since 1970 are more
+LARGEST = 1e9  # of a signal in SI, beyond which it is no number
 OLD = 1.0  # s, age from which a sample says nothing of now
 LATELY = 30.0  # s, in which the tires must have shown force
 NEEDED = 4.0  # s with force at both axles, before tires are identified
@@ -76,8 +79,10 @@ class Live:
         require_kind(Vehicle, "as of Vehicle.from_toml or sedan", vehicle=vehicle)
         for one in filter(None, (tire, resume)):
             if not vehicle.moves_as(one.vehicle):
-                names = f"{one.vehicle.name!r} as declared then, not of {vehicle.name!r} as now"
-                raise ValueError(f"the tires are of {names}: begin without them")
+                raise ValueError(
+                    f"the tires are of {one.vehicle.name!r} with other numbers than "
+                    f"{vehicle.name!r} has: give that car, or another store or weights"
+                )
         self.vehicle, self.counts, self._tire, self._resume = vehicle, Counts(), tire, resume
         self.identifier: OnlineIdentifier | None = None
         self._method: Any = None
@@ -95,7 +100,8 @@ class Live:
         # Of each state: slip, force by the motion, and as identified [static axle loads], (3, 2).
         self._points = deque[Array](maxlen=round(LATELY / (EVERY * DT)))
         self._states_with_force = np.zeros(2)
-        self._complaint, self._steps, self._stuck = "nothing was driven yet", 0, 0
+        self._complaint, self._stuck = "nothing was driven yet", 0
+        self._steps, self._breaks = 0, 0  # instants; gaps and jumps since the last state
         self._begin()
 
     def _begin(self) -> None:
@@ -158,15 +164,16 @@ class Live:
         ValueError
             Where the first sample has neither v_y nor a_y.
         """
-        if not math.isfinite(t):
+        if not abs(t) < LATEST:
             self.counts.refused += 1
             return None
         if self.identifier is None:
             if v_y is None and a_y is None:
                 raise ValueError("v_y or a_y is needed, the sample has neither")
             self.prepare(v_y=v_y is not None)
-        state = None
-        for instant in self._clock.add(t, np.array([v_x, v_y, r, delta_f, a_y], dtype=np.float64)):
+        state, values = None, np.array([v_x, v_y, r, delta_f, a_y], dtype=np.float64)
+        values[np.abs(values) > LARGEST] = math.nan
+        for instant in self._clock.add(t, values):
             self._take(instant)
             self._steps += 1
             if self._steps % LOOK == LOOK // 2:  # not beside a state
@@ -188,6 +195,7 @@ class Live:
             for _ in range(self._method.plausibility.rest(DT)):
                 identifier.update(np.full(2, math.nan), np.zeros(2), math.nan)
             self._begin()
+        self._breaks += instant.gap or instant.jump
         self._t = instant.t
         v_x, v_y, r, delta, a_y = instant.values.tolist()
         refused = identifier.counts.refused
@@ -239,6 +247,7 @@ class Live:
         identifier, rows = self.identifier, self._rows
         assert identifier is not None
         point, self._rows = _NO_POINT, []
+        breaks, self._breaks = self._breaks, 0
         if len(rows) > EVERY // 2:
             slip, force, _, turning = np.mean(rows, axis=0)
             stuck = not np.ptp(self._window.last(EVERY * DT)[:, 1])
@@ -254,6 +263,8 @@ class Live:
             return
         self._model, self._live = model, _numbers(model)
         explains, self._complaint = self._judged(model, identifier.state())
+        if breaks > EVERY // 2:
+            self._complaint = f"samples are over {LONGEST_GAP:g} s apart (clock.unit?)"
         if not explains:
             self._explained_since = self._steps
         elif self._steps - self._explained_since >= REFERENCE and self._friction in (None, 1.0):

@@ -43,14 +43,14 @@ class Outputs(ExitStack):
         logging.getLogger("foxglove").setLevel(logging.CRITICAL)  # not what clients do wrong
         self._context = context = foxglove.Context()  # which the topic needs
         with ExitStack() as stack:
-            if record is not None:
+            if serve is not None:
+                self._serve(*serve, stack, foxglove.start_server)
+            if record is not None:  # a new file, only where nothing else is wrong
                 options = foxglove.mcap.MCAPWriteOptions(chunk_size=_CHUNK)
                 file = stack.enter_context(_File(record, "x"))
                 recording: Any = foxglove.open_mcap(file, context=context, writer_options=options)
-                stack.callback(lambda: file.closed or recording.close())
-                self.words = f"record {record}\n"
-            if serve is not None:
-                self._serve(*serve, stack, foxglove.start_server)
+                stack.callback(_close, recording)
+                self.words += f"record {record}"
             self.enter_context(stack.pop_all())
         self._topic = foxglove.Channel(TOPIC, schema=State.schema(), context=context)
 
@@ -70,11 +70,18 @@ class Outputs(ExitStack):
             raise OutputError(f"{rule}: {error}; choose another, as 127.0.0.1:8775") from None
         Thread(target=pages.serve_forever, daemon=True).start()
         stack.callback(pages.shutdown)
-        self.words += f"page http://{host}:{pages.server_port}/, Foxglove ws://{host}:{server.port}"
+        self.words += (
+            f"page http://{host}:{pages.server_port}/, Foxglove ws://{host}:{server.port}\n"
+        )
 
     def send(self, state: State) -> None:
         if self._topic is not None:
             self._topic.log(state.to_dict())
+
+
+def _close(recording: Any) -> None:
+    with suppress(RuntimeError):  # what its file has said
+        recording.close()
 
 
 class _File(FileIO):

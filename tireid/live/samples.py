@@ -120,7 +120,10 @@ class Packets:
         self._factors = [factor for _, factor in self._reading.channels]
         self.v_y = True if has_v_y(log_map.signals) else None
         self._struct = struct.Struct(log_map.packet) if log_map.packet else None
-        self._looked, self._came = _FIRST - 1 if self._struct else 0, set[str]()
+        self._looked, self._came = 0, set[str]()
+        if self._struct:  # its packets are known
+            self._looked, fields = _FIRST - 1, dict.fromkeys(log_map.fields)
+            self._look(fields, [_found(fields, name) for name in self._places])
 
     def take(self, data: bytes | None) -> Iterator[Sample]:
         """Yield the sample of a packet; none of one that cannot be read, which is counted."""
@@ -145,6 +148,9 @@ class Packets:
             return
         if self._looked < _FIRST:
             self._look(packet, found)
+        if all(one is ... for one in found):
+            self._counts.unreadable += 1
+            return
         t = t / self._per_second if self._zero is None else time.monotonic() - self._zero
         yield self._reading.sample(t, list(map(mul, values, self._factors)))
 
@@ -153,13 +159,13 @@ class Packets:
         places, clock = zip(self._places, found, strict=True), self._map.clock
         self._came |= {name for name, one in places if one is not ...}
         self._looked += 1
-        if self.v_y is None:
-            self.v_y = column_of("v_y") in self._came
         self._zero = None if clock or _TIME in self._came else self._zero or time.monotonic()
         there = {n: one for n, one in self._signals.items() if self._came.issuperset(one.channel)}
         needed = [n for n in (*self._map.signals, *missing_signals(there)) if n in self._signals]
         missing = {one for name in needed for one in self._signals[name].channel}
         missing = (missing | {clock}) - {"", *self._came}
+        if self.v_y is None and not missing:
+            self.v_y = column_of("v_y") in self._came
         if missing and self._looked == _FIRST:
             raise RecordingError(
                 f"{self._label}: no packet has {some(sorted(missing))}; they have "
@@ -244,7 +250,7 @@ class Frames:
         no_data = frame.is_error_frame or frame.is_remote_frame
         if no_data or message is None or message.name not in self._of:
             return
-        if len(frame.data) < message.length:
+        if len(frame.data) < message.length or not math.isfinite(frame.timestamp):
             self._counts.unreadable += 1
             return
         t = frame.timestamp

@@ -47,7 +47,7 @@ class Source:
 
     @property
     def v_y(self) -> bool | None:
-        """Whether lateral velocity comes; None where only the first sample will tell."""
+        """Whether lateral velocity comes; None where only packets will tell."""
         return self.told()
 
     def __iter__(self) -> Iterator[Sample | None]:

@@ -210,6 +210,38 @@ def test_bad_numbers_are_counted_and_the_rest_goes_on(car, log):
     assert before.valid
 
 
+@pytest.mark.parametrize(
+    "times",
+    [
+        [-1.7e308, 1.7e308, 1.0],
+        [0.0, 5e-324, 2.0],
+        [0.0, 1e4, 1e4 + 0.01],  # no time yet, then one
+        [0.0, *(0.006 + 1e-9 * k for k in range(3000))],  # of a wrong unit
+    ],
+)
+def test_no_time_stops_it_or_makes_samples_that_never_were(car, times):
+    live = Live(car)
+    for t in times:
+        live.feed(t, 20.0, 0.0, 0.0, v_y=0.0)
+    assert live.counts.samples <= 3 and len(live._clock._last) <= 5
+
+
+def test_huge_numbers_are_none(car):
+    live = Live(car)
+    for k in range(40):
+        live.feed(0.01001 * k, 20.0, (-1) ** k * 1e308, 0.0, v_y=(-1) ** k * 1.7e308)
+    assert live.counts.refused >= 39 and live.counts.samples == 0
+
+
+@pytest.mark.parametrize("times", [lambda k: 10.0 * k, lambda k: 0.01 * k + k % 2 * 1e3])
+def test_samples_that_do_not_follow_each_other_are_said_to_be_so(car, log, times):
+    live = Live(car)
+    assert fed(live, log)[-1].valid
+    states = [live.feed(1e4 + times(k), 20.0, 0.0, 0.0, v_y=0.0) for k in range(60)]
+    (*_, last) = filter(None, states)
+    assert not last.valid and "0.1 s apart" in last.reason and live.tires() is None
+
+
 def test_a_clock_that_jumps_back_begins_states_anew_and_keeps_the_tires(car, log):
     live = Live(car)
     before = fed(live, log)[-1]
@@ -227,7 +259,7 @@ def test_a_clock_that_jumps_back_in_an_alarm_is_no_end_of_it(car, dropped):
 
 
 def test_stamps_of_a_clock_that_was_not_set_hold_nothing_up(car, log):
-    """The first stamp 0 and the others those of an epoch; then one that no float reaches twice."""
+    """The first stamp 0 and the others those of an epoch; then times of no clock."""
     live = Live(car)
     live.feed(0.0, 20.0, 0.0, 0.0, 0.0, 0.0)
     later = replace(log, t=log.t + 1.7e9)
@@ -235,7 +267,7 @@ def test_stamps_of_a_clock_that_was_not_set_hold_nothing_up(car, log):
     for t in (1.7e308, -1.7e308, 1.7e308):
         live.feed(t, 20.0, 0.0, 0.0, 0.0, 0.0)
     assert len(fed(live, later, part=slice(500, 1000))) == 25
-    assert (live.counts.lost, live.counts.jumps) == (0, 5)  # to the epoch, on, back, on, back
+    assert (live.counts.lost, live.counts.jumps, live.counts.refused) == (0, 1, 3)
 
 
 def test_numbers_that_are_none_for_long_are_said_in_states(car, log):
@@ -285,5 +317,5 @@ def test_without_v_y_side_slip_is_estimated(car, log, stored):
 
 
 def test_tires_of_another_car_are_refused(car, stored):
-    with pytest.raises(ValueError, match="not of"):
+    with pytest.raises(ValueError, match="'sedan' with other numbers than 'van'"):
         Live(replace(car, mass=2.0 * car.mass, name="van"), stored)

@@ -44,7 +44,7 @@ def made(t, **other):
 
 
 def address(outputs, scheme):
-    return re.search(rf"{scheme}://[^/ ]+", outputs.words)[0]
+    return re.search(rf"{scheme}://[^/\s]+", outputs.words)[0]
 
 
 def subscribed(url):
@@ -129,15 +129,15 @@ def test_the_page_and_nothing_else_is_served_also_beside_a_silent_browser():
 
 
 @pytest.mark.parametrize("taken", [0, 1])
-def test_ports_in_use_are_named_with_the_remedy(taken):
+def test_ports_in_use_are_named_with_the_remedy(taken, tmp_path):
     pytest.importorskip("foxglove")
     with socket.create_server(FREE) as other:
         port = other.getsockname()[1] - taken
         with pytest.raises(
             OutputError, match=rf"--serve.*{port} .*in use.*; choose another, as"
         ) as said:
-            Outputs(("127.0.0.1", port))
-    assert "\n" not in str(said.value)
+            Outputs(("127.0.0.1", port), tmp_path / "run.mcap")
+    assert "\n" not in str(said.value) and not list(tmp_path.iterdir())
     with pytest.raises(OutputError, match="choose another"):
         Outputs(("127.0.0.1", 65535))
 
@@ -195,18 +195,21 @@ def test_most_of_a_recording_is_there_where_the_run_is_killed(tmp_path):
     assert len(found) > 250 and found == [0.2 * k for k in range(len(found))]
 
 
-def test_a_full_disk_ends_the_recording_alone_and_is_said_once(tmp_path, capsys):
+@pytest.mark.parametrize("states", [300, 5])  # 5: all of it is written at the end
+def test_a_full_disk_ends_the_recording_alone_and_is_said_once(tmp_path, capfd, states):
     pytest.importorskip("mcap")
     path, limits = tmp_path / "run.mcap", resource.getrlimit(resource.RLIMIT_FSIZE)
-    with Outputs(record=path) as outputs:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, limits[1]))
-        try:
-            for k in range(300):
-                outputs.send(made(0.2 * k, force=np.random.default_rng(k).normal(size=(2, 41))))
-        finally:
-            resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-    said = capsys.readouterr().err
-    assert said.count("run.mcap ends here, all else goes on: File too large") == 1
+    outputs = Outputs(record=path)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (5_000, limits[1]))
+    try:
+        for k in range(states):
+            outputs.send(made(0.2 * k, force=np.random.default_rng(k).normal(size=(2, 41))))
+        outputs.close()
+        del outputs
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    said = capfd.readouterr().err
+    assert said == f"  {path} ends here, all else goes on: File too large\n"
 
 
 @pytest.fixture(scope="module")

@@ -123,6 +123,18 @@ def test_standard_names_need_no_map_and_arrival_is_the_time_without_a_clock():
     assert 0.0 <= one.t < two.t < 20.0 and math.isnan(two.v_y)
 
 
+def test_packets_without_a_signal_do_not_say_what_the_others_have():
+    counts = Counts()
+    reader = Packets("udp", LogMap(), counts)
+    parts = {"hello": 1}, {"t": 0.0, "r": 0.2, "ay": 4.0}, PLAIN
+    samples = [one for part in parts for one in reader.take(json.dumps(part).encode())]
+    assert counts.unreadable == 1 and len(samples) == 2 and reader.v_y is True
+    alone, plain = Packets("udp", LogMap(), counts), {**PLAIN, "v": PLAIN["vy"]}
+    del plain["vy"]
+    list(alone.take(json.dumps(plain).encode()))
+    assert alone.v_y is False
+
+
 @pytest.mark.parametrize("packed", [False, True])
 def test_a_packet_that_cannot_be_read_is_counted_and_the_next_one_is_read(packed):
     log_map = LogMap(packet="<6f", fields=tuple(PLAIN)) if packed else LogMap()
@@ -152,10 +164,7 @@ def test_a_name_that_is_missing_once_is_nan_and_one_that_never_comes_ends_the_so
         for _ in range(50):
             list(packets.take(lacking))
     with pytest.raises(RecordingError, match="no packet has r; they have"):
-        packets = Packets(
-            "udp://:9", LogMap(packet="<3d", fields=("vx", "vy", "delta_f")), Counts()
-        )
-        list(packets.take(bytes(24)))
+        Packets("udp://:9", LogMap(packet="<3d", fields=("vx", "vy", "delta_f")), Counts())
 
 
 @pytest.mark.parametrize(
@@ -330,6 +339,8 @@ def test_a_bus_whose_clock_jumps_back_or_whose_signal_pauses_goes_on(tmp_path):
     taken(messages(can, 100), joined)
     again = taken(frames, joined)  # other values, 1.6 s earlier
     assert again[-158:] == taken(frames, Frames("can:a", log_map, Counts()))[-158:]
+    timeless = can.Message(math.inf, 100, False, data=bytes(8))
+    assert not taken([timeless], joined)
     without = [one for one in frames if one.arbitration_id != 0x18FF1023]
     for one in without:
         one.timestamp += 1.6
