@@ -108,9 +108,11 @@ class _Page(BaseHTTPRequestHandler):
         if self.path != "/":
             self.send_error(404)
             return
-        page = (Path(__file__).parent / "page.html").read_text("utf-8")
+        page = (Path(__file__).parent / "page.html").read_text(encoding="utf-8")
         for part in _PARTS:
-            page = page.replace(f"%{part}%", (Path(__file__).parent / part).read_text("utf-8"))
+            page = page.replace(
+                f"%{part}%", (Path(__file__).parent / part).read_text(encoding="utf-8")
+            )
         self.send_response(200)
         self.send_header("Content-Type", "text/html")
         self.end_headers()
