@@ -207,6 +207,15 @@ def test_bad_numbers_are_counted_and_the_rest_goes_on(car, log):
     assert before.valid
 
 
+@pytest.mark.parametrize("unit", [1e3, 1e9])
+def test_a_clock_in_another_unit_or_far_ahead_costs_no_time_and_counts_as_lost(car, log, unit):
+    live = Live(car)
+    for t, v_x, r, delta in zip(log.t[:50], log.v_x, log.r, log.delta_f, strict=False):
+        live.feed(unit * t, v_x, r, delta, v_y=0.0)
+    assert live.counts.lost >= 49 and live.state() is None
+    live.feed(1e308, 20.0, 0.0, 0.0, v_y=0.0)
+
+
 def test_a_clock_that_jumps_back_begins_states_anew_and_keeps_the_tires(car, log):
     live = Live(car)
     before = fed(live, log)[-1]
