@@ -45,6 +45,7 @@ LATELY = 30.0  # s, in which the tires must have shown force
 NEEDED = 4.0  # s with force at both axles, before tires are identified
 MISSED = 2.0 * LARGEST_MODEL_ERROR  # of the force, rms; noise is in it: .10 on 99 % of random cars
 NOISE = 0.03  # m/s, of v_y as coupled receivers have it
+CHECK = ": check signs, units, steering ratio"
 LOST = 0.9  # of the friction of the reference, below which there is an alarm
 REFERENCE = 10.0  # s for which tires explained the motion, before they are the reference
 PUSH = 1.5  # m/s² of braking or driving, beyond which another friction is not looked for
@@ -277,7 +278,7 @@ class Live:
                 reasons.append(f"the {axle} axle had no force in the last {LATELY:g} s")
             elif not error <= MISSED:
                 share = f"{PERCENT * error:.0f} %"
-                reasons.append(f"{share} of the force of the {axle} axle is not explained")
+                reasons.append(f"{share} of the force of the {axle} axle is not explained{CHECK}")
             elif not sd <= RULES.doubt:
                 share = f"{PERCENT * sd:.0f} %"
                 reasons.append(f"the doubt of the {axle} axle is {share} of what it was at first")
