@@ -22,7 +22,7 @@ _FAST = 1.5  # samples a step, from which means are taken
 _MISSING = 1.5  # usual intervals, beyond which a sample was lost
 _GAP = 2.5  # usual intervals, beyond which nothing is known of the way there
 _SLOWEST = 1.0  # s, usual interval at most: a clock in ns would fill years with instants
-_PAUSE = 86400.0  # s, of a gap at most, whose samples are counted as lost
+_MOST = 1e7  # samples that are lost in a gap, at most: a day at 100 Hz
 _USUAL = 0.05  # weight of a new interval in the usual one
 
 
@@ -70,7 +70,7 @@ class Clock:
         else:
             usual = min(self._usual or h, _SLOWEST)
             if h > _MISSING * usual:
-                counts.lost += round(min(h, _PAUSE) / usual) - 1
+                counts.lost += round(min(h / usual, _MOST)) - 1
             if h > max(LONGEST_GAP * (1.0 + 1e-6), _GAP * usual):
                 yield self._begin(t, values, gap=True)
                 return
