@@ -311,11 +311,9 @@ def main() -> int:
         show("alarms within 1 s of sliding", f"{(late <= IN_TIME).sum()} of {late.size}")
         targets.at_most("false alarms", sum(one.false for one in roads), 0, "", key="roads/false")
         if DATA.is_dir():
-            cases = [
-                (one, other, k) for one, other in pairwise([*FLOORS, FLOORS[0]]) for k in TAPES
-            ]
-            alike = list(pool.map(joined, cases))
-            joins = list(pool.map(joined, [(one, TAPE, k) for one, _, k in cases]))
+            pairs = list(pairwise([*FLOORS, FLOORS[0]]))
+            alike = list(pool.map(joined, [(*pair, k) for pair in pairs for k in TAPES]))
+            joins = list(pool.map(joined, [(one, TAPE, k) for one, _ in pairs for k in TAPES]))
             in_time = sum(one <= IN_TIME for one in joins)
             targets.record("floors/joins", len(joins))
             targets.at_least("alarms on tape", in_time, len(joins), "", key="floors/in_time")

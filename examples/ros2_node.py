@@ -2,6 +2,7 @@
 
     python3 ros2_node.py --ros-args -p vehicle:=car.toml -r odom:=/ekf/odom -r steering:=/ackermann
 
+`-p velocity_sensor_x:=-1.2`: odometry is of a point 1.2 m behind the center of gravity.
 rclpy comes with ROS 2 and not from PyPI: this file is tested with a stand-in of it, in no robot.
 """
 
@@ -23,6 +24,7 @@ def main() -> None:
     node = rclpy.create_node("tireid")
     live = ti.Live(ti.Vehicle.from_toml(node.declare_parameter("vehicle", "car.toml").value))
     live.prepare(v_y=True)  # compiles, once
+    ahead = node.declare_parameter("velocity_sensor_x", 0.0).value  # m, of the center of gravity
     states = node.create_publisher(String, "tireid/state", 10)
     diagnostics = node.create_publisher(DiagnosticArray, "/diagnostics", 10)
     steering = math.nan  # rad, at the road wheels, left positive
@@ -32,9 +34,9 @@ def main() -> None:
         steering = message.drive.steering_angle
 
     def moved(message: Odometry) -> None:
-        stamp, twist = message.header.stamp, message.twist.twist  # of the center of gravity
-        t, v = stamp.sec + 1e-9 * stamp.nanosec, twist.linear
-        state = live.feed(t, v.x, twist.angular.z, steering, v_y=v.y)
+        stamp, twist = message.header.stamp, message.twist.twist
+        t, v, r = stamp.sec + 1e-9 * stamp.nanosec, twist.linear, twist.angular.z
+        state = live.feed(t, v.x, r, steering, v_y=v.y - ahead * r)
         if state is None:
             return
         states.publish(String(data=json.dumps(state.to_dict())))

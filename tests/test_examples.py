@@ -98,14 +98,14 @@ def test_the_node_of_ros_publishes_what_live_says_of_its_topics(monkeypatch, tmp
     assert len(NODE.read_text().splitlines()) <= 55
     car, log = ti.sedan(), ti.sample_recording().between(0.0, 5.0)
     car.to_toml(tmp_path / "car.toml")
-    ros = Ros(messages_of(log), vehicle=str(tmp_path / "car.toml"))
+    ros = Ros(messages_of(log), vehicle=str(tmp_path / "car.toml"), velocity_sensor_x=-1.2)
     ros.put_in(monkeypatch)
     loaded(NODE).main()
     live = ti.Live(car)
     stamps = (stamp_of(t) for t in log.t)
     times = [stamp.sec + 1e-9 * stamp.nanosec for stamp in stamps]
     signals = zip(times, log.v_x, log.r, log.delta_f, log.v_y, strict=True)
-    fed = [live.feed(t, v_x, r, angle, v_y=v_y) for t, v_x, r, angle, v_y in signals]
+    fed = [live.feed(t, v_x, r, angle, v_y=v_y + 1.2 * r) for t, v_x, r, angle, v_y in signals]
     states = [json.loads(message.data) for message in ros.published["tireid/state"]]
     assert states == [state.to_dict() for state in fed if state is not None]
     diagnoses = [status for one in ros.published["/diagnostics"] for status in one.status]

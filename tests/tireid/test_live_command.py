@@ -64,7 +64,9 @@ def test_what_is_recorded_is_every_state_of_the_drive(drive, tmp_path, capsys):
     assert set(states[0]) == set(State.schema()["properties"])
     assert all(0.15 < b["t"] - a["t"] < 0.25 for a, b in pairwise(states))
     assert states[-1]["t"] > 9.7 and states[-1]["counts"]["samples"] > 970
-    assert "drive.mcap: file exists" in refusal(capsys, words(drive, "--record", file))
+    assert "drive.mcap: name a new file, one that ends in .mcap" in refusal(
+        capsys, words(drive, "--record", file)
+    )
 
 
 def test_the_next_drive_goes_on_from_the_store(drive, tmp_path, capsys):
@@ -89,7 +91,7 @@ def test_the_next_drive_goes_on_from_the_store(drive, tmp_path, capsys):
         (None, ["--speed", "nan"], "--speed must be positive, it is nan"),
         (None, ["--serve", "here"], "--serve wants HOST:PORT, a port of 0 to 65535, not 'here'"),
         (None, ["--serve", "127.0.0.1:99999"], "--serve wants HOST:PORT"),
-        (None, ["--record", "states.csv"], "the name must end in .mcap"),
+        (None, ["--record", "states.csv"], "one that ends in .mcap"),
         (None, ["--weights", "none.json"], "none.json"),
     ],
 )

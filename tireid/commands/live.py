@@ -37,8 +37,9 @@ def declare(new: Any) -> None:
         "tireid sample --udp sends the packets of a simulated one.",
     )
     text = (
-        "udp://:PORT (JSON, or a struct that log.toml describes), can:CHANNEL (with --dbc), "
-        "zenoh:KEY, or a log, which is replayed in its own time"
+        "udp://:PORT (JSON, or a struct that log.toml describes; of this machine, of others by "
+        "udp://0.0.0.0:PORT), can:CHANNEL (with a DBC file), "
+        "zenoh:KEY, or a log, which is replayed in real time"
     )
     parser.add_argument("source", metavar="SOURCE", help=text)
     add_vehicle(parser, required=True)
@@ -50,7 +51,7 @@ def declare(new: Any) -> None:
         "--store FOLDER": "store the tires of the drive there, and begin with the last ones stored",
     }
     add_options(parser, Path, table)
-    text = "times its own time that a log is replayed with; inf: as fast as it goes (1)"
+    text = "of the replay of a log over real time; inf: as fast as possible (1)"
     add_options(parser, float, {"--speed X": (1.0, text)})
     add_log_map(parser)
 
@@ -60,8 +61,8 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--speed must be positive, it is {options.speed:g}")
     serve = host_and_port(options.serve, "--serve") if options.serve else None
     record: Path | None = options.record
-    if record is not None and record.suffix.lower() != ".mcap":
-        raise ValueError(f"--record {record}: the name must end in .mcap")
+    if record is not None and (record.suffix.lower() != ".mcap" or record.exists()):
+        raise ValueError(f"--record {record}: name a new file, one that ends in .mcap")
     tire = stored_model(options.weights)
     vehicle = read_vehicle(options, tire, options.weights)
     with ExitStack() as signals, ExitStack() as stack:  # a second one cuts no end short

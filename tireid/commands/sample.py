@@ -40,7 +40,7 @@ def declare(new: Any) -> None:
     )
     text = "file to write, .csv or .csv.gz"
     parser.add_argument("log", nargs="?", type=Path, metavar="LOG", help=text)
-    text = "send the drive as JSON packets in its own time, again and again, in place of LOG"
+    text = "send the drive as JSON packets in real time, again and again, in place of LOG"
     add_options(parser, str, {"--udp HOST:PORT": text})
     add_vehicle(parser)
     parser.add_argument(

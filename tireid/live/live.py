@@ -294,7 +294,7 @@ class Live:
                 reasons.append(f"the {axle} axle had no force in the last {LATELY:g} s")
             elif not explained:
                 words = f"{PERCENT * off:.0f} % of the force of the {axle} axle is not explained"
-                reasons.append(words)
+                reasons.append(f"{words}: check signs, units, steering ratio")
             elif not sd <= RULES.doubt:
                 share = f"{PERCENT * sd:.0f} %"
                 reasons.append(f"the doubt of the {axle} axle is {share} of what it was at first")

@@ -23,7 +23,7 @@ import numpy as np
 from models.logs.can import CALENDAR, EXTENDED, reader_of, wanted
 from models.logs.clock import FASTER, GAP_INTERVALS, ON_STEP
 from models.logs.log import RecordingError, some
-from models.logs.signals import BETA, INSTEAD, Signal, quantity_of
+from models.logs.signals import BETA, INSTEAD, POSE, WHEELS, Signal, quantity_of
 from models.logs.units import PER_SECOND, TIME, is_given, time_unit, to_si
 from models.recordings.choice import column_of, has_v_y, missing_signals
 from models.recordings.map import AXES, LARGEST_PACKET, LogMap
@@ -60,6 +60,7 @@ def live_map(log_map: LogMap) -> LogMap:
         "repair.delay": repair.delay, "repair.lag": repair.lag,
         "repair.acceleration_sensor_x": repair.acceleration_sensor_x,
         "signals.delta_r": "delta_r" in signals,
+        **{f"signals.{n}": n in signals and "v_x" not in signals for n in (*WHEELS, *POSE)},
         **{f"signals.{name}.sign": one.sign for name, one in signals.items()},
     }  # fmt: skip
     if key := next((key for key, value in declared.items() if value), None):
@@ -218,13 +219,14 @@ class Frames:
         signals, self.v_y = log_map.signals, has_v_y(log_map.signals)
         lacking = [f"signals.{name}" for name in missing_signals(signals)]
         if lacking := ["file.dbc"] * (not log_map.dbc) + lacking:
+            names = ", ".join(lacking).replace("v_y", "v_y (or a_y)")
             raise RecordingError(
-                f'{label}: {", ".join(lacking)} of log.toml must be declared: dbc = "car.dbc" in '
-                '[file], channel = "FRAME.SIGNAL" in [signals.r]'
+                f'{label}: {names} of log.toml must be declared: dbc = "car.dbc" in [file], '
+                'channel = "FRAME.SIGNAL" in [signals.r]'
             )
-        names = [one for signal in signals.values() for one in signal.channel]
-        self._dbc, found = wanted(Path(log_map.dbc), names)
-        units = {n: (one.unit or "").strip() for n, (_, one) in zip(names, found, strict=True)}
+        channels = [one for signal in signals.values() for one in signal.channel]
+        self._dbc, found = wanted(Path(log_map.dbc), channels)
+        units = {n: (one.unit or "").strip() for n, (_, one) in zip(channels, found, strict=True)}
         self._reading = _Reading(log_map, signals, units)
         self._channels = [_Channel(*one, log_map.longest_gap) for one in self._reading.channels]
         self._read, self._of = {}, dict[str, list[tuple[str, _Channel]]]()  # by message

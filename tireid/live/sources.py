@@ -145,7 +145,8 @@ def _udp(text: str, log_map: LogMap, counts: Counts) -> Source:
             return None
 
     host, port = bound.getsockname()[:2]
-    words = f"UDP at {host}:{port}, {log_map.packet or 'JSON'}"
+    alone = f" (of this machine; of others: udp://0.0.0.0:{port})" * (host == "127.0.0.1")
+    words = f"UDP at {host}:{port}{alone}, {log_map.packet or 'JSON'}"
     return Source(words, _read(receive, packets.take), lambda: packets.v_y, bound.close)
 
 

@@ -70,7 +70,7 @@ def first(source, count):
 
 
 def address_of(source):
-    host, port = re.search(r"UDP at (.*):(\d+)", source.words).groups()
+    host, port = re.search(r"UDP at (\S+):(\d+)", source.words).groups()
     return host, int(port)
 
 
@@ -177,6 +177,7 @@ def test_a_name_that_is_missing_once_is_nan_and_one_that_never_comes_ends_the_so
         (LogMap(repair=Repair(lag={"r": 0.1})), "repair.lag"),
         (LogMap(repair=Repair(acceleration_sensor_x=0.1)), "repair.acceleration_sensor_x"),
         (LogMap(signals={"delta_r": Signal(channel=("w",))}), "signals.delta_r"),
+        (LogMap(signals={"wheel_rl": Signal(channel=("w",))}), "signals.wheel_rl"),
         (LogMap(signals={"r": Signal(channel=("w",), sign="s")}), "signals.r.sign"),
     ],
 )
@@ -357,7 +358,7 @@ def test_a_dbc_without_the_signal_and_an_interface_that_is_none_are_refused(tmp_
         opened("can:virtual:a", other)
     with pytest.raises(RecordingError, match=r"file\.dbc of log\.toml must be declared"):
         opened("can:virtual:a", replace(log_map, dbc=""))
-    with pytest.raises(RecordingError, match=r"signals\.r, .*delta_f of .* must be decl"):
+    with pytest.raises(RecordingError, match=r"v_y \(or a_y\), signals\.r, .*delta_f of"):
         opened("can:virtual:a", replace(log_map, signals={"v_x": log_map.signals["v_x"]}))
     with pytest.raises(RecordingError, match="can:nothing:a: cannot be opened"):
         opened("can:nothing:a", log_map)
