@@ -135,7 +135,10 @@ def _subscribed(port: int) -> Iterator[Any]:
     from websockets import Subprotocol
     from websockets.sync.client import connect
 
-    with connect(f"ws://127.0.0.1:{port}", subprotocols=[Subprotocol("foxglove.sdk.v1")]) as client:
+    protocols = [Subprotocol("foxglove.sdk.v1")]
+    with connect(
+        f"ws://127.0.0.1:{port}", subprotocols=protocols, ping_interval=None, close_timeout=1.0
+    ) as client:
         while True:
             said = client.recv()
             if isinstance(said, str) and json.loads(said)["op"] == "advertise":
