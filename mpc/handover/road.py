@@ -128,6 +128,7 @@ def look_at_road(
     trusted: float,
     judge: Judge,
     rules: Rules,
+    moments: ChiSquare | None = None,
 ) -> Change | None:
     """Return what changed about the friction of the road, or None.
 
@@ -139,6 +140,7 @@ def look_at_road(
     t : time [s].
     baseline : mean chi-square of the tire in use where the road does not change [-].
     trusted : slip up to which a tire must be one [rad].
+    moments : chi-square of the tire in use in the last moments; None computes it.
     """
     if road.base.structure.at_friction(road.base.weights, 1.0) is None:
         return None
@@ -149,7 +151,8 @@ def look_at_road(
         if not least < most:
             return None
         samples = window.last(judge.lookback(seconds))
-        now = judge.chi_square(in_use, samples)
+        known = moments if seconds == rules.last_moments else None
+        now = known or judge.chi_square(in_use, samples)
         if now.mean <= wrong * baseline:
             return None
         between = (least, most)
@@ -224,7 +227,7 @@ class RoadWatch:
         now = judge.chi_square(in_use, window.last(judge.lookback(rules.last_moments)))
         change = look_at_road(
             self.road, in_use, window, t=t, baseline=self.baseline, trusted=trusted, judge=judge,
-            rules=rules,
+            rules=rules, moments=now,
         )  # fmt: skip
         if change is not None and change.verdict is Verdict.FRICTION:
             again, self._suspected_at = t - self._suspected_at < 1.5 * rules.every, t

@@ -1,6 +1,7 @@
 """`tireid live SOURCE`: the tires while the car drives, on a page, in a file, on the terminal."""
 
 import argparse
+import gc
 import math
 import signal
 import time
@@ -72,6 +73,8 @@ def run(options: argparse.Namespace) -> None:
             options.source, given_map(options), live.counts, vehicle=vehicle, speed=options.speed
         )
         live.prepare(v_y=source.v_y is not False)  # before packets come, which would have to wait
+        gc.collect()
+        gc.freeze()  # what is there by now stays: not to be looked through while packets wait
         stack.enter_context(source)
         outputs = stack.enter_context(Outputs(serve=serve, record=record))
         for number in (getattr(signal, one) for one in _ENDS if hasattr(signal, one)):

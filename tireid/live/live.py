@@ -37,6 +37,7 @@ from tireid.live.state import LIVE, SLIP, STORED, Counts, Point, State
 
 DT = 0.01  # s between two instants of the recursion
 EVERY = 20  # instants between two states
+AT_ONCE = 5  # samples that are taken together
 LOOK = 10  # instants between two looks at the road; with twice the evidence that drives ask for
 # recordings have half the false alarms, and of 48 halved frictions 94 % are still found within 1 s
 RULES_OF_ROAD = Rules(every=LOOK * DT, friction_evidence=16.0)
@@ -58,7 +59,7 @@ _NO_POINT = np.zeros((3, 2))
 class Live:
     """Identifies the tires of a car while it drives, and says what is known of it.
 
-    Attributes: counts, of samples; identifier, None before the first; measures_v_y.
+    Attributes: measures_v_y.
 
     Parameters
     ----------
@@ -83,15 +84,15 @@ class Live:
                     f"the tires are of {one.vehicle.name!r} with other numbers than "
                     f"{vehicle.name!r} has: give that car, or another store or weights"
                 )
-        self.vehicle, self.counts, self._tire, self._resume = vehicle, Counts(), tire, resume
-        self.identifier: OnlineIdentifier | None = None
+        self.vehicle, self._counts, self._tire, self._resume = vehicle, Counts(), tire, resume
+        self._identifier: OnlineIdentifier | None = None
         self._method: Any = None
         self.measures_v_y = False
         self._stored = None if tire is None else _numbers(tire)
         self._live: dict[str, Any] = {}
         self._model: AxleModel | None = None
         self._arms, _, self._inertia, self._loads = car_numbers(vehicle).T
-        self._clock, self._judge = Clock(DT, self.counts), Judge(DT)
+        self._clock, self._judge = Clock(DT, self._counts), Judge(DT)
         self._moments = self._judge.lookback(RULES_OF_ROAD.last_moments)
         self._window = Window(self._moments + RULES_OF_ROAD.follow, DT)
         reference = tire or resume
@@ -102,6 +103,8 @@ class Live:
         self._states_with_force = np.zeros(2)
         self._complaint, self._stuck = "nothing was driven yet", 0
         self._steps, self._breaks = 0, 0  # instants; gaps and jumps since the last state
+        self._waiting: list[tuple[float, ...]] = []  # samples, as they came
+        self._due = False  # whether a state is
         self._begin()
 
     def _begin(self) -> None:
@@ -128,10 +131,10 @@ class Live:
             method, start = InertialIdentifier.beginning_with(
                 self._resume or self._tire, self.vehicle, dt=DT
             )
-        self.identifier = OnlineIdentifier(method, self.vehicle, DT, start)
-        self.identifier.prepare()
+        self._identifier = OnlineIdentifier(method, self.vehicle, DT, start)
+        self._identifier.prepare()
         straight = np.tile([2.0 * method.min_speed, 0.0, 0.0, 0.0], (round(self._moments / DT), 1))
-        tire = prediction_tire(self.identifier.model(), self.vehicle)
+        tire = prediction_tire(self._identifier.model(), self.vehicle)
         fit_friction(self._judge, tire, straight)  # compiles what looks at the road
         self._judge.chi_square(tire, straight)
         self._method, self._start, self.measures_v_y = method, start, v_y
@@ -165,27 +168,39 @@ class Live:
             Where the first sample has neither v_y nor a_y.
         """
         if not abs(t) < LATEST:
-            self.counts.refused += 1
+            self._counts.refused += 1
             return None
-        if self.identifier is None:
+        if self._identifier is None:
             if v_y is None and a_y is None:
                 raise ValueError("v_y or a_y is needed, the sample has neither")
             self.prepare(v_y=v_y is not None)
-        state, values = None, np.array([v_x, v_y, r, delta_f, a_y], dtype=np.float64)
-        values[np.abs(values) > LARGEST] = math.nan
-        for instant in self._clock.add(t, values):
-            self._take(instant)
-            self._steps += 1
-            if self._steps % LOOK == LOOK // 2:  # not beside a state
-                self._look()
-            if self._steps % EVERY == 0:
-                self._refresh()
-                state = self.state()
-        return state
+        waiting = self._waiting
+        signals = (v_x, v_y, r, delta_f, a_y)
+        waiting.append((float(t), *(math.nan if one is None else float(one) for one in signals)))
+        if (self._steps + len(waiting)) % AT_ONCE and abs(t - waiting[0][0]) < AT_ONCE * DT:
+            return None
+        self._catch_up()
+        due, self._due = self._due, False
+        return self.state() if due else None
+
+    def _catch_up(self) -> None:
+        """Take the samples that wait: one at a time costs twice as much, out of a cold cache."""
+        waiting, self._waiting = self._waiting, []
+        for t, *signals in waiting:
+            values = np.array(signals, dtype=np.float64)
+            values[np.abs(values) > LARGEST] = math.nan
+            for instant in self._clock.add(t, values):
+                self._take(instant)
+                self._steps += 1
+                if self._steps % LOOK == AT_ONCE:
+                    self._look()
+                if self._steps % EVERY == EVERY - AT_ONCE:  # a state comes the sooner
+                    self._refresh()
+                self._due |= self._steps % EVERY == 0
 
     def _take(self, instant: Instant) -> None:
         """Show the recursion an instant."""
-        identifier = self.identifier
+        identifier = self._identifier
         assert identifier is not None
         if instant.jump or identifier.diverged:
             anew = identifier.diverged or self._holds
@@ -201,12 +216,12 @@ class Live:
         refused = identifier.counts.refused
         force = identifier.update(np.array([v_y, r]), np.array([delta, 0.0]), v_x, a_y)
         if identifier.counts.refused > refused:
-            self.counts.refused += 1
+            self._counts.refused += 1
             self._lost += 1
             if self._lost > _LOST_SAMPLES:
                 self._begin()
             return
-        self.counts.samples += 1
+        self._counts.samples += 1
         self._lost = 0
         if not self.measures_v_y:
             found = {name: float(value.flat[0]) for name, value in identifier.outputs.items()}
@@ -244,7 +259,7 @@ class Live:
 
     def _refresh(self) -> None:
         """Bring what is identified up to date, with the mean of the samples since the last time."""
-        identifier, rows = self.identifier, self._rows
+        identifier, rows = self._identifier, self._rows
         assert identifier is not None
         point, self._rows = _NO_POINT, []
         breaks, self._breaks = self._breaks, 0
@@ -306,6 +321,18 @@ class Live:
         return bool((good & (peak >= RULES.force)).all()), reasons[0] if reasons else ""
 
     @property
+    def counts(self) -> Counts:
+        """What became of the samples."""
+        self._catch_up()
+        return self._counts
+
+    @property
+    def identifier(self) -> OnlineIdentifier | None:
+        """The recursion, with all samples taken; None before the first."""
+        self._catch_up()
+        return self._identifier
+
+    @property
     def _friction(self) -> float | None:
         return None if self._watch is None else self._watch.road.ratio
 
@@ -316,13 +343,14 @@ class Live:
         ----------
         age : of the newest sample [s].
         """
+        self._catch_up()
         model, friction = self._model, self._friction
-        if model is None or self.identifier is None:
+        if model is None or self._identifier is None:
             return None
         reason, alarm = self._complaint, ""
         if age > OLD:
             reason = f"nothing came for {age:.1f} s"
-        elif self.identifier.stale:
+        elif self._identifier.stale:
             reason = "samples hold no numbers of a car"
         if friction is not None and friction < LOST:
             alarm = f"friction {friction:.2f} of the reference, since {self._friction_since:.1f} s"
@@ -349,11 +377,12 @@ class Live:
             v_y_bias=float(model.offset[1]) if self.measures_v_y else None,
             v_y_bias_sd=bias_sd if self.measures_v_y else None,
             point=None if point is _NO_POINT else Point(point[0], point[1] * self._loads),
-            counts=replace(self.counts),
+            counts=replace(self._counts),
         )
 
     def tires(self) -> TireModel | None:
         """Return what is identified now; None where it is not to be trusted, or friction is low."""
+        self._catch_up()
         friction = self._friction
         low = friction is not None and friction < LOST
         return None if self._complaint or low else self._model
