@@ -156,7 +156,8 @@ def _read(port: int, arrived: dict[int, float]) -> None:
             data = client.recv()
             now = time.perf_counter()
             if isinstance(data, bytes) and data[0] == 1:
-                arrived[round(json.loads(data[struct.calcsize("<BIQ") :])["t"] / DT)] = now
+                sample = round(json.loads(data[struct.calcsize("<BIQ") :])["t"] / DT)
+                arrived.setdefault(sample, now)  # the last one comes again, older
 
 
 def _processor(pid: int) -> float:
