@@ -28,6 +28,7 @@ from tireid.live.state import Counts, State
 from tireid.progress import say, tell
 
 _EVERY = 10.0  # s between two lines while nothing changes
+_GARBAGE = 700, 10, 10  # as Python has it: a run that does not end cannot gather it as others do
 _ENDS = ("SIGINT", "SIGTERM", "SIGHUP")
 
 
@@ -75,6 +76,7 @@ def run(options: argparse.Namespace) -> None:
         live.prepare(v_y=source.v_y is not False)  # before packets come, which would have to wait
         gc.collect()
         gc.freeze()  # what is there by now stays: not to be looked through while packets wait
+        gc.set_threshold(*_GARBAGE)
         stack.enter_context(source)
         outputs = stack.enter_context(Outputs(serve=serve, record=record))
         for number in (getattr(signal, one) for one in _ENDS if hasattr(signal, one)):

@@ -396,7 +396,12 @@ def _numbers(tires: TireModel) -> dict[str, Any]:
     peak, stiffness = force.argmax(axis=0), tires.stiffness
     grip, grip_sd = force[peak, both] / loads, sd[peak, both] / loads
     weaker = int(grip.argmin())
-    stiffness_sd = np.array([one.sd for one in tires.estimates() if one.title == STIFFNESS])
+    if isinstance(tires, AxleModel):  # sooner than by its estimates
+        steep, n = 1.0 / np.array(tires.ladder), len(tires.ladder)
+        variance = np.einsum("j,ijk,k->i", steep, tires.covariance[:, :n, :n], steep)
+        stiffness_sd = loads * np.sqrt(variance)
+    else:
+        stiffness_sd = np.array([one.sd for one in tires.estimates() if one.title == STIFFNESS])
     each = car.mass / car.wheelbase * np.array([car.l_r, -car.l_f]) / stiffness
     return {
         "force": force.T,
