@@ -43,7 +43,7 @@ class Ros:
     """
 
     def __init__(self, play, **parameters):
-        self.play, self.parameters, self.heard, self.published = play, parameters, {}, {}
+        self.play, self.parameters, self.subscribed, self.published = play, parameters, {}, {}
 
     def create_node(self, name):
         return self
@@ -56,11 +56,11 @@ class Ros:
         return SimpleNamespace(publish=lambda message: sent.append(message))
 
     def create_subscription(self, kind, topic, callback, qos):
-        self.heard[topic] = callback
+        self.subscribed[topic] = callback
 
     def spin(self, node):
         for topic, message in self.play:
-            self.heard[topic](message)
+            self.subscribed[topic](message)
 
     def put_in(self, monkeypatch):
         class Status(SimpleNamespace):
@@ -86,8 +86,8 @@ def stamp_of(t):
 
 def messages_of(log):
     """Steering and odometry of a log as a robot would publish them."""
-    told = zip(log.t, log.v_x, log.v_y, log.r, log.delta_f, strict=True)
-    for t, v_x, v_y, r, angle in told:
+    samples = zip(log.t, log.v_x, log.v_y, log.r, log.delta_f, strict=True)
+    for t, v_x, v_y, r, angle in samples:
         twist = SimpleNamespace(linear=SimpleNamespace(x=v_x, y=v_y), angular=SimpleNamespace(z=r))
         yield "steering", SimpleNamespace(drive=SimpleNamespace(steering_angle=angle))
         head, twist = SimpleNamespace(stamp=stamp_of(t)), SimpleNamespace(twist=twist)

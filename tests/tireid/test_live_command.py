@@ -121,8 +121,8 @@ def test_without_the_extra_one_line_says_what_to_install(
     assert not (drive / "new.mcap").exists()
 
 
-def started(*told):
-    line = [sys.executable, "-m", "tireid", *map(str, told)]
+def started(*given):
+    line = [sys.executable, "-m", "tireid", *map(str, given)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     return subprocess.Popen(line, cwd=ROOT, **pipes)
 
@@ -195,8 +195,8 @@ def test_the_sample_drive_is_sent_in_its_own_time_and_again(monkeypatch, capsys,
         here.bind(("127.0.0.1", 0))
         here.settimeout(10.0)
         port = here.getsockname()[1]
-        told = ["sample", "--udp", f"127.0.0.1:{port}", "--car", tmp_path / "car.toml"]
-        assert typed(*told) == 0
+        given = ["sample", "--udp", f"127.0.0.1:{port}", "--car", tmp_path / "car.toml"]
+        assert typed(*given) == 0
         packets = [json.loads(here.recv(4096)) for _ in range(24)]
     command = f"tireid live udp://:{port} --vehicle {tmp_path / 'car.toml'} --serve 127.0.0.1:8765"
     assert command in capsys.readouterr().err

@@ -36,19 +36,19 @@ class Source:
     """Samples, and None where there was none for 0.2 s, until a log ends or the source is closed.
 
     words : what is read, one line.   steps : samples, and None after each packet or wait.
-    told : returns whether v_y comes.   free : closes what is open.
+    tells_v_y : returns whether v_y comes.   free : closes what is open.
     """
 
     words: str
     steps: Iterator[Sample | None]
-    told: Callable[[], bool | None]
+    tells_v_y: Callable[[], bool | None]
     free: Callable[[], object] = lambda: None
     _closed: bool = False
 
     @property
     def v_y(self) -> bool | None:
         """Whether lateral velocity comes; None where only packets will tell."""
-        return self.told()
+        return self.tells_v_y()
 
     def __iter__(self) -> Iterator[Sample | None]:
         last = time.monotonic()
