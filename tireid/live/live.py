@@ -24,6 +24,7 @@ from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import AXLES, STIFFNESS, TireModel, require_band
 from identifier.verdict.judging import RULES
 from identifier.verdict.verdict import LARGEST_MODEL_ERROR, PERCENT
+from models.bicycle import measured_slip
 from models.recordings.map import LONGEST_GAP
 from models.rules import require_kind
 from models.vehicle import GRAVITY, Vehicle
@@ -91,7 +92,7 @@ class Live:
         self._stored = None if tire is None else _numbers(tire)
         self._live: dict[str, Any] = {}
         self._model: AxleModel | None = None
-        self._arms, _, self._inertia, self._loads = car_numbers(vehicle).T
+        _, _, self._inertia, self._loads = car_numbers(vehicle).T
         self._clock, self._judge = Clock(DT, self._counts), Judge(DT)
         self._moments = self._judge.lookback(RULES_OF_ROAD.last_moments)
         self._window = Window(self._moments + RULES_OF_ROAD.follow, DT)
@@ -111,8 +112,8 @@ class Live:
         """Forget the last moments."""
         self._window.clear()
         self._lost, self._v_y_sd = 0, math.nan
-        self._v_x = self._v_y = math.nan  # newest, errors of the sensor of v_y taken off [m/s]
-        self._rows: list[Array] = []  # since the last state: slip, force, impulse [s], v_x r/g
+        self._v_x = self._v_y = self._r = math.nan  # newest, as they are read
+        self._forces: list[Array] = []  # of the axles since the last state [N], (2,) each
 
     def _watching(self, tires: TireModel) -> RoadWatch:
         return RoadWatch(prediction_tire(tires, self.vehicle), RULES_OF_ROAD)
@@ -227,20 +228,40 @@ class Live:
             found = {name: float(value.flat[0]) for name, value in identifier.outputs.items()}
             v_y = found["v_y"] if found["side_slip_observable"] > 0.0 else math.nan
             self._v_y_sd = found["v_y_sd"]
-        model, moves = self._model, v_x >= self._method.min_speed
-        self._v_x, self._v_y = (v_x if moves else math.nan), v_y
-        if not (moves and math.isfinite(v_y)):
+        moves = v_x >= self._method.min_speed
+        self._v_x, self._v_y, self._r = (v_x if moves else math.nan), v_y, r
+        if moves and math.isfinite(v_y):
+            self._window.add((v_x, v_y, r, delta))
+            self._forces.append(force)
+        else:
             self._window.clear()
-            self._rows.clear()
-            return
-        self._window.add((v_x, v_y, r, delta))
-        if model is not None:
-            if self.measures_v_y:
-                self._v_y = float(model.sensors.v_y(v_y, r, v_x) - model.offset[1])
-            slip = -np.arctan((self._v_y + self._arms * r) / v_x)
-            slip[0] += model.sensors.steering(delta) + model.offset[0]
-            impulse, turning = v_y / GRAVITY + self._inertia * r, v_x * r / GRAVITY
-            self._rows.append(np.array([slip, force / self._loads, impulse, [turning, turning]]))
+            self._forces.clear()
+
+    def _true_v_y(self, model: AxleModel, v_x: Any, v_y: Any, r: Any) -> Any:
+        """Return lateral velocities without errors of their sensor [m/s]."""
+        return model.sensors.v_y(v_y, r, v_x) - model.offset[1] if self.measures_v_y else v_y
+
+    def _point(self, model: AxleModel) -> Array:
+        """Return the means since the last state; the force by dξ/dt = F/F_z - v_x r/g."""
+        n, forces = len(self._forces), self._forces
+        self._forces = []
+        if n <= EVERY // 2:
+            return _NO_POINT
+        v_x, v_y, r, delta = self._window.last(n * DT).T
+        stuck = not np.ptp(v_y)
+        turning = float(np.mean(v_x * r)) / GRAVITY
+        self._stuck = stuck * (self._stuck + int(abs(turning) >= RULES.force))
+        slip = measured_slip(
+            self.vehicle.l_f,
+            self.vehicle.l_r,
+            v_x=v_x,
+            v_y=self._true_v_y(model, v_x, v_y, r),
+            r=r,
+            delta_f=model.sensors.steering(delta) + model.offset[0],
+        )
+        rate = (v_y[-1] - v_y[0]) / GRAVITY + self._inertia * (r[-1] - r[0])
+        measured = rate / (DT * (n - 1)) + turning
+        return np.array([slip.mean(axis=0), measured, np.mean(forces, axis=0) / self._loads])
 
     def _look(self) -> None:
         """Look at the road, with the zeros of the sensors as they are today."""
@@ -259,24 +280,17 @@ class Live:
 
     def _refresh(self) -> None:
         """Bring what is identified up to date, with the mean of the samples since the last time."""
-        identifier, rows = self._identifier, self._rows
+        identifier = self._identifier
         assert identifier is not None
-        point, self._rows = _NO_POINT, []
         breaks, self._breaks = self._breaks, 0
-        if len(rows) > EVERY // 2:
-            slip, force, _, turning = np.mean(rows, axis=0)
-            stuck = not np.ptp(self._window.last(EVERY * DT)[:, 1])
-            self._stuck = stuck * (self._stuck + int(abs(turning[0]) >= RULES.force))
-            rate = (rows[-1][2] - rows[0][2]) / (DT * (len(rows) - 1))
-            point = np.array([slip, rate + turning, force])  # dξ/dt = F/F_z - v_x r/g
-        self._points.append(point)
-        self._states_with_force += np.abs(point[1]) >= RULES.force
         try:
             model: Any = identifier.model()
         except (DivergedError, ValueError) as error:
             self._complaint = f"no tires follow from what was driven: {error}"
             return
         self._model, self._live = model, _numbers(model)
+        self._points.append(self._point(model))
+        self._states_with_force += np.abs(self._points[-1][1]) >= RULES.force
         explains, self._complaint = self._judged(model, identifier.state())
         if breaks > EVERY // 2:
             self._complaint = f"samples are over {LONGEST_GAP:g} s apart (clock.unit?)"
@@ -357,6 +371,7 @@ class Live:
         stored = bool(reason) and self._stored is not None
         bias_sd = math.sqrt(model.covariance[1, -1, -1])
         v_y_sd = math.hypot(bias_sd, NOISE) if self.measures_v_y else self._v_y_sd
+        v_y = self._true_v_y(model, self._v_x, self._v_y, self._r)
         slides = age <= OLD and not self._lost and math.isfinite(self._v_x * self._v_y)
         point = self._points[-1] if age <= OLD else _NO_POINT
         return State(
@@ -370,7 +385,7 @@ class Live:
             **(self._stored or self._live if stored else self._live),
             friction=friction,
             friction_since=None if math.isnan(self._friction_since) else self._friction_since,
-            side_slip=math.atan2(self._v_y, self._v_x) if slides else None,
+            side_slip=math.atan2(v_y, self._v_x) if slides else None,
             side_slip_sd=v_y_sd / self._v_x if slides else None,
             steering_zero=float(model.offset[0]),
             steering_zero_sd=math.sqrt(model.covariance[0, -1, -1]),
