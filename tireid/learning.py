@@ -115,7 +115,7 @@ def replay(recording: Recording, tire: TireModel, *, since: float | None = None)
 def with_v_y(recording: Recording, tire: TireModel) -> Recording:
     """Return a drive with its v_y, or with that which the tires or a filter estimate.
 
-    For tires of a fit a v_y that is rare or noisy is brought on time, as the fit reads it.
+    For tires of a fit the delay of a v_y that is rare or noisy is removed, as the fit reads it.
 
     Parameters
     ----------

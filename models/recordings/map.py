@@ -74,7 +74,7 @@ class LogMap:
     longest_gap : the log is cut where a channel has no sample for longer [s].
     holes : "refuse" a channel of which some cells have no value (NaN), or "cut" them out: then it
         has no sample there.
-    order : "refuse" stamps that fall or repeat, or "mend" them: samples are sorted by time, of
+    order : "refuse" times that decrease or repeat, or "mend" them: samples are sorted by time, of
         those that share a stamp the first stays, and where the clock goes back for a second or more
         the rest follows after a gap.
     low_pass : cut-off of a low pass on all signals [Hz]; None filters nothing. All pass the same

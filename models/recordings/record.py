@@ -76,7 +76,7 @@ class Recording:
     breaks : index of the first sample of each segment but the first, rising.
     notes : what was taken or done in reading beyond the words of the file, one sentence each.
     estimated : signals that a method estimated, not a sensor: v_y only. No method gets them.
-    v_y_sd : standard deviation of a v_y that was brought on time and smoothed [m/s], else 0.
+    v_y_sd : standard deviation of a v_y that was smoothed, its delay removed [m/s], else 0.
 
     Raises
     ------

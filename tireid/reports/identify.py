@@ -175,7 +175,7 @@ def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
 
 
 def extrapolated(model: TireModel, recording: Recording) -> list[str]:
-    """Return at which axles a drive slips farther than the model knows, in words."""
+    """Return at which axles a drive exceeds the identified slip range, in words."""
     beyond = beyond_known(model, recording)
     if model.known_slip is None or beyond is None:
         return []
