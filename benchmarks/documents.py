@@ -70,8 +70,12 @@ def _block(name: str, known: Mapping[str, Record]) -> str:
     else:
         table = _tables(scripts[0])(known[scripts[0]]["values"])[name]
     notes = [_state(script, known[script]) for script in scripts]
-    if name in scripts and (missed := "; ".join(known[name]["missed"])):
-        notes.append(f"Targets missed: {missed}.")
+    missed = [one for script in scripts for one in known[script]["missed"]]
+    if name == "summary":
+        count = sum(known[script]["met"] for script in scripts) + len(missed)
+        notes.append(f"Targets missed: {len(missed)} of {count}.")
+    elif name in scripts and missed:
+        notes.append(f"Targets missed: {'; '.join(missed)}.")
     return f"{_grid(table)}\n\n{textwrap.fill(' '.join(notes), WIDTH, break_on_hyphens=False)}"
 
 

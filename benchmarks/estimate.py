@@ -320,10 +320,12 @@ def judge_place(targets: Targets, place: str, tasks: Sequence[Taught], *, quick:
             targets.at_most("ferrari: worst", three[2], 12.0)
     own = means.pop(DEFAULT)
     if LIVE in means and place in FLOORS:
-        targets.at_most(f"{place}: over {LIVE}", own / means[LIVE], 0.82, "-")
+        targets.at_most(f"{place}: error over that of {LIVE}", own / means[LIVE], 0.82, "-")
     best = min(means, key=means.__getitem__)
     limit = 1.0 if place in FLOORS else BEHIND
-    targets.at_most(f"{place}: over the best rival, {best}", own / means[best], limit, "-")
+    targets.at_most(
+        f"{place}: error over that of the best rival, {best}", own / means[best], limit, "-"
+    )
 
 
 def judge_together(targets: Targets) -> None:
@@ -336,7 +338,7 @@ def judge_together(targets: Targets) -> None:
     runs = read("carmaker.csv.gz", CARMAKER_RUNS)
     tire = fit(runs, CARMAKER).model
     error = float(np.mean([both(*missed(tire, [one])) for one in runs]))
-    targets.at_most("carmaker: both taught together", error, 3.5, key="together/carmaker")
+    targets.at_most("carmaker: both runs identified together", error, 3.5, key="together/carmaker")
 
 
 def judge_gti(targets: Targets) -> None:
@@ -352,7 +354,10 @@ def judge_gti(targets: Targets) -> None:
         found = 100.0 * np.sqrt(error / size)
         for axle, value, limit in zip(("front", "rear"), found, GTI_LIMITS[name], strict=True):
             targets.at_most(
-                f"gti, {name} teaches: {axle}", float(value), limit, key=f"gti/{name}/{axle}"
+                f"hatchback, identified from {name}: {axle}",
+                float(value),
+                limit,
+                key=f"gti/{name}/{axle}",
             )
 
 
@@ -421,7 +426,9 @@ def judge_ratio(targets: Targets) -> None:
             known = "" if all(one.identified for one in stiff) else ", not known"
             said = f"{words}; {judged}{known}"
             show(f"{run} to {end:g} s, ratio {ratio:g}: kN/rad, front, rear", said)
-    targets.at_most("wrong ratios that are valid without the truth", silent, 0, "", "ratio/silent")
+    targets.at_most(
+        "wrong steering ratios, valid, truth outside two deviations", silent, 0, "", "ratio/silent"
+    )
 
 
 def judge_cost(targets: Targets) -> None:

@@ -178,7 +178,7 @@ def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
     """
     early = 100.0 * float(np.mean([one.early for one in every]))
     targets.record(f"{way}/drives", len(every))
-    label = f"{way}: drives with a road that is none"
+    label = f"{way.replace('_', ' ', 1)}: false alarms"
     targets.at_most(label, early, 1.0, key=f"{way}/early")
     for name, some in (
         ("drop", [one for one in every if one.ratio < 1.0]),
@@ -195,7 +195,8 @@ def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
         if name == "drop":
             off = [abs(one.told / one.ratio - 1.0) for one in slid if not math.isnan(one.told)]
             soon = 100.0 * float(np.mean(after <= SOON))
-            targets.at_least(f"{way}: told within 1 s", soon, 90.0, key=f"{way}/drop/soon")
+            label = f"{way.replace('_', ' ', 1)}: detected within 1 s"
+            targets.at_least(label, soon, 90.0, key=f"{way}/drop/soon")
             print(f"  median {np.median(after):.2f} s, size off by {100.0 * np.median(off):.1f} %")
 
 

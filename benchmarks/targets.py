@@ -82,7 +82,7 @@ class Targets:
         if good:
             self.met += 1
         else:
-            self.missed.append(f"{label} ({limit.strip()})")
+            self.missed.append(f"{label} ({limit.strip(' -')})")
         verdict = "ok" if good else "MISSED"
         print(f"  {label:66} {value:8.2f} {unit:3} target {limit}  {verdict}", flush=True)
 

@@ -187,13 +187,9 @@ def blind_answers(job: tuple[str, int]) -> list[Judged]:
         case = blind_fault(fault, rng)
         log, known = case.log(own), case.car(car)
         end = float(log.t[0]) + SHARE * log.duration
-        run = ti.identify(log.between(log.t[0], end), known, check=False)
-        error = force_error(run.freeze(), log.between(end, log.t[-1]))
-        codes = tuple(one.code for one in run.verdict.findings if one.refuses)
+        result = answer(log.between(log.t[0], end), known, log.between(end, log.t[-1]))
         group = "without v_y, faulty" if fault else "without v_y, clean"
-        found.append(
-            Judged(group, seed, f"{kind} {fault}", Answer(error, run.verdict.valid, codes))
-        )
+        found.append(Judged(group, seed, f"{kind} {fault}", result))
     return found
 
 
@@ -348,7 +344,7 @@ def judge(targets: Targets) -> None:
     right = [int(targets.values[f"planted: nothing/{what}"]) for what in ("rejected", "good")]
     targets.at_most("other logs: good rejected", 100.0 * right[0] / max(right[1], 1), 1.0)
     silent = int(targets.values["with v_y/silent"])
-    targets.at_most("bad models accepted, and no word of the doctor", silent, 0, "")
+    targets.at_most("with v_y: bad models accepted, and no finding of the doctor", silent, 0, "")
 
 
 COUNTS = ("answers", "bad", "accepted", "silent", "good", "rejected")
@@ -376,7 +372,7 @@ def tables(v: Values) -> dict[str, Table]:
     ]
     header = (
         "logs", "answers", f"bad models (error above {WRONG:g} %)", "of these accepted",
-        "and no word of the doctor", f"good models (below {RIGHT:g} %)", "of these rejected",
+        "and no finding of the doctor", f"good models (below {RIGHT:g} %)", "of these rejected",
     )  # fmt: skip
     planted = [
         [name, *(f"{v[f'planted: {name}/{what}']}" for what in COUNTS if what != "silent")]
