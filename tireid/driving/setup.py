@@ -10,8 +10,10 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.speed_limits import SpeedLimits
+from identifier.speed_limits import SpeedLimits, speed_limits
+from identifier.tire_model import TireModel
 from models.friction import Friction, FrictionChange
+from models.rules import require_positive
 from models.tires import Tire
 from models.vehicle import GRAVITY, Vehicle
 from mpc.cars import BRAKES, DoubleTrackCar
@@ -42,6 +44,28 @@ class SpeedWish(NamedTuple):
     a_y: float | None = None
     speed: float | None = None
     profile: SpeedProfile | None = None
+
+    @classmethod
+    def of(cls, speeds: SpeedProfile | float | None, tire: TireModel | None) -> "SpeedWish":
+        """Return the wish for a profile, for a speed [m/s], or for what a tire allows."""
+        if isinstance(speeds, SpeedProfile):
+            return cls(profile=speeds)
+        if speeds is not None:
+            require_positive(ValueError, **{"speeds in m/s": speeds})
+            return cls(speed=speeds)
+        if tire is None:
+            raise ValueError("no tire is given that tells the speed: give speeds, such as 15.0 m/s")
+        return BY_TIRES
+
+    def limits(self, tire: TireModel | None) -> SpeedLimits | None:
+        """Return what the tires allow where the wish is a share of it."""
+        if tire is None or self.share is None:
+            return None
+        try:
+            return speed_limits(tire)
+        except ValueError as error:
+            remedy = "say how fast instead: --speed 0.4g, speeds=15.0"
+            raise ValueError(f"no speed follows from these tires: {error}; {remedy}") from None
 
     @property
     def words(self) -> str:
