@@ -37,7 +37,7 @@ from mpc.path import Path, SpeedProfile
 from mpc.problem import Problem
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.driving.setup import PERIOD, WIDEST, Setup, SpeedWish
+from tireid.driving.setup import PERIOD, WIDEST, Setup, SpeedWish, simulated
 from tireid.progress import Progress
 
 _NOTED = 0.1  # change of the grip that is worth a note
@@ -357,14 +357,15 @@ def drive(
     Parameters
     ----------
     path : to follow, of `tireid.paths`, or `tireid.paths.Path.from_csv`.
-    vehicle : the car, with a chassis.
+    vehicle : the car; where it has no chassis a typical one is assumed.
     tire : the identified tires; None takes the linear tires of the vehicle.
     speeds : a profile of `tireid.speed_profile`, or a constant speed [m/s]; None plans the profile
         of the identified tires.
     confirm : whether the speed has to be earned: it begins at .45 of the limits, and goes on as the
         car holds what it drives and nothing says that the friction is another.
     friction : of the road over that of the tire's measurement [-].
-    tires : that the car truly has, front and rear; None reads the file named by its chassis.
+    tires : that the car truly has, front and rear; None reads the file named by its chassis, or
+        without one scales tires of a sedan to the identified stiffness and grip.
     delay : from a measurement until its command acts, a multiple of 0.01 s [s].
     learning : go on learning from the tire while driving, and hand over what is fit.
     noise : whether sensors are noisy.
@@ -383,7 +384,7 @@ def drive(
     Raises
     ------
     VehicleError
-        Where the vehicle has no chassis.
+        Where the vehicle has no chassis and no identified tires are given.
     ValueError
         Where a number is not that of a drive, there is no tire to go on learning from or to plan
         speeds of, speeds are of another path, or no C compiler is there for the tracker.
@@ -391,8 +392,9 @@ def drive(
     if learning and tire is None:
         raise ValueError("learning goes on from a tire: none is given")
     wish = SpeedWish.of(speeds, tire)
+    vehicle, true_tires = (vehicle, tires) if tires else simulated(vehicle, tire)
     conditions = Conditions(
-        setup=Setup(path, vehicle, friction, (), wish, tires=tires),
+        setup=Setup(path, vehicle, friction, (), wish, tires=true_tires),
         delay=delay_periods(delay),
         noise=noise,
         seed=seed,

@@ -172,7 +172,8 @@ class Tracker:
     @property
     def status(self) -> Status:
         """What the last step did: OK, or why it steers by the last plan or by feedback."""
-        return Status(self._located and self._command.status)
+        assert self._located
+        return Status(self._command.status)
 
     @property
     def s(self) -> float:
