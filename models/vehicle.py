@@ -87,6 +87,8 @@ class Chassis:
     estimated: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
+        if not set(self.estimated) <= {one.name for one in fields(self)}:
+            raise VehicleError(f"estimated must name numbers of a chassis, not {self.estimated}")
         centers = ("roll_center_height_front", "roll_center_height_rear")
         for (low, high), names in (*_RANGES.items(), ((0.0, self.cg_height), centers)):
             values = {name: getattr(self, name) for name in names}

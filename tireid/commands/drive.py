@@ -124,6 +124,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return 0 where the first car reached the end of the path, else 1."""
     every = (driving.FROZEN, driving.LINEAR, driving.ORACLE, driving.LEARNING)
     labels = list(dict.fromkeys(every if ALL in options.tires else options.tires))
+    shared.require_one(options, "weights", "method", "paper", "design")
     stored = shared.model_of_day(options)
     conditions = conditions_of(options, stored)
     setup = conditions.setup
@@ -264,7 +265,6 @@ def conditions_of(
         require_its_car(options, stored.vehicle, vehicle)
     vehicle, tires = simulated(vehicle, stored)
     setup = Setup(path_of(options, vehicle), vehicle, options.mu, (), wish, tires=tires)
-    shared.require_one(options, "weights", "method", "paper", "design")
     drops = tuple(sorted(_parse_drop(text) for text in options.mu_drop))
     for s, _ in drops:
         if not setup.path.closed and s >= (length := setup.path.length):
