@@ -89,6 +89,7 @@ def test_other_tires_steer_otherwise_from_the_next_step_on():
     assert one.step(aside) == other.step(aside)
     other.set_tire(replace(CAR, cornering_stiffness_front=0.5 * CAR.cornering_stiffness_front))
     assert one.step(aside) != other.step(aside)
+    assert abs(tracker(max_steering_rate=0.1).step(aside._replace(Y=1.0))) <= 0.0011
     with pytest.raises(ValueError, match="the tracker is built for"):
         other.set_tire(FialaTire(C_alpha=6e4, C_kappa=8e4, friction=1.0))
 
@@ -103,6 +104,7 @@ def test_other_tires_steer_otherwise_from_the_next_step_on():
         (ValueError, lambda: ti.Tracker(PATH, CAR), "give speeds, such as 15.0 m/s"),
         (ValueError, lambda: tracker(speeds=-1.0), "speeds in m/s must be positive"),
         (ValueError, lambda: tracker(period=0.06), "period must be positive and at most 0.05"),
+        (ValueError, lambda: tracker(max_steering=0.0), "max_steering must be positive"),
         (ValueError, lambda: tracker(delay=0.5), "delay must be between 0 and 0.31 s"),
         (ValueError, lambda: tracker().s, "call step first"),
     ],

@@ -8,7 +8,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.tire_model import TireModel
-from models.rules import require_kind
+from models.rules import require_kind, require_positive
 from models.sensors import is_measured
 from models.vehicle import Vehicle
 from mpc.cars import SPEED_GAIN
@@ -17,10 +17,13 @@ from mpc.loop.lateral import LateralVelocity
 from mpc.loop.record import Plan
 from mpc.loop.sensing import Measured
 from mpc.path import Path, SpeedProfile
+from mpc.problem import Limits, Problem
 from mpc.realtime.instance import Command, Status
 from mpc.realtime.tracker import Tracker as _Tracker
 from mpc.tires import prediction_tire
 from tireid.driving.setup import PERIOD, Setup, SpeedWish
+
+_LIMITS = Limits()
 
 
 class VehicleState(NamedTuple):
@@ -63,6 +66,8 @@ class Tracker:
     period : between two steps [s], at most 0.05.
     delay : from a state until its steering has reached the wheels [s], the lag of the steering
         included; at most 31 periods.
+    max_steering : largest angle of the front road wheels [rad].
+    max_steering_rate : fastest change of it [rad/s].
     caution : share of the tires' uncertainty that the plan allows for, from 0 to 1.
 
     Raises
@@ -84,6 +89,8 @@ class Tracker:
         speeds: SpeedProfile | float | None = None,
         period: float = PERIOD,
         delay: float = 0.0,
+        max_steering: float = _LIMITS.steering,
+        max_steering_rate: float = _LIMITS.steering_rate,
         caution: float = 0.0,
     ) -> None:
         require_kind(Path, "as of paths.Path.from_waypoints or Path.from_csv", path=path)
@@ -91,7 +98,11 @@ class Tracker:
         model = prediction_tire(car if tire is None else tire, car)
         self._known = tire if isinstance(tire, TireModel) else None
         wish = SpeedWish.of(speeds, self._known)
-        self._tracker = _Tracker(model, period=period, delay=delay, caution=caution)
+        require_positive(ValueError, max_steering=max_steering, max_steering_rate=max_steering_rate)
+        limits = Limits(steering=max_steering, steering_rate=max_steering_rate)
+        self._tracker = _Tracker(
+            model, Problem(limits=limits), period=period, delay=delay, caution=caution
+        )
         self.profile = Setup(path, car, 1.0, (), wish, wish.limits(self._known)).profile()
         self._path, self._car = path, car
         self._guide: Guide | None = None
