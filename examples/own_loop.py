@@ -7,8 +7,7 @@ from math import atan2, cos, sin, tanh
 
 import tireid as ti
 
-EXPECTED_BELOW = 0.05  # m
-DT = 0.01  # s
+EXPECTED_BELOW, DT = 0.05, 0.01  # m, s
 CAR = ti.sedan()
 
 
@@ -28,7 +27,8 @@ def main() -> float:
     """Return the largest deviation from the path [m]."""
     path = ti.paths.Path.from_waypoints([0, 30, 60, 90, 120], [0, 0, 3.5, 3.5, 0])
     tracker = ti.Tracker(path, CAR, speeds=18.0)  # tire=run.tire steers on identified tires
-    state, off = ti.VehicleState(*map(float, path.pose(0.0)), 18.0, 0.0, 0.0), 0.0
+    X, Y, psi = map(float, path.pose(0.0))
+    state, off = ti.VehicleState(X, Y, psi, v_x=18.0, r=0.0, v_y=0.0), 0.0
     while state.X < 120.0:
         steering, off = tracker.step(state), max(off, abs(tracker.e_y))
         state = moved(state, steering, a_x=2.0 * (tracker.wanted_speed - state.v_x))
