@@ -443,8 +443,8 @@ class Vehicle:
         """Return the chassis to who cannot do without."""
         if self.chassis is None:
             raise VehicleError(
-                f"vehicle '{self.name}' cannot be simulated: add [chassis] with "
-                'tire = "my_tire.tir" to its file; tireid drive takes --weights instead'
+                f"vehicle '{self.name}' has no [chassis] with tire = "
+                '"my_tire.tir": add it, or drive with --weights'
             )
         return self.chassis
 

@@ -129,7 +129,7 @@ def test_weights_that_tell_no_speed_are_refused(folder, out, capsys):
     stored["vehicle"]["mass"] *= 2.0
     (folder / "heavy.json").write_text(json.dumps(stored))
     words = ["--vehicle", folder / "car.toml", "--out", out]
-    assert "was identified on 'sedan'" in refusal(capsys, ["lap", folder / "heavy.json", *words])
+    assert "is of another car (mass" in refusal(capsys, ["lap", folder / "heavy.json", *words])
 
 
 def test_a_lap_is_driven_learnt_from_and_kept(folder, out, capsys, undrawn):

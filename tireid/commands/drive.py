@@ -321,8 +321,5 @@ def require_its_car(options: argparse.Namespace, learnt: Vehicle, driven: Vehicl
     if learnt.bicycle == driven.bicycle:
         return
     key = next(key for key in BICYCLE if getattr(learnt, key) != getattr(driven, key))
-    apart = f"{key} {getattr(learnt, key):.6g} there, {getattr(driven, key):.6g} here"
-    raise ValueError(
-        f"{options.weights} was identified on {learnt.name!r}, driven is {driven.name!r} "
-        f"({apart}): give its file by --vehicle, or leave --vehicle out"
-    )
+    apart = f"{key} {getattr(learnt, key):.6g}, driven {getattr(driven, key):.6g}"
+    raise ValueError(f"{options.weights} is of another car ({apart}): leave --vehicle out")

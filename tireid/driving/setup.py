@@ -31,10 +31,10 @@ FASTEST = 30.0  # m/s
 _DRIVES, _BRAKES = 0.22, 0.33
 PERIOD = 0.01  # control period [s]
 _BEYOND = 2.0  # identified slips, up to which the grip of a tire is read, as `speed_limits` does
-_SLIPS = np.linspace(0.0, 0.4, 81)  # rad, within which a tire has its peak
+_SLIPS = np.linspace(1e-3, 0.4, 81)  # rad, within which a tire has its peak
 _LIKE = "the sedan's tires, scaled to the identified stiffness and grip"
 _WIDTH = 116  # characters of a line that is logged
-_ROUNDS = 3  # after which the grip is that of the identified tire to 1 %
+_ROUNDS = 4  # after which stiffness and grip are those of the identified tire to 1 %
 
 PLANT = "double-track"
 _log = logging.getLogger("tireid")
@@ -106,18 +106,17 @@ def simulated(vehicle: Vehicle, tire: TireModel | None) -> tuple[Vehicle, tuple[
 
 def _scaled_tire(vehicle: Vehicle, like: TireModel, axle: int) -> Tire:
     """Return the tire that in steady cornering has stiffness and grip of an identified axle."""
-    load = 0.5 * vehicle.axle_loads[axle]
     known = like.known_slip
     alpha = np.linspace(0.0, _SLIPS[-1] if known is None else _BEYOND * float(known[axle]), 61)[1:]
     grip = float(like.force(alpha)[:, axle].max())
     tire = MagicFormula.from_tir(str(sedan().require_chassis().tire))
-    c = replace(tire.coefficients, FNOMIN=load)
-    stiffness = float(replace(tire, coefficients=c).cornering_stiffness(load))
-    c = replace(c, LKY=0.5 * float(like.stiffness[axle]) / stiffness)
-    for _ in range(_ROUNDS):  # less grip shifts less load, which leaves more of it
+    c = replace(tire.coefficients, FNOMIN=0.5 * vehicle.axle_loads[axle])
+    for _ in range(_ROUNDS):  # roll, camber and load depend on what they change
         tire = replace(tire, coefficients=c, name=_LIKE)
-        most = float(cornering_force(vehicle, tire, axle, _SLIPS, 1.0).max())
-        c = replace(c, LMUX=c.LMUX * grip / most, LMUY=c.LMUY * grip / most)
+        force = cornering_force(vehicle, tire, axle, _SLIPS, 1.0)
+        stiffer, firmer = like.stiffness[axle] * _SLIPS[0] / force[0], grip / force.max()
+        scales = {"LKY": stiffer, "LMUX": firmer, "LMUY": firmer}
+        c = replace(c, **{name: getattr(c, name) * float(x) for name, x in scales.items()})
     return replace(tire, coefficients=c)
 
 
