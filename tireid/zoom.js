@@ -1,7 +1,7 @@
 // Draws panels of a figure in place of its picture, and back: `data` and LIBRARY as of zoom.py.
 const HEIGHT = 240, FINEST = 5;  // px; digits that are read
-const HINT = "Drag to zoom, double-click for all; values are those at the cursor. Long signals have "
-  + `the lowest and highest sample of each of ${data.columns} columns.`;
+const HINT = "Drag to zoom, double-click for all. "
+  + `Of long signals: the lowest and highest sample of each of ${data.columns} columns.`;
 const STYLE = `
 .zoomed { display: grid; gap: .4rem 1rem; margin: .5rem 0;
   grid-template-columns: repeat(auto-fit, minmax(min(100%, 24rem), 1fr)); }
@@ -59,7 +59,7 @@ function chart(panel, place, key) {
     return room > 0 ? [ends[0] - room, ends[1] + room] : [least, most];
   };
   const made = new uPlot({
-    title: panel.title, width: place.clientWidth || 300, height: HEIGHT, bands,
+    title: panel.title, width: place.clientWidth || 300, height: HEIGHT, pxAlign: 0, bands,
     cursor: { sync: { key }, y: false },
     axes: [{ label: panel.across, labelSize: 18, size: 34 }, { label: panel.up, labelSize: 18 }],
     scales: { x: { time: false }, y: { range: inside } },

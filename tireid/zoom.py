@@ -151,12 +151,14 @@ def _series(axes: Any) -> Iterator[Series]:
         yield Series("" if label.startswith("_") else _words(label), to_hex(color), kind, x, y)
 
     for band in axes.collections:
-        x, y = np.concatenate([one.vertices for one in band.get_paths()]).T
-        across, place = np.unique(x, return_inverse=True)
-        for kind, start, extreme in (("low", np.inf, np.fmin), ("high", -np.inf, np.fmax)):
-            ends = np.full(len(across), start)
-            extreme.at(ends, place.ravel(), y)
-            yield from made(band, band.get_facecolor()[0], kind, across, ends)
+        outlines = [one.vertices[np.argsort(one.vertices[:, 0])].T for one in band.get_paths()]
+        starts = [np.unique(x, return_index=True)[1] for x, _ in outlines]
+        x = np.concatenate([x[at] for (x, _), at in zip(outlines, starts, strict=True)])
+        for kind, extreme in (("low", np.fmin), ("high", np.fmax)):
+            ends = [extreme.reduceat(y, at) for (_, y), at in zip(outlines, starts, strict=True)]
+            for one in ends[1:]:
+                one[0] = np.nan  # where a segment begins
+            yield from made(band, band.get_facecolor()[0], kind, x, np.concatenate(ends))
     for line in axes.lines:
         if line.get_transform() is axes.transData:
             kind = "points" if line.get_linestyle() == "None" else "line"
