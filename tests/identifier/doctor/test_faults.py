@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import tireid as ti
 from benchmarks.doctor_cases import planted
 from benchmarks.everyday_drives import drawn_everyday
 from benchmarks.faults import Late, Misaligned
@@ -59,6 +60,15 @@ def test_nothing_is_found_on_a_clean_drive_and_little_is_unseen(driven):
     assert said.findings == ()
     assert all("is not observable" in line for line in said.unobservable)
     assert len(said.unobservable) < 3
+
+
+@pytest.mark.parametrize(("scale", "found"), [(1.0, []), (0.87, [("factor", "v_x")])])
+def test_a_scale_of_v_x_without_a_y_is_found_where_roll_does_not_explain_it(scale, found):
+    log = ti.sample_recording(seed=2)
+    said = examine(replace(log, v_x=scale * log.v_x, a_y=None, axle_force=None), ti.sedan())
+    assert [(one.code, one.channel) for one in said.findings] == found
+    for one in said.findings:
+        assert abs(one.size - scale) < 2.0 * one.deviation < 0.1 and not one.sure
 
 
 @pytest.mark.sweep("offset v_y")
