@@ -51,7 +51,7 @@ def driven():
     """A minute of a sedan with a slalom in it: the car as told, a log, and the exact drive."""
     drive = drawn_everyday("sedan", "slalom", 1)
     log = drive.log(np.random.default_rng([1, 1]))
-    return drive.car.told, replace(log, axle_force=None), drive.exact
+    return drive.car.declared, replace(log, axle_force=None), drive.exact
 
 
 def test_nothing_is_found_on_a_clean_drive_and_little_is_unseen(driven):
@@ -159,7 +159,7 @@ def test_a_number_of_the_car_is_a_note_and_neither_an_alarm_nor_sure(driven):
 
 def test_swapped_lengths_are_a_note_that_names_the_swap():
     drive = drawn_everyday("sedan", "lane change", 7000)
-    log, car = drive.log(np.random.default_rng([7000, 1])), drive.car.told
+    log, car = drive.log(np.random.default_rng([7000, 1])), drive.car.declared
     assert abs(car.l_f - car.l_r) > 0.5
     swapped = replace(car, l_f=car.l_r, l_r=car.l_f)
     (found, *_) = found_in(replace(log, axle_force=None), swapped)
@@ -377,7 +377,7 @@ def test_a_valley_of_one_number_is_found_within_steps_of_three_widths():
 @pytest.mark.parametrize(("names", "sign"), [(("r", "a_y"), 1.0), (("v_y", "delta_f"), -1.0)])
 def test_two_channels_that_are_late_alike_are_one_device(names, sign):
     """Where v_y and the steering are early by as much, the others are late."""
-    car = drawn_everyday("sedan", "slalom", 1).car.told
+    car = drawn_everyday("sedan", "slalom", 1).car.declared
 
     def late(channel, size, **other):
         return Finding(code="delay", channel=channel, size=size, deviation=0.002, **other)
