@@ -434,7 +434,8 @@ class Search:
         size = suspect.size(one.value)
         text = suspect.words(size, deviation, vehicle)
         if alike:
-            text += f"; on this drive it looks like: {', '.join(x.suspect.name for x in alike)}"
+            others = ", ".join(x.suspect.name for x in alike)
+            text += f"; this drive cannot separate it from: {others}"
         repair = suspect.repair(size, vehicle)
         real = math.erf(abs(one.value) / (math.sqrt(2.0) * deviation))
         return Finding(

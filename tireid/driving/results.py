@@ -103,7 +103,7 @@ class Drives(NamedTuple):
         """All that goes into the drives, ready for JSON."""
         conditions, setup = self.conditions, self.conditions.setup
         v, chassis = setup.speeds(), setup.vehicle.require_chassis()
-        tire = None
+        tire = None if setup.tires is None else digest(repr(setup.tires))
         if chassis.tire is not None:  # a hash in place of its file
             tire = digest(Path(chassis.tire).read_text(errors="replace", encoding="utf-8"))
         return {
@@ -126,7 +126,7 @@ class Drives(NamedTuple):
             "weights_hash": None if self.learnt is None else digest(self.learnt.to_dict()),
             "plant": PLANT,
             "vehicle": vehicle_numbers(setup.vehicle),
-            "chassis": {**asdict(chassis), "tire": tire},
+            "chassis": {k: x for k, x in asdict(chassis).items() if x != ()} | {"tire": tire},
             "delay_ms": 1e3 * PERIOD * conditions.delay,
             "period_ms": 1e3 * PERIOD,
             "noise": conditions.noise,
@@ -291,6 +291,7 @@ def write_drive_report(
                 first.drive.vehicle,
                 (),
                 tires=drives.source,
+                **({"simulated_car": assumed} if (assumed := first.drive.vehicle.assumed) else {}),
                 all_inputs=f"hash {digest(drives.inputs)}, listed in summary.json",
             ),
         ],

@@ -276,7 +276,7 @@ def test_a_sensor_that_no_car_carries_is_never_sure(driven, ahead, sure):
     doubtful = one._replace(value=search.deviation(one))  # of a Gaussian 68 % lie within one
     found = search.finding(doubtful, (0.9, 0.5), (one,), sure=False)
     assert (found.confidence, found.group) == pytest.approx((0.6827 * 0.9, 0.6827 * 0.5), abs=1e-3)
-    assert found.text.endswith("on this drive it looks like: velocity sensor x v_y")
+    assert found.text.endswith("this drive cannot separate it from: velocity sensor x v_y")
 
 
 def test_a_size_is_believed_that_stands_out_and_that_devices_have(driven):
