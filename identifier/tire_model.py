@@ -592,11 +592,7 @@ def stored_verdict(path: str | PathLike[str]) -> bool | None:
 
 def _stored(path: Path) -> Table:
     """Return the table of a file that says it is a frozen model."""
-    try:
-        table = Table(read_json(path, FrozenModelError), f"{path}: ", FrozenModelError)
-    except OSError as error:
-        reason = error.strerror or "not a file"
-        raise FrozenModelError(f"{path}: cannot be read: {reason.lower()}") from error
+    table = Table(read_json(path, FrozenModelError), f"{path}: ", FrozenModelError)
     if "format" not in table or table.value("format") != FORMAT:
         raise FrozenModelError(f"{path}: not a frozen model, format must be {FORMAT!r}")
     return table

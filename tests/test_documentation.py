@@ -281,22 +281,6 @@ def test_links_of_documents_lead_to_files():
     assert dead_links(ROOT / "README.md", planted) == ["docs/nowhere.md", "docs/limits.md#nothing"]
 
 
-def unknown_names(text):
-    """Names of `tireid` in the Python of a document that are none."""
-    used = set()
-    for block in re.findall(r"^```python\n(.*?)^```$", text, re.M | re.S):
-        for node in ast.walk(ast.parse(block)):
-            if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "ti":
-                used.add(node.attr)
-    return used - set(ti.__all__)
-
-
-def test_python_in_documents_is_python_and_names_what_there_is():
-    for path in DOCUMENTS:
-        assert not unknown_names(path.read_text(encoding="utf-8")), path
-    assert unknown_names("```python\nti.learn(ti.sedan())\n```\n") == {"learn"}
-
-
 def test_every_page_is_in_the_table_of_contents():
     index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"^[\w/]+$", index, re.M))
