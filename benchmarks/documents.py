@@ -175,6 +175,8 @@ def main(argv: list[str] | None = None) -> int:
         print(f"{path.relative_to(ROOT)}: {'differs' if check else 'written'}")
         if not check:
             path.write_text(new, encoding="utf-8")
+    older = [script for script, record in known.items() if record["code"] != _code(script)]
+    print(f"{len(older)} of {len(known)} records are older than the code:", *older)
     return 1 if check and differing else 0
 
 

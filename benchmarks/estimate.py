@@ -180,10 +180,15 @@ def of_random_cars(count: int = CARS) -> dict[str, list[Taught]]:
     """
     found: dict[str, list[Taught]] = defaultdict(list)
     for one in random_cars(count):
-        asked = tuple((other,) for other in one.others)
-        for kind, log in one.teach.items():
-            found[kind].append(Taught(one.declared, log, asked, since=CORNER))
+        for kind, task in tasks_of(one).items():
+            found[kind].append(task)
     return found
+
+
+def tasks_of(one: Driven) -> dict[str, Taught]:
+    """Return what is identified of a random car and what is evaluated, by kind of drive."""
+    asked = tuple((other,) for other in one.others)
+    return {kind: Taught(one.declared, log, asked, since=CORNER) for kind, log in one.teach.items()}
 
 
 def of_carmaker() -> dict[str, list[Taught]]:
@@ -450,6 +455,13 @@ COLUMNS = {
 }
 
 
+def canary() -> Values:
+    """Return errors of two methods on one random car [%]."""
+    full = tasks_of(drives_of("sedan", FIRST_SEED))["full"]
+    found = {name: errors_of(full, name) or [] for name in (DEFAULT, LIVE)}
+    return {f"{name}/{i}": value for name, some in found.items() for i, value in enumerate(some)}
+
+
 def tables(v: Values) -> dict[str, Table]:
     """Return the tables of the documents.
 
@@ -503,7 +515,7 @@ def main() -> int:
             judge(targets)
     if "cost" in only:
         judge_cost(targets)
-    return targets.finish(keep=options.record and DATA.is_dir())
+    return targets.finish(canary, keep=options.record and DATA.is_dir())
 
 
 if __name__ == "__main__":

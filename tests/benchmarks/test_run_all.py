@@ -16,7 +16,7 @@ from benchmarks.targets import Targets, parse
 targets, options = Targets("lap"), parse("lap", __doc__)
 targets.at_most("time of a lap", {}, 2.0, "s", key="time")
 targets.at_least("laps", 3.0, 2.0, "")
-sys.exit(targets.finish(keep=options.record))
+sys.exit(targets.finish(lambda: {{"laps": 3.0}}, keep=options.record))
 """
 
 
@@ -51,6 +51,7 @@ def test_targets_that_are_met_give_0_and_are_recorded_where_that_is_asked(
     assert bench(tmp_path, "--record") == 0
     record = json.loads((scripts / "results" / "lap.json").read_text())
     assert (record["values"], record["missed"], record["met"]) == ({"time": 1.0}, [], 2)
+    assert record["canary"] == {"laps": 3.0}
     assert record["code"] == fingerprint("lap", tmp_path)
 
 
@@ -116,9 +117,8 @@ def test_a_benchmark_that_starts_commands_runs_all_of_them():
     assert {"tireid.commands.identify", "identifier.axle.step"} <= set(modules("benchmarks.speed"))
 
 
-@pytest.mark.parametrize("script", ["sensor_faults", "paper_gains", "export_cost"])
-def test_a_quick_run_ends(script):
-    command = [sys.executable, "-m", f"benchmarks.{script}", "--quick"]
+def test_a_quick_run_ends():
+    command = [sys.executable, "-m", "benchmarks.export_cost", "--quick"]
     answer = subprocess.run(command, cwd=run_all.ROOT, capture_output=True, text=True, check=False)
     assert answer.returncode in (0, 1), answer.stderr
-    assert f"{script}: " in answer.stdout.splitlines()[-1]
+    assert "export_cost: " in answer.stdout.splitlines()[-1]
