@@ -202,7 +202,9 @@ def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
 def canary() -> Values:
     """Return what a stored model tells of one drop of friction."""
     lesson, rng = drawn("sedan", FIRST_SEED), np.random.default_rng(0)
-    models = {"with_v_y": ti.identify(blind(lesson.log(rng)), lesson.car.declared, check=False).tire}
+    models = {
+        "with_v_y": ti.identify(blind(lesson.log(rng)), lesson.car.declared, check=False).tire
+    }
     (found,) = of_drive(lesson.car, models, 0.5, rng).values()
     return found._asdict()
 
