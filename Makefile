@@ -51,8 +51,9 @@ format: $(VENV)/.test
 types: $(VENV)/.test
 	$(VENV)/bin/mypy
 
-# The documents as a site, out/docs/index.html; a warning is an error.
+# The documents as a site, out/docs/index.html; a warning is an error, and so is a snippet that does not run.
 docs: $(VENV)/.docs
+	$(PY) docs/snippets.py
 	$(PY) -m sphinx --builder html --fail-on-warning --keep-going --nitpicky --quiet docs out/docs
 
 # At most an hour on two idle cores; `python -m benchmarks.run_all --record` keeps what it measures.
@@ -106,8 +107,8 @@ $(VENV)/.bench: pyproject.toml $(RIVALS)/pyproject.toml | $(PY)
 	$(PY) -m pip install --quiet --editable . --editable $(RIVALS)
 	touch $@
 
-$(VENV)/.docs: pyproject.toml | $(PY)
-	$(PY) -m pip install --quiet --editable ".[docs]"
+$(VENV)/.docs: pyproject.toml $(RIVALS)/pyproject.toml | $(PY)
+	$(PY) -m pip install --quiet --editable ".[docs]" --editable $(RIVALS)
 	touch $@
 
 $(VENV)/.mutants: pyproject.toml $(RIVALS)/pyproject.toml | $(PY)

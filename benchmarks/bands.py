@@ -58,8 +58,8 @@ def cases(*, quick: bool) -> Iterator[Case]:
     for one in random_cars(count=1) if quick else random_cars():
         first, second = one.others
         full = one.teach["full"]
-        yield Case("random", one.told, [full], [first], CORNER)
-        yield Case("random", one.told, [full, first], [second], CORNER)
+        yield Case("random", one.declared, [full], [first], CORNER)
+        yield Case("random", one.declared, [full, first], [second], CORNER)
     if quick or not DATA.is_dir():
         return
     runs = read("carmaker.csv.gz", CARMAKER_RUNS)
@@ -112,7 +112,7 @@ def held(case: Case) -> list[tuple[str, float, float]]:
 def canary() -> Values:
     """Return share and width of the bands of one random car."""
     one = drives_of("sedan", FIRST_SEED)
-    found = held(Case("random", one.told, [one.teach["full"]], one.others[:1], CORNER))
+    found = held(Case("random", one.declared, [one.teach["full"]], one.others[:1], CORNER))
     return {f"{key}/{i}": value for key, *some in found for i, value in enumerate(some)}
 
 

@@ -132,7 +132,7 @@ def case(job: tuple[str, int]) -> dict[str, list[Asked]]:
     lesson, rng = drawn(kind, seed), np.random.default_rng([seed, 77])
     car, log = lesson.car, blind(lesson.log(rng))
     logs = {"with_v_y": log, "without_v_y": replace(log, v_y=None)}
-    models = {way: ti.identify(one, car.told, check=False).tire for way, one in logs.items()}
+    models = {way: ti.identify(one, car.declared, check=False).tire for way, one in logs.items()}
     less = np.exp(rng.uniform(math.log(LESS[0]), math.log(LESS[1]), DROPS))
     told: dict[str, list[Asked]] = {way: [] for way in WAYS}
     for ratio in (*[1.0] * SAME, *less.tolist(), *rng.uniform(*MORE, RISES).tolist()):
@@ -203,7 +203,9 @@ def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
 def canary() -> Values:
     """Return what a stored model tells of one drop of friction."""
     lesson, rng = drawn("sedan", FIRST_SEED), np.random.default_rng(0)
-    models = {"with_v_y": ti.identify(blind(lesson.log(rng)), lesson.car.told, check=False).tire}
+    models = {
+        "with_v_y": ti.identify(blind(lesson.log(rng)), lesson.car.declared, check=False).tire
+    }
     (found,) = of_drive(lesson.car, models, 0.5, rng).values()
     return found._asdict()
 

@@ -81,10 +81,15 @@ def require_file(path: Path, refusal: type[ValueError], *, limit: str) -> None:
 
 def read_bytes(path: Path, refusal: type[ValueError], *, limit: str = "document") -> bytes:
     """Read a file.   path : a regular file: no device, pipe or folder, which may have no end."""
-    require_file(path, refusal, limit=limit)
     most = int(min(1e6 * getattr(limits(), limit), 2.0**62))
-    with path.open("rb") as file:
-        data = file.read(most + 1)
+    try:
+        require_file(path, refusal, limit=limit)
+        with path.open("rb") as file:
+            data = file.read(most + 1)
+    except FileNotFoundError:
+        raise refusal(f"{path}: there is no such file") from None
+    except OSError as error:
+        raise refusal(f"{path}: cannot be read: {(error.strerror or '').lower()}") from None
     _require_size(path, refusal, len(data), limit)  # which grew, or has no size as in /proc
     return data
 

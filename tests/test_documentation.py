@@ -169,7 +169,7 @@ def test_the_interface_is_what_tireid_names_with_its_bases():
     assert named > {"Vehicle", "AxleIdentifier", "Method", "TireModel", "read_recording"}
     assert "Path" in named  # of `tireid.paths`
     assert named > {"Band", "Drives"}  # of `tire.band` and so on
-    assert not named & {"Tracker", "Scan", "gate"}
+    assert not named & {"Guide", "Scan", "gate"}
 
 
 def test_a_drifted_docstring_is_caught():
@@ -279,22 +279,6 @@ def test_links_of_documents_lead_to_files():
         assert not dead_links(path, path.read_text(encoding="utf-8")), path
     planted = "[a](docs/nowhere.md), [b](docs/index.md), [c](#tireid), [d](docs/limits.md#nothing)"
     assert dead_links(ROOT / "README.md", planted) == ["docs/nowhere.md", "docs/limits.md#nothing"]
-
-
-def unknown_names(text):
-    """Names of `tireid` in the Python of a document that are none."""
-    used = set()
-    for block in re.findall(r"^```python\n(.*?)^```$", text, re.M | re.S):
-        for node in ast.walk(ast.parse(block)):
-            if isinstance(node, ast.Attribute) and ast.unparse(node.value) == "ti":
-                used.add(node.attr)
-    return used - set(ti.__all__)
-
-
-def test_python_in_documents_is_python_and_names_what_there_is():
-    for path in DOCUMENTS:
-        assert not unknown_names(path.read_text(encoding="utf-8")), path
-    assert unknown_names("```python\nti.learn(ti.sedan())\n```\n") == {"learn"}
 
 
 def test_every_page_is_in_the_table_of_contents():

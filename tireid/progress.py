@@ -98,16 +98,17 @@ def listen_to_library() -> None:
 
 
 _QUIET, _EVERY = 2.0, 5.0  # s: before the first line, between lines
-_TELLING = 0.02  # share from which the time left is given
+_MEASURED = 0.05  # share of a part after which its rate is known
+_PACE = 0.25, 4.0  # of this machine over the one of the seconds below; beyond it, a log was long
 
 
 class Progress:
     """Prints now and then how far something has come and how much time is left.
 
-    Short work says nothing, nor does a program that only uses the library.
+    Short work says nothing, nor does a program that only uses the library. The time left follows
+    from the rate of the part that runs, without what comes before its first share, as compiling.
 
-    parts : names of its parts in order, and about how long each takes beside the others; None has
-        one.
+    parts : names of its parts in order, and about how many seconds each takes; None has one.
     long : whether it is known to last, so that the beginning of each part is given at once.
     """
 
@@ -126,9 +127,13 @@ class Progress:
 
     def begin(self, part: str) -> "Progress":
         """Go on with a part; return what takes its share."""
-        names, whole = list(self._parts), sum(self._parts.values())
-        self._before = sum(self._parts[name] for name in names[: names.index(part)]) / whole
-        self._weight, self._name, self._done = self._parts[part] / whole, part, 0
+        names, lasts = list(self._parts), list(self._parts.values())
+        k = names.index(part)
+        self._before, self._lasts, self._after = sum(lasts[:k]), lasts[k], sum(lasts[k + 1 :])
+        pace = self.seconds / self._before if k else 1.0
+        self._pace = min(max(pace, _PACE[0]), _PACE[1])
+        self._name, self._done = part, 0
+        self._first: tuple[float, float] | None = None
         if self._long:
             self._said = -math.inf
         self(0.0)
@@ -152,12 +157,28 @@ class Progress:
         share : done of the part, 0 to 1.
         """
         now = time.perf_counter()
+        if share > 0.0 and self._first is None:
+            self._first = now, share
         if not _listening or now - self._said < _EVERY:
             return
         self._said = now
-        done = min(self._before + self._weight * share, 1.0)
-        parts = [text or self._name, f"{100.0 * done:.0f} %"]
-        if done > _TELLING:
-            left = (now - self._begun) * (1.0 - done) / done
-            parts.append(f"{left:.0f} s left" if left < 100.0 else f"{left / 60.0:.0f} min left")
-        say(f"{self._what}: {', '.join(one for one in parts if one)}")
+        left = self._left(now, share)
+        words = [text or self._name]
+        if left is None:
+            whole = self._before + self._lasts + self._after
+            words.append(f"{100.0 * (self._before + self._lasts * share) / whole:.0f} %")
+        else:
+            words.append(f"{100.0 * self.seconds / max(self.seconds + left, 1e-9):.0f} %")
+            words.append(f"{left:.0f} s left" if left < 100.0 else f"{left / 60.0:.0f} min left")
+        say(f"{self._what}: {', '.join(one for one in words if one)}")
+
+    def _left(self, now: float, share: float) -> float | None:
+        """Return the time left [s]; None while nothing is known of it."""
+        since, begun = self._first or (now, share)
+        if share >= 1.0 or share - begun >= _MEASURED:
+            own = (now - since) * (1.0 - share) / max(share - begun, _MEASURED)
+        elif self._before:
+            own = self._pace * self._lasts * (1.0 - share)
+        else:
+            return None
+        return own + self._pace * self._after

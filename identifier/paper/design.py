@@ -345,10 +345,7 @@ def read_design(path: Path) -> PaperIdentifier:
     path : TOML with the keys of `PaperIdentifier`, and tables [gains], [network] and, where the
         conditions of driving are declared, [driving].
     """
-    try:
-        data = read_toml(path, DesignFileError)
-    except OSError as error:
-        raise DesignFileError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+    data = read_toml(path, DesignFileError)
     inner = {name: data.pop(name, None) for name in TABLES}
     gains, network, driving = (
         None if part is None else Table(part, f"{path}: ", DesignFileError, f"{name}.").record(cls)

@@ -42,7 +42,7 @@ def test_what_is_no_file_is_refused_before_it_is_opened(read, tmp_path):
     endless = tmp_path / "endless"
     endless.symlink_to("/dev/zero")
     assert "a device, pipe or socket" in refusal(read, endless)
-    with pytest.raises(FileNotFoundError):
+    with pytest.raises(RefusedError, match="absent: there is no such file"):
         read(tmp_path / "absent", RefusedError)
 
 

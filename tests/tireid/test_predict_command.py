@@ -156,7 +156,7 @@ def test_an_axle_model_is_mounted_on_the_car_that_drove(model, logs, tmp_path, c
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["missing.json", "log.csv"], "missing.json: cannot be read"),
+        (["missing.json", "log.csv"], "missing.json: there is no such file"),
         (["MODEL", "missing.csv"], "missing.csv"),
         (["NETWORK", "LOG", "--vehicle", "CAR"], "cannot be mounted on 'other'"),
     ],

@@ -42,7 +42,7 @@ def test_a_program_that_uses_the_library_hears_nothing(clock, monkeypatch, capsy
 
 
 def test_parts_count_by_how_long_they_last(clock, capsys):
-    work = progress.Progress("work", {"first": 1.0, "second": 3.0}, long=True)
+    work = progress.Progress("work", {"first": 10.0, "second": 30.0}, long=True)
     clock[0] += 10.0
     work(1.0)
     work.begin("second")
@@ -57,6 +57,21 @@ def test_parts_count_by_how_long_they_last(clock, capsys):
         "  work: second, 75 %, 10 s left",
         "  work: second, 100 %, 0 s left",
     ]
+
+
+def test_the_time_left_leaves_out_what_comes_before_the_first_share(clock, capsys):
+    """The first share comes after 20 s of compiling; the log is long, what follows it is short."""
+    work = progress.Progress("work", {"learning": 0.2, "figures": 2.0})
+    clock[0] += 20.0
+    for share in range(1, 41):
+        clock[0] += 1.0
+        work(share / 40)
+    work.begin("figures")
+    said = capsys.readouterr().err.splitlines()
+    left = [int(line.split(", ")[-1].split()[0]) for line in said if "left" in line]
+    assert "left" not in said[0] and len(left) > 5
+    assert all(abs(one - (42 - 5 * (k + 1))) <= 1 for k, one in enumerate(left[:-1])), left
+    assert "min" not in " ".join(said)
 
 
 def test_what_a_file_is_called_neither_commands_the_terminal_nor_breaks_the_line(clock, capsys):

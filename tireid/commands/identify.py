@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
     if start is not None and start.scales_with_load and not start.vehicle.moves_as(vehicle):
         say(f"{options.weights} is of the car {start.vehicle.name!r}: scaled by the axle loads")
     count = 1.0 + len(others)
-    parts = {_LEARNING: 1.0 + count, _JUDGING: count, _DRAWING: 2.0 + 3.0 * count}
+    parts = {_LEARNING: count, _JUDGING: 0.1 * count, _DRAWING: 0.5 + 0.5 * count}  # about s
     with shared.folder_of(options) as folder:
         progress = Progress("identify", parts)
         runs: list[History] = []
