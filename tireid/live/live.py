@@ -287,8 +287,9 @@ class Live:
         except (DivergedError, ValueError) as error:
             self._complaint = f"no tires follow from what was driven: {error}"
             return
+        point = self._point(model)  # its first forces are those of the prior
+        self._points.append(_NO_POINT if self._model is None else point)
         self._model, self._live = model, _numbers(model)
-        self._points.append(self._point(model))
         self._states_with_force += np.abs(self._points[-1][1]) >= RULES.force
         explains, self._complaint = self._judged(model, identifier.state())
         if breaks > EVERY // 2:
