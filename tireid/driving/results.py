@@ -400,7 +400,7 @@ def known_blocks(runs: _Runs, figures: Images) -> list[Block]:
     if given is not None:
         lateral = (
             f": rms error of the estimate {given.rms_error_m_s:.3f} m/s, "
-            f"{given.rms_error_deg:.2f} of {given.rms_deg:.2f}° of side slip; "
+            f"{given.rms_error_deg:.2f}° of side slip ({given.rms_deg:.2f}° rms); "
             f"{100.0 * given.within_two_sd:.0f} % of the errors within two standard deviations"
         )
     captions = {
