@@ -1,7 +1,8 @@
 """A report: headline numbers, text, tables and figures in ONE HTML file that needs nothing else.
 
 Pictures are embedded; a figure fills the window when clicked on, by its own anchor. Styles are
-inline, without scripts or links to other files, so that it can be mailed, archived and printed.
+inline, without links to other files, so that it can be mailed, archived and printed. The script of
+`zoom.py` is inline too; without it the pictures stand alone.
 
 The order is always: at most three headline numbers, the notes that would change a decision, what
 was found with its figures and how to read each, and where it came from.
@@ -25,6 +26,7 @@ from models.files import digest, digest_of_bytes, write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
+from tireid.zoom import Zoom, plots_html
 
 _SIGNATURES = {  # of files, by their kind
     b"\x89PNG\r\n\x1a\n": "png",
@@ -147,6 +149,11 @@ class Picture:
             raise ValueError(f"the picture {self.caption!r} must be SVG, PNG, GIF or WebP")
         object.__setattr__(self, "image", data)
 
+    @property
+    def zoom(self) -> Zoom:
+        """Panels that a browser draws in its place; none of most."""
+        return getattr(self.image, "zoom", ())
+
 
 Block = str | Table | Picture  # running text is a str
 
@@ -183,13 +190,16 @@ class Report(NamedTuple):
 def report_html(report: Report) -> str:
     """Return a report as one HTML page; tables and figures are numbered through."""
     title = html(report.title)
-    tables, figures = count(1), count(1)
+    tables, figures, zooms = count(1), count(1), dict[str, Zoom]()
 
     def written(block: Block) -> str:
         if isinstance(block, Table):
             return _table(block, next(tables))
         if isinstance(block, Picture):
-            return _picture(block, next(figures))
+            number = next(figures)
+            if block.zoom:
+                zooms[f"figure-{number}"] = block.zoom
+            return _picture(block, number)
         return f"<p>{_inline(block)}</p>"
 
     lead = [written(block) for block in report.lead]
@@ -217,7 +227,8 @@ def report_html(report: Report) -> str:
     ]
     head += _numbers(report.numbers) + lead + _notes(report.notes)
     contents = ['<nav aria-label="Contents">', "<ol>", *entries, "</ol>", "</nav>"]
-    return "\n".join([*head, *contents, *parts, "</body>", "</html>"]) + "\n"
+    body = [*head, *contents, *parts, plots_html(zooms)]
+    return "\n".join([*body, "</body>", "</html>"]) + "\n"
 
 
 def write_report(folder: Path, report: Report) -> None:

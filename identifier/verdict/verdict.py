@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from codegen import markup
 from codegen.arrays import Array
 from identifier.measured import NOT_IDENTIFIABLE, printed_value
 from identifier.tire_model import Axle
@@ -198,3 +199,12 @@ class Verdict:
             for finding in self.findings
         )
         return f"<Verdict: {self.word.lower()}{f': {codes}' if codes else ''}>"
+
+    def _repr_html_(self) -> str:
+        color = markup.GREEN if self.valid else markup.RED if self.judged else markup.AMBER
+        said = self.headline.removeprefix(f"verdict: {self.word}").lstrip(", ")
+        return markup.card(
+            markup.line(said, self.word, color),
+            *map(markup.line, self.lines[1 : -len(self.unobservable)]),
+            markup.folded("not observable in this drive", [*UNOBSERVABLE, *self.blind]),
+        )
