@@ -82,7 +82,7 @@ _VARIES_BY_AXLE = rf"{_VARIES}|\bfront\b|\brear\b"
 _NOTES = 3  # that stand above the first section, those that would change a decision
 _WIDE = 4  # columns from which a narrow screen gets a line for each cell
 # In the cells of tables: after what a name may go on in the next line, and where a number may not.
-_BREAKS = re.compile(r"(_|\w{24})")
+_BREAKS = re.compile(r"(_|\w{16})")
 _JOINED = re.compile(r"(?<=±) |(?<=\d) (?=%|m|N|k|s\b)")
 _INDEXED = re.compile(r"\b(v_x|v_y|a_x|a_y|e_y|l_f|l_r|A_d|T_freeze)\b")
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")

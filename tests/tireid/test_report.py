@@ -2,12 +2,14 @@
 
 import re
 from base64 import b64decode
+from itertools import product
 from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
 
 from tests.pages import faults_of, outline
+from tests.tireid.conftest import learn_words, typed
 from tireid.figures.style import figure_png
 from tireid.report import (
     Headline,
@@ -184,3 +186,22 @@ def test_a_film_and_a_drawing_are_embedded_as_what_they_are():
         assert str(image).startswith(f"data:image/{kind};base64,")
         assert b64decode(str(image).split(",")[1]) == content
         assert "how" in parser.text
+
+
+def test_no_table_is_cut_in_a_window_or_on_a_telephone(tab, logs, tmp_path):
+    name, long = "drive_of_a_car_" * 4, "0.0123 ± 0.0045 m/s"
+    tables = [
+        Table("c", [f"a title of the column {k}" for k in range(7)], [[name, *[long] * 6]]),
+        Table("d", ["", "front", "rear"], [["W" * 60, Marked(long, "unknown", "not known"), 1.0]]),
+        Table("e", ["what", "value"], [["command", f"tireid {'/a/path' * 30}"]], verbatim=True),
+    ]
+    write_report(tmp_path, Report(title="T", sections=[Section("h", tables)], notes=[name] * 9))
+    assert typed(*learn_words(logs), "--replay", logs / "quick.csv", "--out", tmp_path / "out") == 0
+    cut = "[...document.querySelectorAll('div.scroll')].filter(e => e.scrollWidth > "
+    for folder, width in product((tmp_path, tmp_path / "out"), (1200, 500)):
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        tab.call("Emulation.setDeviceMetricsOverride", **size)
+        tab.call("Page.navigate", url=(folder / "report.html").as_uri())
+        tab.wait("document.readyState === 'complete' && document.querySelector('table') !== null")
+        assert tab.value(f"{cut} e.clientWidth).map(e => e.textContent).join()") == ""
+        assert tab.value("document.documentElement.scrollWidth") <= width

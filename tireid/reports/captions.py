@@ -14,7 +14,6 @@ from models.vehicle import Vehicle
 
 _CURVE = 200  # points at which a band is compared with the points of a drive
 _SETTLED = 0.1  # of its last value: an estimate within it has converged
-_GAP = 5.0  # sample periods: a longer pause of a log is a gap
 _PLACES = ("at small slip", "near the end of the identified slip", "beyond the identified slip")
 
 
@@ -99,22 +98,22 @@ def settled_caption(learnt: History) -> str:
 
 
 def inputs_caption(recording: Recording) -> str:
-    """Return the range of the signals of a log, and its longest gap."""
-    v, pauses = recording.v_x, np.diff(recording.t)
-    most = {
-        "steering": (np.degrees(recording.delta_f), "°"),
-        "yaw rate": (np.degrees(recording.r), "°/s"),
-        "a_y": (recording.a_y, " m/s²"),
-    }
+    """Return the range of the signals of a log."""
+    v, most = (
+        recording.v_x,
+        {
+            "steering": (np.degrees(recording.delta_f), "°"),
+            "yaw rate": (np.degrees(recording.r), "°/s"),
+            "a_y": (recording.a_y, " m/s²"),
+        },
+    )
     ranges = [
         f"{name} up to {np.abs(one).max():.3g}{unit}"
         for name, (one, unit) in most.items()
         if one is not None
     ]
-    gap = f"; longest gap {pauses.max():.3g} s" if pauses.max() > _GAP * recording.dt else ""
     return (
-        f"Signals of {recording.name}: v_x {v.min():.3g} to {v.max():.3g} m/s, {', '.join(ranges)}"
-        f"{gap}."
+        f"Signals of {recording.name}: v_x {v.min():.3g} to {v.max():.3g} m/s, {', '.join(ranges)}."
     )
 
 
