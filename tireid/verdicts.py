@@ -130,11 +130,12 @@ def verdict_headline(verdict: Verdict) -> Headline:
 def of_answer(verdict: Verdict, numbers: Sequence[Headline]) -> list[Headline]:
     """Return numbers of a report as the verdict leaves them: of a refused answer none is right.
 
-    Those that are not bad are grey there.
+    Those that are neither bad nor in doubt are grey there.
     """
     if verdict.valid:
         return list(numbers)
-    return [one if one.tone == "bad" else one._replace(tone="refused") for one in numbers]
+    spoken = ("bad", "doubt")
+    return [one if one.tone in spoken else one._replace(tone="refused") for one in numbers]
 
 
 def model_error_headline(verdict: Verdict) -> list[Headline]:

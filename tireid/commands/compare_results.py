@@ -220,11 +220,12 @@ def write_compare_report(
     verdicts : on what the default learns, by recording.
     """
     course, said, rows = comparison.course, remarks(comparison), summary_rows(comparison)
+    slips = ", ".join(f"{row[0]} {row[4]}°" for row in rows[1:] if row[4] != "-")
     known = [not {*cells} <= {"-", ""} for cells in zip(*rows[1:], strict=True)]
     rows = [list(compress(row, known)) for row in rows]
     captions = {
         "methods": _methods_caption(comparison),
-        "side_slip": _side_slip_caption(comparison),
+        "side_slip": f"Side slip estimated without a lateral velocity, rms error: {slips}.",
     }
     blocks: list[Block] = [
         Table(
@@ -273,15 +274,6 @@ def _methods_caption(comparison: Comparison) -> str:
     ends = [f"{name} {value:.1f} %" for name, value in errors.items()]
     least = f"; frozen {where} from {ends[0]} to {ends[-1]} of the rms force" if ends else ""
     return f"Errors of every method{least}."
-
-
-def _side_slip_caption(comparison: Comparison) -> str:
-    found = []
-    for name, trial in comparison.trials.items():
-        errors = [one.rms for one in trial.side_slip.values() if one.rms is not None]
-        found += [f"{name} {np.mean(errors):.2f}°"] if errors else []
-    rms = f": rms error {', '.join(found)}" if found else ""
-    return f"Side slip estimated by methods without a lateral velocity{rms}."
 
 
 def _compare_notes(comparison: Comparison) -> list[Note]:

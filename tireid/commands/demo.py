@@ -107,11 +107,9 @@ def drive_section(driven: _Cases, folder: Path) -> Section:
     blocks: list[Block] = [
         (
             "A model predictive tracker steers the car around the cones. It plans 2 s ahead, "
-            "100 times a second, with noisy sensors and 20 ms of delay. In the middle of the "
-            "slalom the friction drops to half, which is the limit of this path, and no tracker "
-            "gets this friction. One tracker goes on identifying: its tire is replaced where "
-            "recent innovations require it and the new one explains the last seconds better. The "
-            "others keep the tires that were frozen before, or the linear ones."
+            "100 times a second, with noisy sensors and 20 ms of delay. In the slalom friction "
+            "drops to half; no tracker gets it. The learning one replaces its tire where "
+            "innovations require it, the others keep frozen or linear tires."
         ),
         film_picture(folder / _SLIPPERY / f"drive.{_FILM}", slippery.drives.runs),
         *_scores(slippery),
@@ -185,10 +183,9 @@ def shipped_text(shipped: Shipped) -> str:
 def package_section(shipped: Shipped) -> Section:
     name = shipped.exported.package.specialized.name
     intro = (
-        "The axle identifier, beginning with the weights of this drive, is written as a C99 "
-        f"package to the folder {FOLDER}/ beside this report: library, example, self-test and "
-        f"README with its costs, every symbol begins with {name}_. It is what tireid export "
-        "writes; here it is compiled, tested and run over the slalom, beside Python."
+        "The axle identifier with the weights of this drive, as tireid export writes it: a C99 "
+        f"package in {FOLDER}/ beside this report, whose symbols begin with {name}_. Here it is "
+        "compiled, tested and run over the slalom."
     )
     lines = (intro, *shipped_text(shipped).splitlines())
     return Section("The identifier as C for a controller", lines)
@@ -240,19 +237,14 @@ def _learn(found: Results, figures: Images) -> Section:
         "Identified tires",
         [
             (
-                "The car is a double-track model of a mid-size sedan: roll, load transfer, "
-                "tire relaxation and combined slip on Magic Formula tires, integrated at 1 ms. It "
-                f"drives a slalom at {SPEED:g} m/s. The identifier gets what any log has, "
-                "speed, lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it "
-                "gets no force."
+                "The car is a double-track model of a mid-size sedan on Magic Formula tires, in a "
+                f"slalom at {SPEED:g} m/s. The identifier gets speed, lateral velocity, yaw rate "
+                "and steering at 100 Hz with sensor noise; it gets no force."
             ),
             (
-                "Each axle has a force curve of slip, a sum of tanh units that is odd and "
-                "saturates. Slip is lagged by the relaxation of the tire, which is identified "
-                "too, and moved by the sway of the body. The curves are identified by recursive "
-                "least squares from motion alone; where nothing was excited the prior remains. "
-                "It works sample by sample, in a car too; tireid identify makes one estimate of "
-                "a whole log."
+                "Each axle has an odd, saturating force curve of lagged slip. Recursive least "
+                "squares identify it sample by sample; where nothing was excited the prior "
+                "remains. tireid identify makes one estimate of a whole log."
             ),
             curve_drawing(figures, verdict, slip_caption(found.model, learnt.recording, learnt)),
             *learnt_blocks(found, figures)[1:],
@@ -265,9 +257,8 @@ def _predict(story: Story, figures: Images) -> Section:
     columns = ["frozen", "of rms"]
     blocks: list[Block] = [
         (
-            "The same frozen weights predict two other maneuvers, not used for "
-            "identification: beside them the paper's network and law, identified on the same "
-            "slalom with gains from the phase margin of their loop."
+            "The same frozen weights predict two maneuvers that were not used for "
+            "identification. Beside them: the paper's network, identified on the same slalom."
         ),
         Table(
             "RMSE of the axle force, both axles together [kN], and the frozen error as a "

@@ -38,6 +38,7 @@ from tireid.report import (
     Table,
     drawings,
     origin,
+    sentence,
     write_report,
 )
 from tireid.reports.captions import (
@@ -181,8 +182,7 @@ def learnt_blocks(found: Results, figures: Images) -> list[Block]:
     if band := band_sentence(found.model):
         blocks.append(band)
     captions = {
-        "side_slip": f"Side slip of {found.runs[0].recording.name}: "
-        f"{side_slip_text(found.runs[0]).removeprefix('side slip was ')}.",
+        "side_slip": sentence(side_slip_text(found.runs[0]) or "side slip as estimated"),
         "learnt": settled_caption(found.runs[0]) if "learnt" in figures else "",
         "error": "Norm of the observer's error.",
         "weights": "Weights of the network.",
