@@ -4,8 +4,8 @@ Pictures are embedded; a figure fills the window when clicked on, by its own anc
 inline, without links to other files, so that it can be mailed, archived and printed. The script of
 `zoom.py` is inline too; without it the pictures stand alone.
 
-The order is always: headline numbers, what speaks against them, what was found with its figures and
-how to read each, and where it came from.
+The order is always: at most three headline numbers, the notes that would change a decision, what
+was found with its figures and how to read each, and where it came from.
 """
 
 import math
@@ -13,7 +13,7 @@ import platform
 import re
 import tomllib
 from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -43,6 +43,17 @@ with Path(__file__).with_name("read.toml").open("rb") as file:
 Tone = Literal["", "good", "doubt", "bad", "unknown", "refused", "struck"]
 
 
+class Note(NamedTuple):
+    """A sentence that speaks against a result.
+
+    tone : bad refuses the result, doubt says that nobody can judge it.   where : drive it is about.
+    """
+
+    text: str
+    tone: Tone = ""
+    where: str = ""
+
+
 class Marked(NamedTuple):
     """A text with what it is worth, and a note below it that is never struck; all plain text."""
 
@@ -64,6 +75,15 @@ _LETTERS = {
     "lambda": "λ",
     "theta": "θ",
 }
+_WORDS: dict[str, Tone] = {"NOT VALID": "bad", "Cannot judge": "doubt", "cannot judge": "doubt"}
+_WORD = re.compile("|".join(_WORDS))  # of a verdict, colored wherever it stands
+_VARIES = r"\d+(?:\.\d+)?(?: / \d+(?:\.\d+)?)*"  # numbers: notes that differ in these are one
+_VARIES_BY_AXLE = rf"{_VARIES}|\bfront\b|\brear\b"
+_NOTES = 3  # that stand above the first section, those that would change a decision
+_WIDE = 4  # columns from which a narrow screen gets a line for each cell
+# In the cells of tables: after what a name may go on in the next line, and where a number may not.
+_BREAKS = re.compile(r"(_|\w{16})")
+_JOINED = re.compile(r"(?<=±) |(?<=\d) (?=%|m|N|k|s\b)")
 _INDEXED = re.compile(r"\b(v_x|v_y|a_x|a_y|e_y|l_f|l_r|A_d|T_freeze)\b")
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
@@ -76,13 +96,16 @@ def printed(text: str) -> str:
     return raised.replace("`", "").replace("->", "→").replace("+-", "±")
 
 
+def sentence(line: str) -> str:
+    """Return a line of a command's output as a sentence of a report."""
+    text = printed(line)
+    return f"{text[:1].upper()}{text[1:]}."
+
+
 class Headline(NamedTuple):
-    """A number that a hurried reader looks for: with its unit, and what it is, plain text.
+    """A number that a hurried reader decides by: with its unit, and what it is, plain text."""
 
-    value : the number, or those of several axles, a line each.
-    """
-
-    value: str | Sequence[Marked]
+    value: str
     meaning: str
     tone: Tone = ""
 
@@ -151,9 +174,9 @@ class Report(NamedTuple):
     """All that a page says.
 
     summary : what a hurried reader should know, plain text.
-    numbers : what stands at the top, with units; none where there is nothing to count.
-    lead : what is looked at first, above the warnings.
-    warnings : what speaks against the results, plain text; what is marked bad refuses them.
+    numbers : the three that decide, with units; others belong into a table.
+    lead : what is looked at first, above the notes.
+    notes : what speaks against the results, plain text.
     """
 
     title: str
@@ -161,7 +184,7 @@ class Report(NamedTuple):
     summary: str = ""
     numbers: Sequence[Headline] = ()
     lead: Sequence[Block] = ()
-    warnings: Sequence[str | Marked] = ()
+    notes: Sequence[str | Note] = ()
 
 
 def report_html(report: Report) -> str:
@@ -202,7 +225,7 @@ def report_html(report: Report) -> str:
         f"<h1>{title}</h1>",
         f'<p class="summary">{_inline(report.summary)}</p>',
     ]
-    head += _numbers(report.numbers) + lead + _warnings(report.warnings)
+    head += _numbers(report.numbers) + lead + _notes(report.notes)
     contents = ['<nav aria-label="Contents">', "<ol>", *entries, "</ol>", "</nav>"]
     body = [*head, *contents, *parts, plots_html(zooms)]
     return "\n".join([*body, "</body>", "</html>"]) + "\n"
@@ -213,21 +236,20 @@ def write_report(folder: Path, report: Report) -> None:
 
 
 def _inline(text: str) -> str:
-    """Return text for the page, with the indices of our letters lowered."""
-    return _INDEXED.sub(
+    """Return text for the page: indices of our letters lowered, words of a verdict colored."""
+    lowered = _INDEXED.sub(
         lambda found: "<i>{}</i><sub>{}</sub>".format(*found[1].split("_")), html(text)
     )
+    return _WORD.sub(lambda found: f'<span class="{_WORDS[found[0]]}">{found[0]}</span>', lowered)
 
 
 def _numbers(numbers: Sequence[Headline]) -> list[str]:
     if not numbers:
         return []
-    cards = []
-    for value, meaning, tone in numbers:
-        parts = [Marked(value)] if isinstance(value, str) else value
-        pair = ' class="pair"' if len(parts) > 1 else ""
-        given = "".join(f"<dd{pair}>{_marked(one)}</dd>" for one in parts)
-        cards.append(f"<div{_class(tone)}><dt>{_inline(meaning)}</dt>{given}</div>")
+    cards = [
+        f"<div{_class(tone)}><dt>{_inline(meaning)}</dt><dd>{_inline(value)}</dd></div>"
+        for value, meaning, tone in numbers
+    ]
     return ['<dl class="numbers">', *cards, "</dl>"]
 
 
@@ -241,20 +263,60 @@ def _marked(one: Marked) -> str:
     return text + (f'<small class="unknown">{_inline(one.note)}</small>' if one.note else "")
 
 
-def _warnings(warnings: Sequence[str | Marked]) -> list[str]:
-    if not warnings:
-        return ['<p class="fine">No warnings.</p>']
-    marked = [one if isinstance(one, Marked) else Marked(one) for one in warnings]
-    refused = any(one.tone == "bad" for one in marked)
-    lines = [f"<li{_class(one.tone)}>{_inline(one.text)}</li>" for one in marked]
-    return [f'<ul class="warnings{" refusals" if refused else ""}">', *lines, "</ul>"]
+def _as_one(notes: Iterable[Note], varies: str, key: Callable[[Note], str]) -> list[list[Note]]:
+    """Return notes that say the same but for what varies, together."""
+    found: dict[tuple[str, ...], list[Note]] = {}
+    for one in notes:
+        found.setdefault((one.tone, key(one), re.sub(varies, "#", one.text)), []).append(one)
+    return list(found.values())
+
+
+def _listed(words: Iterable[str], last: str = " and ", between: str = ", ") -> str:
+    """Return words in one: a, b and c; those that are all alike once."""
+    *others, end = words
+    return end if {*others} <= {end} else between.join(others) + last + end
+
+
+def _text_of(notes: Sequence[Note], varies: str, *signs: str) -> str:
+    parts = zip(*(re.split(f"({varies})", one.text) for one in notes), strict=True)
+    return "".join(_listed(part, *signs) for part in parts)
+
+
+def merged(notes: Iterable[str | Note]) -> list[Note]:
+    """Return notes with each finding once: axles and drives of the same in one, refusals first."""
+    given = (one if isinstance(one, Note) else Note(one) for one in notes)
+    of_drives = [
+        some[0]._replace(text=_text_of(some, _VARIES_BY_AXLE, " / ", " / "))
+        for some in _as_one(dict.fromkeys(given), _VARIES_BY_AXLE, lambda one: one.where)
+    ]
+    found = [
+        Note(_text_of(some, _VARIES), some[0].tone, _listed(one.where for one in some))
+        for some in _as_one(of_drives, _VARIES, lambda one: str(bool(one.where)))
+    ]
+    return sorted(found, key=lambda one: ("bad", "doubt", "").index(one.tone))
+
+
+def _notes(notes: Sequence[str | Note]) -> list[str]:
+    found = merged(notes)
+    lines = [
+        f"<li{_class(tone)}>{_inline(f'{where}: {text}' if where else text)}</li>"
+        for text, tone, where in found
+    ]
+    first, rest = lines[:_NOTES], lines[_NOTES:]
+    if not lines:
+        return ['<p class="fine">No notes.</p>']
+    refused = any(one.tone == "bad" for one in found)
+    folded = f"{len(rest)} more note{'s' * (len(rest) > 1)}"
+    more = ["<details>", f"<summary>{folded}</summary>", "<ul>", *rest, "</ul>", "</details>"]
+    opening = f'<div class="notes{" refusals" if refused else ""}">'
+    return [opening, "<ul>", *first, "</ul>", *(more if rest else []), "</div>"]
 
 
 def _table(table: Table, number: int) -> str:
     columns = list(zip(*table.rows, strict=True)) or [()] * len(table.header)
     words = table.verbatim
-    opening = '<table class="verbatim">' if words else "<table>"
-    numeric = [any(_is_number(cell) for cell in column) and not words for column in columns]
+    kind = "verbatim" if words else "wide" if len(table.header) >= _WIDE else "narrow"
+    numeric = [_numbers_in(column) and not words for column in columns]
     kinds = [' class="number"' if right else "" for right in numeric]
     header = "".join(
         f'<th scope="col"{kind}>{_inline(name)}</th>'
@@ -263,13 +325,20 @@ def _table(table: Table, number: int) -> str:
     lines = [
         '<figure class="table">',
         f"<figcaption><b>Table {number}.</b> {_inline(table.caption)}</figcaption>",
-        f'<div class="scroll">{opening}\n<thead><tr>{header}</tr></thead>\n<tbody>',
+        f'<div class="scroll"><table class="{kind}">\n<thead><tr>{header}</tr></thead>\n<tbody>',
     ]
     for row in table.rows:
-        written = [html(_text(one)) if words else _marked(_of(one)) for one in row]
-        cells = (f"<td{kind}>{one}</td>" for one, kind in zip(written, kinds, strict=True))
+        written = [html(_text(one)) if words else _in_cell(_marked(_of(one))) for one in row]
+        cells = (
+            f'<td data-of="{html(name)}"{kind}>{one}</td>'
+            for name, one, kind in zip(table.header, written, kinds, strict=True)
+        )
         lines.append(f"<tr>{''.join(cells)}</tr>")
     return "\n".join([*lines, "</tbody>\n</table></div>", "</figure>"])
+
+
+def _in_cell(markup: str) -> str:
+    return _BREAKS.sub(r"\1<wbr>", _JOINED.sub("\N{NO-BREAK SPACE}", markup))
 
 
 def _picture(picture: Picture, number: int) -> str:
@@ -292,6 +361,12 @@ def _picture(picture: Picture, number: int) -> str:
 
 def _of(cell: Cell) -> Marked:
     return cell if isinstance(cell, Marked) else Marked(_text(cell))
+
+
+def _numbers_in(column: Sequence[Cell]) -> bool:
+    """Return whether at least half of the cells that are not empty are numbers."""
+    given = [cell for cell in column if cell is not None and _text(cell) not in ("", "-")]
+    return bool(given) and 2 * sum(map(_is_number, given)) >= len(given)
 
 
 def _is_number(cell: Cell) -> bool:

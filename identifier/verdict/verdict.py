@@ -12,6 +12,7 @@ from identifier.verdict.friction import RoadFriction
 
 LARGEST_MODEL_ERROR = 0.12  # share of the force, rms, that the frozen model may miss at an axle
 PERCENT = 100.0
+BEYOND_KNOWN = "beyond_known"  # code of the finding that a drive slips beyond the identified range
 
 UNOBSERVABLE = (
     "a wrong mass, which scales all forces alike: weigh the car",
