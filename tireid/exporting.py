@@ -116,7 +116,8 @@ def export(
         except CannotFreezeError:  # a filter of forces learns nothing that a run could begin with
             start = None
         if method.whole and start is not None:
-            method = continuing(start, car, method.dt)
+            measured = source.recording.logged_v_y is not None
+            method = continuing(start, car, method.dt, v_y=measured)
     elif isinstance(source, TireModel):
         start, car = source, vehicle or source.vehicle
         method = continuing(source, car)

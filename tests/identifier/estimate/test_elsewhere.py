@@ -17,6 +17,7 @@ from identifier.estimate.posterior import Reach
 from identifier.estimate.priors import Priors
 from identifier.export.onnx import onnx_bytes
 from identifier.export.package import build_package
+from identifier.inertial import InertialIdentifier
 from identifier.methods import continuing
 from identifier.motion.parameters import INDEX
 from identifier.run import identify
@@ -138,6 +139,10 @@ def test_a_run_of_a_fit_is_exported_to_go_on_learning(drive, fitted, tmp_path, m
     step = ti.export(run, tmp_path / "ecu").package.specialized
     assert isinstance(step.method, AxleIdentifier)
     np.testing.assert_allclose(step.carry["W"], begun(fitted).W)
+    blind = ti.identify(replace(drive, v_y=None), CAR)
+    assert isinstance(
+        ti.export(blind, tmp_path / "imu").package.specialized.method, InertialIdentifier
+    )
 
 
 def test_a_fit_exports_on_another_car_by_its_loads(fitted):
