@@ -85,12 +85,16 @@ def test_a_quick_run_is_not_recorded(monkeypatch, capsys):
     assert "only all of the cases are recorded" in capsys.readouterr().err
 
 
+CAR = 'drive = 1\nif drive > 3:\n    raise ValueError(f"{drive} is too fast")'
+
+
 @pytest.mark.parametrize(
     ("file", "text", "other"),
     [
         ("benchmarks/lap.py", "from models.car import drive\n", True),
-        ("models/car.py", '"""Other words."""\n\ndrive = 1  # more\n', False),
-        ("models/car.py", "drive = 2\n", True),
+        ("models/car.py", f'"""Other words."""\n\n{CAR}  # more\n', False),
+        ("models/car.py", CAR.replace("too fast", "too slow"), False),
+        ("models/car.py", CAR.replace("1", "2"), True),
         ("models/step.c", "/* a comment */\nint   x;\n", False),
         ("models/step.c", "int y;\n", True),
         ("benchmarks/pit.py", "stops = 2\n", False),
@@ -101,7 +105,7 @@ def test_a_record_is_older_where_the_code_that_it_measured_changed(tmp_path, fil
         "benchmarks/lap.py": "from models.car import drive\nprint(drive)\n",
         "benchmarks/pit.py": "stops = 1\n",
         "models/__init__.py": "",
-        "models/car.py": '"""Words."""\ndrive = 1\n',
+        "models/car.py": f'"""Words."""\n{CAR}\n',
         "models/step.c": "int x;\n",
     }
     hashes = []
