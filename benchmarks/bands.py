@@ -57,8 +57,8 @@ def cases(*, quick: bool) -> Iterator[Case]:
     for one in random_cars(count=1) if quick else random_cars():
         first, second = one.others
         full = one.teach["full"]
-        yield Case("random", one.told, [full], [first], CORNER)
-        yield Case("random", one.told, [full, first], [second], CORNER)
+        yield Case("random", one.declared, [full], [first], CORNER)
+        yield Case("random", one.declared, [full, first], [second], CORNER)
     if quick or not DATA.is_dir():
         return
     runs = read("carmaker.csv.gz", CARMAKER_RUNS)

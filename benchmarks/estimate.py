@@ -86,7 +86,7 @@ class Taught(NamedTuple):
 class Driven(NamedTuple):
     """Drives of a random car: that teach, by kind, and two others."""
 
-    told: Vehicle
+    declared: Vehicle
     teach: dict[str, Recording]
     others: tuple[Recording, Recording]
 
@@ -129,7 +129,7 @@ def drives_of(kind: str, seed: int) -> Driven:
             break
         except PlantError:
             continue
-    return Driven(car.told, teach, (others[0], others[1]))
+    return Driven(car.declared, teach, (others[0], others[1]))
 
 
 @cache
@@ -182,7 +182,7 @@ def of_random_cars(count: int = CARS) -> dict[str, list[Taught]]:
     for one in random_cars(count):
         asked = tuple((other,) for other in one.others)
         for kind, log in one.teach.items():
-            found[kind].append(Taught(one.told, log, asked, since=CORNER))
+            found[kind].append(Taught(one.declared, log, asked, since=CORNER))
     return found
 
 
@@ -426,13 +426,13 @@ def judge_cost(targets: Targets) -> None:
     ----------
     targets : collects what is missed.
     """
-    one = next(one for one in random_cars() if one.told.name == "sedan")
+    one = next(one for one in random_cars() if one.declared.name == "sedan")
     log = one.teach["full"]
     spent = {}
     for name in (DEFAULT, LIVE):
-        learnt(log, one.told, name)  # compiled and warm
+        learnt(log, one.declared, name)  # compiled and warm
         begin = time.process_time()
-        learnt(log, one.told, name)
+        learnt(log, one.declared, name)
         spent[name] = (time.process_time() - begin) * 60.0 / log.duration
         targets.record(f"cost/{name}", spent[name])
     more = spent[DEFAULT] - spent[LIVE]

@@ -146,7 +146,7 @@ def lap_car(number: int, friction: float | None = None) -> LapCar:
     if not rng.integers(4):
         file = MagicFormula.from_tir(str(LIKE.require_chassis().tire))
         tires, own = (file, file), 1.0
-    vehicle = replace(car.told, chassis=car.vehicle.chassis)
+    vehicle = replace(car.declared, chassis=car.vehicle.chassis)
     course = courses()[number // 2 % 2]
     return LapCar(number, vehicle, tires, course, (drawn if friction is None else friction) / own)
 

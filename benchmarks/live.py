@@ -208,7 +208,7 @@ def watched(case: tuple[str, int]) -> Watched:
                 sensors = random_cars.good_sensors(car.vehicle)
                 dry, lost = (one.recording(sensors, rng) for one in (run, wet))
                 grip = SCALE * min(car.friction) * np.array(car.vehicle.axle_loads)
-                return _found(car.told, dry, lost, grip)
+                return _found(car.declared, dry, lost, grip)
 
 
 def _found(car: Vehicle, dry: Recording, wet: Recording, grip: Array) -> Watched:

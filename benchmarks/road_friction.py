@@ -132,7 +132,7 @@ def case(job: tuple[str, int]) -> dict[str, list[Asked]]:
     lesson, rng = drawn(kind, seed), np.random.default_rng([seed, 77])
     car, log = lesson.car, blind(lesson.log(rng))
     logs = {"with_v_y": log, "without_v_y": replace(log, v_y=None)}
-    models = {way: ti.identify(one, car.told, check=False).tire for way, one in logs.items()}
+    models = {way: ti.identify(one, car.declared, check=False).tire for way, one in logs.items()}
     less = np.exp(rng.uniform(math.log(LESS[0]), math.log(LESS[1]), DROPS))
     told: dict[str, list[Asked]] = {way: [] for way in WAYS}
     for ratio in (*[1.0] * SAME, *less.tolist(), *rng.uniform(*MORE, RISES).tolist()):

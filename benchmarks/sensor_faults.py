@@ -162,7 +162,7 @@ def drive_of(kind: str, number: int) -> tuple[Drive, float]:
     """
     drawn_drive = drawn(kind, FIRST_SEED + number)
     rng = np.random.default_rng([20, number, *kind.encode()])
-    car, recording = drawn_drive.car.told, replace(blind(drawn_drive.log(rng)), a_y=None)
+    car, recording = drawn_drive.car.declared, replace(blind(drawn_drive.log(rng)), a_y=None)
     history = identify(recording, car, _design(car))
     return Drive(car, recording, history.axle_force), float(doubted(history).mean())
 

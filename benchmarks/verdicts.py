@@ -97,7 +97,7 @@ def plant_answers(job: tuple[str, int]) -> list[Judged]:
         if fate == 1:
             make = partial(random_beginning, str(rng.choice(BEGINNINGS)))
         drive = drawn(kind, seed, make, k)
-        declared_one = drive.car.told
+        declared_one = drive.car.declared
         case = random_case(declared_one, rng) if fate == 2 else Case()
         log = drive.log(rng)
         judged = drive.cornering(log) if fate == 1 else drive.exact
@@ -182,7 +182,7 @@ def blind_answers(job: tuple[str, int]) -> list[Judged]:
     kind, seed = job
     drive, rng = inertial_drive(kind, seed), np.random.default_rng(seed)
     own = replace(drive.shown, v_y=None, axle_force=drive.exact.axle_force)
-    own, car = Repair(acceleration_sensor_x=drive.position[0]).apply(own, drive.told)
+    own, car = Repair(acceleration_sensor_x=drive.position[0]).apply(own, drive.declared)
     found = []
     for fault in ("", str(rng.choice(FAULTS))):
         case = blind_fault(fault, rng)

@@ -181,7 +181,7 @@ def of_car(job: tuple[str, int]) -> dict[str, Told]:
     job : class of the car, and seed.
     """
     drive = inertial_drive(*job)
-    found = runs(drive.shown, drive.told, drive.position)
+    found = runs(drive.shown, drive.declared, drive.position)
     return {name: judged(one, drive.exact, SLOWEST) for name, one in found.items()}
 
 

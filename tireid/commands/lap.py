@@ -120,8 +120,6 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"--laps must be a whole number, 1 or more, it is {n:g}")
     elif not path.closed:
         raise ValueError(f"--laps N drives a closed path N times: leave it out for {path.name}")
-    elif vehicle.chassis is None:
-        raise ValueError("--laps drives a car with a chassis: add --vehicle FILE, with [chassis]")
     with shared.folder_of(options) as folder:
         rows, completed = list[dict[str, float]](), True
         if n is None:

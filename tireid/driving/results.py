@@ -105,7 +105,7 @@ class Drives(NamedTuple):
         """All that goes into the drives, ready for JSON."""
         conditions, setup = self.conditions, self.conditions.setup
         v, chassis = setup.speeds(), setup.vehicle.require_chassis()
-        tire = None
+        tire = None if setup.tires is None else digest(repr(setup.tires))
         if chassis.tire is not None:  # a hash in place of its file
             tire = digest(Path(chassis.tire).read_text(errors="replace", encoding="utf-8"))
         return {
@@ -128,7 +128,7 @@ class Drives(NamedTuple):
             "weights_hash": None if self.learnt is None else digest(self.learnt.to_dict()),
             "plant": PLANT,
             "vehicle": vehicle_numbers(setup.vehicle),
-            "chassis": {**asdict(chassis), "tire": tire},
+            "chassis": {k: x for k, x in asdict(chassis).items() if x != ()} | {"tire": tire},
             "delay_ms": 1e3 * PERIOD * conditions.delay,
             "period_ms": 1e3 * PERIOD,
             "noise": conditions.noise,
@@ -244,23 +244,33 @@ def _drive_columns(drive: Drive) -> dict[str, Array]:
 
 
 def _known_curves(runs: _Runs, setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
-    """Return the tires of the trackers, and the linear and the true tire beside it."""
-    models = {LINEAR: prediction_tire(setup.vehicle)}
+    """Return the tires of the trackers, and the linear and the true tire beside it.
+
+    An identified one is NaN beyond the slip up to which it was identified.
+    """
+    models, known = {LINEAR: prediction_tire(setup.vehicle)}, {}
     if learnt is not None:
         models[FROZEN] = prediction_tire(learnt, setup.vehicle)
+        known[FROZEN] = learnt.known_slip
     for run in runs:
         if run.label != LEARNING:
             models[run.label] = run.model
         if run.label != ORACLE and run.final is not run.model:
             models[run.label + AT_THE_END] = run.final
+            since = [one.slip for one in run.known if (one.steering == run.final.weights).all()]
+            known[run.label + AT_THE_END] = next(iter(since), None)
     with suppress(CurveFitError):  # a true tire that no curve can follow is not drawn
         models[ORACLE] = setup.oracle()
         if setup.drops:
             models[ORACLE + AT_THE_END] = setup.oracle(setup.drops[-1][1])
     v_x, slip = float(setup.speeds().mean()), np.linspace(-0.35, 0.35, 281)
-    return [
-        TireCurve(label, slip, curves_at(model, slip, v_x).T) for label, model in models.items()
-    ]
+    curves = []
+    for label, model in models.items():
+        force, end = curves_at(model, slip, v_x).T, known.get(label)
+        if end is not None:
+            force = np.where(np.abs(slip)[:, None] > end, np.nan, force)
+        curves.append(TireCurve(label, slip, force))
+    return curves
 
 
 def write_drive_report(
@@ -283,6 +293,7 @@ def write_drive_report(
                 first.drive.vehicle,
                 (),
                 tires=drives.source,
+                **({"simulated_car": assumed} if (assumed := first.drive.vehicle.assumed) else {}),
                 all_inputs=f"hash {digest(drives.inputs)}, listed in summary.json",
             ),
         ],
@@ -404,7 +415,8 @@ def known_blocks(runs: _Runs, figures: Images) -> list[Block]:
             f"{100.0 * given.within_two_sd:.0f} % of the errors within two standard deviations"
         )
     captions = {
-        "tires": "Forces of the first drive, and the tire models of the trackers.",
+        "tires": "Forces of the first drive, and the tire models of the trackers. An identified "
+        "curve ends at the slip up to which it was identified.",
         "lateral": f"Lateral velocity, which no sensor measured{lateral}.",
     }
     blocks: list[Block] = [*drawings(figures, captions)]

@@ -33,10 +33,9 @@ from mpc.handover.judge import Judge, Window
 from mpc.handover.road import RoadWatch, at_friction, fit_friction
 from mpc.handover.rules import Rules
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.live.clock import Clock, Instant
+from tireid.live.clock import DT, Clock, Instant
 from tireid.live.state import LIVE, SLIP, STORED, Counts, Point, State
 
-DT = 0.01  # s between two instants of the recursion
 EVERY = 20  # instants between two states
 AT_ONCE = 5  # samples that are taken together
 LOOK = 10  # instants between two looks at the road; with twice the evidence that drives ask for

@@ -88,7 +88,7 @@ def test_what_is_no_force_curve_is_refused(car):
     wave = np.sin(100.0 * alpha)
     with pytest.raises(CurveFitError, match=r"rear force curve is fitted to .* % of its peak only"):
         fitted_ladder(alpha, np.stack([np.tanh(10.0 * alpha), wave]))
-    with pytest.raises(VehicleError, match=r"no \[chassis\]"):
+    with pytest.raises(VehicleError, match=r"add \[chassis\]"):
         oracle_tire(replace(car, chassis=None))
     with pytest.raises(
         VehicleError, match=r'names no tire file .* declare it by tire = "my_tire.tir"'
