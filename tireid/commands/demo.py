@@ -254,7 +254,9 @@ def _learn(found: Results, figures: Images) -> Section:
 
 
 def _predict(story: Story, figures: Images) -> Section:
-    columns = ["frozen", "of rms"]
+    columns = [
+        f"{who}, {what}" for who in ("axle", "paper") for what in ("online", "frozen", "of rms")
+    ]
     blocks: list[Block] = [
         (
             "The same frozen weights predict two maneuvers that were not used for "
@@ -263,7 +265,7 @@ def _predict(story: Story, figures: Images) -> Section:
         Table(
             "RMSE of the axle force, both axles together [kN], and the frozen error as a "
             "share of the rms force.",
-            ["drive", "axle, online", *columns, "paper, online", *columns],
+            ["drive", *columns],
             [[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
