@@ -54,8 +54,8 @@ def locked(text: str) -> Iterator[dict[str, Any]]:
 
 
 def bundled() -> dict[str, Any]:
-    """Return the component that lies in the wheel itself: the library of the live page's charts."""
-    script = (ROOT / "tireid/live/uplot/uPlot.iife.min.js").read_bytes()
+    """Return the component that lies in the wheel itself: the library of charts in pages."""
+    script = (ROOT / "tireid/uplot/uPlot.iife.min.js").read_bytes()
     version = script.partition(b"(v")[2].partition(b")")[0].decode()
     return {
         "type": "library",

@@ -70,8 +70,12 @@ def _block(name: str, known: Mapping[str, Record]) -> str:
     else:
         table = _tables(scripts[0])(known[scripts[0]]["values"])[name]
     notes = [_state(script, known[script]) for script in scripts]
-    if name in scripts and (missed := "; ".join(known[name]["missed"])):
-        notes.append(f"Targets missed: {missed}.")
+    missed = [one for script in scripts for one in known[script]["missed"]]
+    if name == "summary":
+        count = sum(known[script]["met"] for script in scripts) + len(missed)
+        notes.append(f"Targets missed: {len(missed)} of {count}.")
+    elif name in scripts and missed:
+        notes.append(f"Targets missed: {'; '.join(missed)}.")
     return f"{_grid(table)}\n\n{textwrap.fill(' '.join(notes), WIDTH, break_on_hyphens=False)}"
 
 
@@ -175,6 +179,8 @@ def main(argv: list[str] | None = None) -> int:
         print(f"{path.relative_to(ROOT)}: {'differs' if check else 'written'}")
         if not check:
             path.write_text(new, encoding="utf-8")
+    older = [script for script, record in known.items() if record["code"] != _code(script)]
+    print(f"{len(older)} of {len(known)} records are older than the code:", *older)
     return 1 if check and differing else 0
 
 

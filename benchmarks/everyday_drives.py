@@ -148,4 +148,4 @@ def everyday_log(kind: str, seed: int) -> tuple[Recording, Vehicle, Recording]:
     """
     drive = drawn_everyday(kind, KINDS[(seed // 2) % len(KINDS)], seed)
     log = replace(drive.log(np.random.default_rng([seed, 1])), axle_force=None)
-    return replace(log, a_y=None) if seed % 2 else log, drive.car.told, drive.exact
+    return replace(log, a_y=None) if seed % 2 else log, drive.car.declared, drive.exact

@@ -69,6 +69,16 @@ def on_arm(targets: Targets) -> None:
                     targets.at_most(f"{name}, {SMALL}, float: {what}", value, limits[what], "")
 
 
+def canary() -> Values:
+    """Return how many operations and carried numbers the step of each package has."""
+    car, found = sedan(), {}
+    for name in (REFERENCE, LIVE):
+        step = build_package(make_method(name, car), car).specialized
+        found[f"{name}/operations"] = step.function.n_instructions()
+        found[f"{name}/carried"] = sum(one.size for one in step.carry.values())
+    return found
+
+
 def tables(v: Values) -> dict[str, Table]:
     """Return the tables of the documents.
 
@@ -107,7 +117,7 @@ def main() -> int:
         show("costs on Arm", f"not measured, missing: {', '.join(absent)}")
     elif not options.quick:
         on_arm(targets)
-    return targets.finish(keep=options.record and not absent)
+    return targets.finish(canary, keep=options.record and not absent)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 """What a record measured: one hash of the code that its benchmark runs.
 
 It takes the script, every module of the project that it imports, directly or not, and the C beside
-them; a script that starts `-m tireid` runs all of tireid. Comments, docstrings and layout do not
-count.
+them; a script that starts `-m tireid` runs all of tireid. Comments, docstrings, layout
+and the words of errors do not count.
 """
 
 import ast
@@ -16,10 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 FOLDERS = {"tireid_rivals": "benchmarks/rivals"}  # of packages that are not in the root
 PACKAGES = ("benchmarks", "codegen", "identifier", "models", "mpc", "tireid", *FOLDERS)
 BOOKS = {"benchmarks.targets", "benchmarks.fingerprint"}  # write down, measure nothing
-IGNORED = {
-    ".py": re.compile(r'"""(?:.|\n)*?"""|^\s*#.*$|  # .*$', re.M),
-    ".c": re.compile(r"/\*(?:.|\n)*?\*/|//.*$", re.M),
-}
+C_COMMENT = re.compile(r"/\*(?:.|\n)*?\*/|//.*$", re.M)
 DIGITS = 12  # of a hash
 
 
@@ -92,5 +89,20 @@ def _names(source: str) -> Iterator[str]:
 
 @cache
 def _plain(path: Path) -> str:
-    ignored = IGNORED[".py" if path.suffix == ".py" else ".c"]
-    return " ".join(ignored.sub("", path.read_text(encoding="utf-8")).split())
+    text = path.read_text(encoding="utf-8")
+    if path.suffix != ".py":
+        return " ".join(C_COMMENT.sub("", text).split())
+    return ast.unparse(_Measured().visit(ast.parse(text)))
+
+
+class _Measured(ast.NodeTransformer):
+    """Takes out what no number hangs on."""
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST | None:
+        return None if isinstance(node.value, ast.Constant) else node
+
+    def visit_Raise(self, node: ast.Raise) -> ast.AST:
+        for one in ast.walk(node):
+            if isinstance(one, ast.Constant) and isinstance(one.value, str):
+                one.value = ""
+        return node

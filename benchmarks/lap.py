@@ -55,7 +55,6 @@ STEP = 1.02  # of the share of the limits
 SAFE = 3.85  # sd of the margin: at most 1 of 1000 unsafe, 95 % sure of it from 40 normal ones
 TRUE_SHARE = 0.95  # of the true limit
 A_Y_STEP = 0.05 * GRAVITY  # m/s², steps of the given acceleration
-LEAVES = 0.92  # of the true limit, near which cars leave: where a search begins
 _FEW = 8  # cars that are driven at a given acceleration before the next ones
 DAYS = 1000  # added to the seed of the noise of each car
 
@@ -146,7 +145,7 @@ def lap_car(number: int, friction: float | None = None) -> LapCar:
     if not rng.integers(4):
         file = MagicFormula.from_tir(str(LIKE.require_chassis().tire))
         tires, own = (file, file), 1.0
-    vehicle = replace(car.told, chassis=car.vehicle.chassis)
+    vehicle = replace(car.declared, chassis=car.vehicle.chassis)
     course = courses()[number // 2 % 2]
     return LapCar(number, vehicle, tires, course, (drawn if friction is None else friction) / own)
 
@@ -246,7 +245,7 @@ def margin_of(car: LapCar, tire: TireModel, limit: float) -> float:
     limit : true one, near which the search begins [m/s²].
     """
     limits, step = first_limits(tire), math.log(STEP)
-    guess = round(math.log(LEAVES * limit / (SHARE * float(limits.a_y[0]))) / step)
+    guess = round(math.log(limit / (SHARE * float(limits.a_y[0]))) / step)
     return step * last_safe(lambda k: is_safe(car.drive(tire, limits, SHARE * STEP**k)), guess)
 
 
@@ -391,6 +390,17 @@ def judge_dry(targets: Targets, cars: Sequence[Dry]) -> None:
     targets.at_most("false alarms of 100 dry laps", 100.0 * alarms / laps, 1.0, "")
 
 
+def canary() -> Values:
+    """Return what one car plans for its first lap, and the true limit."""
+    car = lap_car(0)
+    limits = first_limits(car.learnt())
+    return {
+        "limit": car.limit,
+        "a_y": float(limits.a_y[0]),
+        "planned": planned(car.course, limits, SHARE).lap_time,
+    }
+
+
 def tables(v: Values) -> dict[str, Table]:
     """Return the tables of the documents.
 
@@ -429,7 +439,7 @@ def main() -> int:
         judge_laps(targets, found)
         judge_given(targets, found, *fastest_given(pool, found))
         judge_dry(targets, list(pool.map(dry_and_wet, range(wet), [laps] * wet)))
-    return targets.finish(keep=options.record)
+    return targets.finish(canary, keep=options.record)
 
 
 if __name__ == "__main__":

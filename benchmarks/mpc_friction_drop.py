@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.mpc_cases import Case, Score, all_driven, median_cm, share_of_limit
+from benchmarks.mpc_cases import Case, Score, all_driven, driven, median_cm, share_of_limit
 from benchmarks.targets import Table, Targets, Values, parse
 from mpc.path import slalom
 
@@ -39,6 +39,14 @@ SEEDS = 10
 def left(score: Score) -> bool:
     """Return whether a car has left its path."""
     return not score.completed or score.peak > WITHIN
+
+
+def canary() -> Values:
+    """Return the deviation of one drive that learns as friction drops [m]."""
+    percent, place, _ = COURSES["iso-3888-1"]
+    words = ("--mu-drop", f"{place:g}:{WET}")
+    found = driven(Case("iso-3888-1", share_of_limit(percent, 1.0), 1.0, "learning", 0, words))
+    return {"rms": found.rms, "peak": found.peak}
 
 
 def tables(v: Values) -> dict[str, Table]:
@@ -88,7 +96,7 @@ def main() -> int:
             targets.at_most(f"{key}: cars that left", lost, 0, "", key=f"{key}/left")
         else:
             targets.record(f"{key}/left", lost)
-    return targets.finish(keep=options.record)
+    return targets.finish(canary, keep=options.record)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ from models.tires import DugoffTire, FialaTire, MagicFormula, Tire
 from models.vehicle import FULL_SIZE, GRAVITY, Chassis, Vehicle, sedan
 
 FIRST_SEED = 1000
-LIKE = sedan()  # to whose size noise and faults are told
+LIKE = sedan()  # to whose size noise and faults are scaled
 TIRES = ("fiala", "dugoff", "magic_formula")
 LEAD, DRIVEN = 8.0, 30.0  # s straight, s of swings
 REACHED, SPIN, SLOWED = 0.5, 0.45, 0.5  # of the grip; |v_y/v_x|; of the wanted speed
@@ -105,13 +105,13 @@ CLASSES: Mapping[str, CarClass] = {
 
 @dataclass(frozen=True, kw_only=True)
 class RandomCar:
-    """A car on its tires, and what is told of it.
+    """A car on its tires, and what is declared of it.
 
     Parameters
     ----------
     kind : one of `CLASSES`.
     vehicle : the car that drives, with chassis; its stiffnesses are those of its tires.
-    told : the same without chassis, its stiffnesses off by 0.7 to 1.4.
+    declared : the same without chassis, its stiffnesses off by 0.7 to 1.4.
     tires : of the front and the rear wheels.
     friction : of the front and the rear tires [-].
     frequency : of its steering [Hz].
@@ -119,7 +119,7 @@ class RandomCar:
 
     kind: str
     vehicle: Vehicle
-    told: Vehicle
+    declared: Vehicle
     tires: tuple[Tire, Tire]
     friction: tuple[float, float]
     frequency: float
@@ -180,7 +180,7 @@ def random_car(kind: str, rng: np.random.Generator) -> RandomCar:
     return RandomCar(
         kind=kind,
         vehicle=replace(plain, chassis=_chassis(drawn, plain, rng)),
-        told=replace(
+        declared=replace(
             plain,
             cornering_stiffness_front=front * plain.cornering_stiffness_front,
             cornering_stiffness_rear=rear * plain.cornering_stiffness_rear,
@@ -557,7 +557,7 @@ class InertialDrive(NamedTuple):
     """
 
     kind: str
-    told: Vehicle
+    declared: Vehicle
     shown: Recording
     exact: Recording
     position: tuple[float, float]
@@ -629,5 +629,5 @@ def _inertial(car: RandomCar, rng: np.random.Generator) -> InertialDrive | None:
         delta_f=exact.delta_f - zero + 5e-4 * rng.normal(size=n),
         axle_force=None,
     )
-    told = (x + 0.01 * L * rng.normal(), y + 0.01 * L * rng.normal())
-    return InertialDrive(car.kind, car.told, shown, exact, told)
+    position = (x + 0.01 * L * rng.normal(), y + 0.01 * L * rng.normal())
+    return InertialDrive(car.kind, car.declared, shown, exact, position)

@@ -14,7 +14,7 @@ to 105.
 import math
 import sys
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
@@ -132,20 +132,38 @@ def case(job: tuple[str, int]) -> dict[str, list[Asked]]:
     lesson, rng = drawn(kind, seed), np.random.default_rng([seed, 77])
     car, log = lesson.car, blind(lesson.log(rng))
     logs = {"with_v_y": log, "without_v_y": replace(log, v_y=None)}
-    models = {way: ti.identify(one, car.told, check=False).tire for way, one in logs.items()}
+    models = {way: ti.identify(one, car.declared, check=False).tire for way, one in logs.items()}
     less = np.exp(rng.uniform(math.log(LESS[0]), math.log(LESS[1]), DROPS))
     told: dict[str, list[Asked]] = {way: [] for way in WAYS}
     for ratio in (*[1.0] * SAME, *less.tolist(), *rng.uniform(*MORE, RISES).tolist()):
-        drive = driven(car, ratio, rng)
-        if drive is None:
-            continue
-        exact, change = drive
-        shown = blind(car.sensors.apply(exact, rng))
-        for way, one in (("with_v_y", shown), ("without_v_y", replace(shown, v_y=None))):
-            wrong = wrong_at(models["with_v_y"], exact, change)
-            found = asked(models[way], one, ratio, change, wrong)
-            if found is not None:
-                told[way].append(found)
+        for way, found in of_drive(car, models, ratio, rng).items():
+            told[way].append(found)
+    return told
+
+
+def of_drive(
+    car: RandomCar, models: Mapping[str, ti.TireModel], ratio: float, rng: np.random.Generator
+) -> dict[str, Asked]:
+    """Return what stored models tell of a drive on another road, where they tell anything.
+
+    Parameters
+    ----------
+    car : that drives.
+    models : with_v_y, and maybe without.
+    ratio : friction after the change.
+    rng : source of randomness.
+    """
+    drive, told = driven(car, ratio, rng), {}
+    if drive is None:
+        return {}
+    exact, change = drive
+    shown = blind(car.sensors.apply(exact, rng))
+    for way, model in models.items():
+        log = shown if way == "with_v_y" else replace(shown, v_y=None)
+        wrong = wrong_at(models["with_v_y"], exact, change)
+        found = asked(model, log, ratio, change, wrong)
+        if found is not None:
+            told[way] = found
     return told
 
 
@@ -160,7 +178,7 @@ def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
     """
     early = 100.0 * float(np.mean([one.early for one in every]))
     targets.record(f"{way}/drives", len(every))
-    label = f"{way}: drives with a road that is none"
+    label = f"{way.replace('_', ' ', 1)}: false alarms"
     targets.at_most(label, early, 1.0, key=f"{way}/early")
     for name, some in (
         ("drop", [one for one in every if one.ratio < 1.0]),
@@ -177,8 +195,19 @@ def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
         if name == "drop":
             off = [abs(one.told / one.ratio - 1.0) for one in slid if not math.isnan(one.told)]
             soon = 100.0 * float(np.mean(after <= SOON))
-            targets.at_least(f"{way}: told within 1 s", soon, 90.0, key=f"{way}/drop/soon")
+            label = f"{way.replace('_', ' ', 1)}: detected within 1 s"
+            targets.at_least(label, soon, 90.0, key=f"{way}/drop/soon")
             print(f"  median {np.median(after):.2f} s, size off by {100.0 * np.median(off):.1f} %")
+
+
+def canary() -> Values:
+    """Return what a stored model tells of one drop of friction."""
+    lesson, rng = drawn("sedan", FIRST_SEED), np.random.default_rng(0)
+    models = {
+        "with_v_y": ti.identify(blind(lesson.log(rng)), lesson.car.declared, check=False).tire
+    }
+    (found,) = of_drive(lesson.car, models, 0.5, rng).values()
+    return found._asdict()
 
 
 def tables(v: Values) -> dict[str, Table]:
@@ -211,7 +240,7 @@ def main() -> int:
                 every[way] += some
     for way in WAYS:
         report(way, every[way], targets)
-    return targets.finish(keep=options.record)
+    return targets.finish(canary, keep=options.record)
 
 
 if __name__ == "__main__":

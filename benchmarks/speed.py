@@ -32,7 +32,7 @@ import numpy as np
 import tireid as ti
 from benchmarks.everyday_drives import drawn_everyday
 from benchmarks.targets import Table, Targets, Values, show
-from identifier.methods import LIVE, REFERENCE, make_method
+from identifier.methods import DEFAULT, LIVE, REFERENCE, make_method
 from models.maneuvers import Slalom
 from models.plant import Plant
 from models.recordings import Recording, write_recording
@@ -239,6 +239,18 @@ def methods(targets: Targets, repeats: int) -> None:
         show(f"45 s, {name}", f"{value:.2f} ms")
 
 
+def canary() -> Values:
+    """Return what the work that is timed gives: the plant's a_y, and forces of each method."""
+    car = sedan()
+    log = Plant(car).simulate(SLALOM, speed=20.0).recording()
+    runs = {
+        name: ti.identify(log, car, make_method(name, car), check=False)
+        for name in (REFERENCE, LIVE, DEFAULT)
+    }
+    forces = {name: float(np.std(run.history.axle_force)) for name, run in runs.items()}
+    return {"a_y": float(np.std(log.needed("a_y"))), **forces}
+
+
 def tables(v: Values) -> dict[str, Table]:
     """Return the table of the documents.
 
@@ -298,7 +310,7 @@ def main() -> int:
             fleet(targets, checkouts, folder)
             fits(targets, checkouts)
     methods(targets, 2 if options.quick else 30)
-    return targets.finish(keep=options.record and not options.quick)
+    return targets.finish(canary, keep=options.record and not options.quick)
 
 
 if __name__ == "__main__":

@@ -1,15 +1,15 @@
 """What a benchmark measured: numbers by key beside their targets, printed, and recorded.
 
 `Targets("mpc_worth")` collects under the name of the script; with `--record` it writes
-benchmarks/results/mpc_worth.json, with the date and a hash of the code that it measured. The
-script's `tables` make the tables of the documents of it. A missed target is printed, recorded, and
-an exit code of 1.
+benchmarks/results/mpc_worth.json, with the date, a hash of the code that it measured, and the
+script's `canary`: a cheap case that a test computes again. The script's `tables` make the tables of
+the documents of it. A missed target is printed, recorded, and an exit code of 1.
 """
 
 import argparse
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -82,15 +82,16 @@ class Targets:
         if good:
             self.met += 1
         else:
-            self.missed.append(f"{label} ({limit.strip()})")
+            self.missed.append(f"{label} ({limit.strip(' -')})")
         verdict = "ok" if good else "MISSED"
         print(f"  {label:66} {value:8.2f} {unit:3} target {limit}  {verdict}", flush=True)
 
-    def finish(self, *, keep: bool) -> int:
+    def finish(self, canary: Callable[[], Values], *, keep: bool) -> int:
         """Say how many targets were met; return the exit code, 1 where one was missed.
 
         Parameters
         ----------
+        canary : returns numbers of a cheap case, none of them near zero or a time.
         keep : write the record.
         """
         if keep:
@@ -102,6 +103,7 @@ class Targets:
                 "code": fingerprint(self.script),
                 "missed": self.missed,
                 "met": self.met,
+                "canary": dict(canary()),
                 "values": self.values,
             }
             path.write_text(json.dumps(text, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -7,6 +7,7 @@ from codegen.arrays import Array
 from identifier.band import UNCALIBRATED
 from identifier.day import Day
 from identifier.evidence import MotionError, motion_error
+from identifier.measured import with_doubt
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.tire_model import TireModel
 from identifier.verdict import RoadFriction, Verdict, friction_of, judge_prediction
@@ -39,8 +40,8 @@ class Prediction:
             return f"<Prediction of {name!r}: no true forces to compare with{given}>"
         front, rear = 100.0 * error.front / size.front, 100.0 * error.rear / size.rear
         return (
-            f"<Prediction of {name!r}: {error.front:.0f} / {error.rear:.0f} N rms error, "
-            f"{front:.1f} / {rear:.1f} % of the force, front / rear>"
+            f"<Prediction of {name!r}: {with_doubt(error.front)} / {with_doubt(error.rear)} N rms "
+            f"error, {front:.1f} / {rear:.1f} % of the force, front / rear>"
         )
 
     @cached_property

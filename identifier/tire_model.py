@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from codegen import markup
 from codegen.arrays import Array
 from codegen.escape import displayed
 from identifier.band import AXLES as AXLES
@@ -37,6 +38,8 @@ if TYPE_CHECKING:  # what some models answer with
 
 # As summaries and verdicts name what is learnt of an axle.
 STIFFNESS, GRIP, RELAXATION = "cornering stiffness", "grip", "relaxation length"
+# A chart of the curves: points, and how far beyond the known slip; where that is unknown, to where.
+_POINTS, _REACH, _UNKNOWN_REACH = 81, 1.25, 0.15  # [-], [-], rad
 
 
 class _TireFunctions(NamedTuple):
@@ -385,6 +388,16 @@ class TireModel(ABC):
         It begins with the share of the force that the model misses where that is known: of a
         model of `calibrated`, also stored and read again. Without, ± knows of noise only.
         """
+        rows = self._rows()
+        widths = [max(len(row[k]) for row in rows) for k in range(3)]
+        lines = [f"{type(self).__name__} of {self.vehicle.name!r}"]
+        for row in rows:
+            cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
+            lines.append("  ".join(cells).rstrip())
+        return "\n".join([*lines, *self._remarks()])
+
+    def _rows(self) -> list[list[str]]:
+        """Return the estimates as a table; its first row is the header."""
         error = self.model_error
         rows = [["", *AXLES]]
         if error is not None:
@@ -398,16 +411,33 @@ class TireModel(ABC):
         rows += [[title, *(cells.get(axle, "") for axle in AXLES)]
                  for title, cells in by_title.items()]  # fmt: skip
         rows += [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in self.facts()]
-        widths = [max(len(row[k]) for row in rows) for k in range(3)]
-        lines = [f"{type(self).__name__} of {self.vehicle.name!r}"]
-        for row in rows:
-            cells = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=True))
-            lines.append("  ".join(cells).rstrip())
-        if self.band is not None:
-            lines.append(f"band: {self.band.origin}")
-        if self.vehicle.estimates:
-            lines.append(self.vehicle.estimates)
-        return "\n".join(lines)
+        return rows
+
+    def _remarks(self) -> list[str]:
+        band = [] if self.band is None else [f"band: {self.band.origin}"]
+        return [*band, self.vehicle.estimates] if self.vehicle.estimates else band
+
+    def _repr_html_(self) -> str:
+        known = np.full(2, np.inf) if self.known_slip is None else self.known_slip
+        reach = _REACH * float(known.max())
+        slip = np.linspace(-1.0, 1.0, _POINTS) * (reach if 0.0 < reach < np.inf else _UNKNOWN_REACH)
+        force, ends = self.force(slip), () if self.band is None else self.band.at(slip)
+        curves = [
+            markup.Curve(
+                axle,
+                color,
+                force[:, k] / 1e3,
+                np.abs(slip) <= known[k],
+                [end[:, k] / 1e3 for end in ends],
+            )
+            for k, (axle, color) in enumerate(zip(AXLES, markup.AXLE_COLORS, strict=True))
+        ]
+        return markup.card(
+            markup.line(f"of {self.vehicle.name}", type(self).__name__),
+            markup.table(self._rows()),
+            markup.chart(np.degrees(slip), curves, "slip angle [deg]", "lateral force [kN]"),
+            *map(markup.line, self._remarks()),
+        )
 
     def casadi_function(self) -> _TireFunctions:
         """Return force curve, equations of motion and prediction step, the weights in them.

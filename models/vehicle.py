@@ -63,6 +63,8 @@ class Chassis:
     drive_front_share : share of the front axle in the driving force [-].
     brake_front_share : the same of the braking force [-].
     tire : property file (.tir) of all four tires, or None where a tire object is handed over.
+    estimated : names of the numbers that nobody stated, see `typical_chassis`; two that differ in
+        it alone are equal.
     """
 
     track_front: float
@@ -82,14 +84,60 @@ class Chassis:
     drive_front_share: float
     brake_front_share: float = 0.62
     tire: Path | None = None
+    estimated: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
+        if not set(self.estimated) <= {one.name for one in fields(self)}:
+            raise VehicleError(f"estimated must name numbers of a chassis, not {self.estimated}")
         centers = ("roll_center_height_front", "roll_center_height_rear")
         for (low, high), names in (*_RANGES.items(), ((0.0, self.cg_height), centers)):
             values = {name: getattr(self, name) for name in names}
             if low > 0.0:
                 require_positive(VehicleError, **values)
             require_within(VehicleError, low, high, **values)
+
+
+# What is typical of a car of that size, where its file leaves out what a simulation needs.
+
+_TRACK, _HEIGHT = 0.57, 0.2  # wheelbases; passenger cars have 0.53 to 0.62 and 0.18 to 0.25
+_ROLL_CENTERS = 0.09, 0.18  # heights of the center of gravity: strut, multi-link
+_ROLL = 0.09  # rad/g: 5.2 degrees of a passenger car on its springs
+_DAMPING = 0.46  # of critical, of the body on its springs
+_GYRATION = 0.39  # track widths, about the x axis: a third of the width of the body
+_RELAXATION = 0.22, 0.185  # wheelbases: two rolling radii, less at the lower load behind
+_LAG = 0.04  # s of a sedan: rack and power assistance, 4 Hz
+_PLAIN = {"roll_stiffness_front_share": 0.58, "roll_camber_front": 0.8, "roll_camber_rear": 0.5}
+
+
+def typical_chassis(car: "Vehicle", given: Mapping[str, Any]) -> Chassis:
+    """Return a chassis of which some numbers are given, and the others typical of such a car.
+
+    car : its size and what it declares of braking and driving.   given : by the names of `Chassis`.
+    """
+    L, values = car.wheelbase, dict(given)
+
+    def default(**typical: float | None) -> None:
+        values.update({k: x for k, x in typical.items() if x is not None and k not in given})
+
+    default(track_front=_TRACK * L, track_rear=_TRACK * L, cg_height=_HEIGHT * L)
+    default(drive_front_share=1.0, **_PLAIN)
+    default(**{name: getattr(car, name) for name in _OF_CHASSIS})
+    h, front, rear = values["cg_height"], *_ROLL_CENTERS
+    default(roll_center_height_front=front * h, roll_center_height_rear=rear * h)
+    front, rear = values["roll_center_height_front"], values["roll_center_height_rear"]
+    tipping = car.weight * (h - (car.l_r * front + car.l_f * rear) / L)
+    gyration = 0.5 * _GYRATION * (values["track_front"] + values["track_rear"])
+    default(
+        roll_stiffness=tipping * (1.0 + 1.0 / _ROLL), roll_inertia=car.mass * gyration * gyration
+    )
+    critical = 2.0 * math.sqrt(abs((values["roll_stiffness"] - tipping) * values["roll_inertia"]))
+    default(
+        roll_damping=_DAMPING * critical,
+        relaxation_length_front=_RELAXATION[0] * L,
+        relaxation_length_rear=_RELAXATION[1] * L,
+        steering_lag=_LAG * car.scale,
+    )
+    return Chassis(**values, estimated=tuple(name for name in values if name not in given))
 
 
 def _from_folder(value: Any, folder: Path) -> Any:
@@ -289,7 +337,7 @@ class Vehicle:
     def lengthwise(self, name: str) -> float | None:
         """Return a number of `_OF_CHASSIS` as the car or else its chassis tells it, or None."""
         given: float | None = getattr(self, name)
-        if given is None and self.chassis is not None:
+        if given is None and self.chassis is not None and name not in self.chassis.estimated:
             given = getattr(self.chassis, name)
         return given
 
@@ -395,11 +443,21 @@ class Vehicle:
         """Return the chassis to who cannot do without."""
         if self.chassis is None:
             raise VehicleError(
-                f"vehicle '{self.name}' has no [chassis] table, which a simulated car needs: "
-                "`tireid init car.toml` writes one to fill in, see docs/driving.md (The car that "
-                "is driven)"
+                f"vehicle '{self.name}' has no [chassis] with tire = "
+                '"my_tire.tir": add it, or drive with --weights'
             )
         return self.chassis
+
+    def with_chassis(self) -> "Vehicle":
+        """Return the car with its chassis, or with one that is typical of its size."""
+        return self if self.chassis else replace(self, chassis=typical_chassis(self, {}))
+
+    @property
+    def assumed(self) -> str:
+        """What of the chassis is typical of such a car, in one line; empty if nothing is."""
+        names = self.chassis.estimated if self.chassis else ()
+        values = ", ".join(f"{name} = {getattr(self.chassis, name):.3g}" for name in names)
+        return f"assumed in [chassis] of {self.name}, SI units: {values}" if values else ""
 
     def origin(self, name: str) -> str:
         """Return where a value comes from: "declared", or "estimated" where left out."""
@@ -419,9 +477,9 @@ class Vehicle:
     def from_toml(cls, path: str | os.PathLike[str]) -> "Vehicle":
         """Read a vehicle from a TOML file: mass, l_f, l_r and what else is known of it.
 
-        Name, yaw inertia, cornering stiffnesses, areas of downforce, what `LENGTHWISE` names and
-        the table [chassis] may be left out; inertia and stiffnesses are estimated then, see
-        `estimated`, and the axles carry their static loads at any speed.
+        Name, yaw inertia, cornering stiffnesses, areas of downforce, what `LENGTHWISE` names, the
+        table [chassis] and any of its numbers may be left out; inertia, stiffnesses and numbers of
+        the chassis are estimated then, and the axles carry their static loads at any speed.
 
         Parameters
         ----------
@@ -443,14 +501,16 @@ class Vehicle:
         except VehicleError as error:
             raise VehicleError(f"{file}: {error}") from None
         values = table.record(cls, skip=outside) | {"estimated": missing}
+        parts: dict[str, Any] = {}
         if inner is not None:
-            parts = Table(inner, f"{file}: ", VehicleError, "chassis.").record(Chassis)
+            body = Table(inner, f"{file}: ", VehicleError, "chassis.")
+            known = body.only_fields(Chassis, skip=("estimated",))
+            parts = body.record(Chassis, skip=("estimated", *known.keys() - body.data.keys()))
         try:
-            if inner is None:
-                return cls(**values)
+            car = cls(**values)
             if "tire" in parts:
                 parts["tire"] = (file.parent / parts["tire"]).resolve()
-            return cls(**values, chassis=Chassis(**parts))
+            return car if inner is None else replace(car, chassis=typical_chassis(car, parts))
         except (ValueError, RuntimeError) as error:  # RuntimeError: a link that leads to itself
             raise VehicleError(f"{file}: {error}") from None
 
@@ -472,16 +532,17 @@ class Vehicle:
         file = Path(path)
         without = (name for name in AREAS if getattr(self, name) == 0.0)
         out = {"chassis", "estimated", *self.estimated, *without}
+        inside = {"estimated", *(self.chassis.estimated if self.chassis else ())}
         tables = [
             toml_table(
                 name,
                 {
                     one.name: _from_folder(value, file.parent)
                     for one in fields(record)
-                    if one.name not in out and (value := getattr(record, one.name)) is not None
+                    if one.name not in skipped and (value := getattr(record, one.name)) is not None
                 },
             )
-            for name, record in (("", self), ("chassis", self.chassis))
+            for name, record, skipped in (("", self, out), ("chassis", self.chassis, inside))
             if record is not None
         ]
         if not overwrite and file.exists():

@@ -39,8 +39,9 @@ class CarState(NamedTuple):
 
 
 BRAKES = 9.0  # m/s²: hardest braking and driving of who holds the speed
+SPEED_GAIN = 4.0  # 1/s: acceleration that the driver asks for, per error of the speed
 # Without an integral, which would lag behind a profile.
-_HOLDING = Driver(gain=4.0, integral_gain=0.0, acceleration_limit=BRAKES)
+_HOLDING = Driver(gain=SPEED_GAIN, integral_gain=0.0, acceleration_limit=BRAKES)
 
 
 class DoubleTrackCar:
@@ -71,7 +72,7 @@ class DoubleTrackCar:
         self.tire = plant.tire
         self.friction = self._plant.friction
         self.period = period
-        self.speed_gain = _HOLDING.gain
+        self.speed_gain = SPEED_GAIN
 
     def start(
         self, v_x: float, *, X: float = 0.0, Y: float = 0.0, psi: float = 0.0, kappa: float = 0.0

@@ -171,7 +171,7 @@ def test_the_interface_is_what_tireid_names_with_its_bases():
     assert named > {"Vehicle", "AxleIdentifier", "Method", "TireModel", "read_recording"}
     assert "Path" in named  # of `tireid.paths`
     assert named > {"Band", "Drives"}  # of `tire.band` and so on
-    assert not named & {"Tracker", "Scan", "gate"}
+    assert not named & {"Guide", "Scan", "gate"}
 
 
 def test_a_drifted_docstring_is_caught():

@@ -79,10 +79,10 @@ def test_the_parts_list_holds_the_lock():
     lock = (ROOT / "requirements.lock").read_text()
     listed = {(one["name"], one["version"]) for one in parts["components"]}
     charts = next(one for one in parts["components"] if one["name"] == "uplot")  # in the wheel
-    script = (ROOT / "tireid/live/uplot/uPlot.iife.min.js").read_bytes()
+    script = (ROOT / "tireid/uplot/uPlot.iife.min.js").read_bytes()
     assert charts["hashes"][0]["content"] == hashlib.sha256(script).hexdigest()
     assert f"(v{charts['version']})".encode() in script[:100]
-    assert "tireid/live/uplot/LICENSE" in PROJECT["license-files"]
+    assert "tireid/uplot/LICENSE" in PROJECT["license-files"]
     assert listed == {*ENTRY.findall(lock), ("uplot", charts["version"])}
     hashes = {h["content"] for one in parts["components"] if one != charts for h in one["hashes"]}
     assert hashes == set(re.findall(r"sha256:([0-9a-f]{64})", lock))

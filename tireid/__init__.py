@@ -42,6 +42,8 @@ if TYPE_CHECKING:
     from tireid import errors as errors
     from tireid.driving.learn import sample_recording as sample_recording
     from tireid.driving.runs import drive as drive
+    from tireid.driving.tracker import Tracker as Tracker
+    from tireid.driving.tracker import VehicleState as VehicleState
     from tireid.emitting import emit as emit
     from tireid.exporting import export as export
     from tireid.figures.lap import plot as _plot
@@ -75,6 +77,7 @@ _NAMES = {  # by the module that they lie in
     "mpc.path.speed": "SpeedProfile speed_profile",
     "tireid.driving.learn": "sample_recording",
     "tireid.driving.runs": "drive",
+    "tireid.driving.tracker": "Tracker VehicleState",
     "tireid.live.live": "Live",
     "tireid.live.state": "State",
     "tireid.emitting": "emit",

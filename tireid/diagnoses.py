@@ -18,11 +18,12 @@ from tireid.output import text_table
 from tireid.report import (
     Block,
     Headline,
+    Note,
+    Picture,
     Report,
     Section,
     Table,
     Tone,
-    drawings,
     origin,
     printed,
     write_report,
@@ -109,12 +110,20 @@ def _tone_of(diagnosis: Diagnosis) -> Tone:
     return "doubt" if diagnosis.findings else "good"
 
 
-def diagnosis_warnings(diagnosis: Diagnosis) -> list[str]:
-    return [printed(f"the log: {one.text}") for one in diagnosis.findings]
+def diagnosis_notes(diagnosis: Diagnosis, verdict: Verdict | None = None) -> list[Note]:
+    """Return the findings as notes of a report.   verdict : says some of them already."""
+    if verdict is None:
+        found = diagnosis.findings
+        return [Note(printed(one.text), "bad" if one.matters else "") for one in found]
+    said, texts = (
+        {one.text for one in verdict.findings},
+        (f"doctor: {one.text}" for one in diagnosis.findings),
+    )
+    return [Note(printed(text)) for text in texts if text not in said]
 
 
 def diagnosis_section(diagnosis: Diagnosis, heading: str = "Doctor") -> Section:
-    rows = _finding_rows(diagnosis)
+    rows = [[*map(printed, row)] for row in _finding_rows(diagnosis)]
     blocks: list[Block] = [
         (
             "Faults of the log, or of its declared car, from the log alone. ± is one "
@@ -122,11 +131,12 @@ def diagnosis_section(diagnosis: Diagnosis, heading: str = "Doctor") -> Section:
         )
     ]
     if rows:
-        blocks.append(Table("What was found.", _HEADER, rows))
-        blocks += [printed(one.text) for one in diagnosis.findings]
+        blocks.append(Table("What was found; the notes above say what it means.", _HEADER, rows))
     else:
         blocks.append("Nothing was found.")
-    blocks += [printed(f"Not observable: {line}") for line in diagnosis.unobservable]
+    if diagnosis.unobservable:
+        lines = [printed(line).partition(": ")[::2] for line in diagnosis.unobservable]
+        blocks.append(Table("What this log cannot verify.", ("what", "why"), lines))
     return Section(heading, blocks)
 
 
@@ -177,18 +187,14 @@ def write_doctor_report(
     vehicle: Vehicle,
     diagnosis: Diagnosis,
     after: Diagnosis | None,
-    figure: bytes,
+    figure: Picture,
     command: str,
 ) -> None:
     """Write the report of a diagnosis.
 
     after : that of the repaired log, None where nothing was repaired.
     """
-    caption = "Force over slip angle, as logged and repaired."
-    sections = [
-        diagnosis_section(diagnosis),
-        Section("Tire curves", drawings({"doctor": figure}, {"doctor": caption})),
-    ]
+    sections = [diagnosis_section(diagnosis), Section("Tire curves", [figure])]
     if after is not None:
         sections.append(diagnosis_section(after, heading="After the repair"))
     count = len(diagnosis.findings)
@@ -207,7 +213,7 @@ def write_doctor_report(
         title=f"Diagnosis of {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {vehicle.name}.",
         numbers=numbers,
-        warnings=diagnosis_warnings(diagnosis),
+        notes=diagnosis_notes(diagnosis),
         sections=[*sections, origin(command, vehicle, [recording])],
     )
     write_report(folder, report)

@@ -1,10 +1,11 @@
 """A report: headline numbers, text, tables and figures in ONE HTML file that needs nothing else.
 
 Pictures are embedded; a figure fills the window when clicked on, by its own anchor. Styles are
-inline, without scripts or links to other files, so that it can be mailed, archived and printed.
+inline, without links to other files, so that it can be mailed, archived and printed. The script of
+`zoom.py` is inline too; without it the pictures stand alone.
 
-The order is always: headline numbers, what speaks against them, what was found with its figures and
-how to read each, and where it came from.
+The order is always: at most three headline numbers, the notes that would change a decision, what
+was found with its figures and how to read each, and where it came from.
 """
 
 import math
@@ -12,7 +13,7 @@ import platform
 import re
 import tomllib
 from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
@@ -25,6 +26,7 @@ from models.files import digest, digest_of_bytes, write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
+from tireid.zoom import Zoom, plots_html
 
 _SIGNATURES = {  # of files, by their kind
     b"\x89PNG\r\n\x1a\n": "png",
@@ -39,6 +41,17 @@ with Path(__file__).with_name("read.toml").open("rb") as file:
 # What something is worth. Of a headline: good (green), doubt (amber), bad (red). Of a number:
 # unknown (grey), of a refused answer refused (grey) or, where its own axle is, struck through.
 Tone = Literal["", "good", "doubt", "bad", "unknown", "refused", "struck"]
+
+
+class Note(NamedTuple):
+    """A sentence that speaks against a result.
+
+    tone : bad refuses the result, doubt says that nobody can judge it.   where : drive it is about.
+    """
+
+    text: str
+    tone: Tone = ""
+    where: str = ""
 
 
 class Marked(NamedTuple):
@@ -62,6 +75,15 @@ _LETTERS = {
     "lambda": "λ",
     "theta": "θ",
 }
+_WORDS: dict[str, Tone] = {"NOT VALID": "bad", "Cannot judge": "doubt", "cannot judge": "doubt"}
+_WORD = re.compile("|".join(_WORDS))  # of a verdict, colored wherever it stands
+_VARIES = r"\d+(?:\.\d+)?(?: / \d+(?:\.\d+)?)*"  # numbers: notes that differ in these are one
+_VARIES_BY_AXLE = rf"{_VARIES}|\bfront\b|\brear\b"
+_NOTES = 3  # that stand above the first section, those that would change a decision
+_WIDE = 4  # columns from which a narrow screen gets a line for each cell
+# In the cells of tables: after what a name may go on in the next line, and where a number may not.
+_BREAKS = re.compile(r"(_|\w{16})")
+_JOINED = re.compile(r"(?<=±) |(?<=\d) (?=%|m|N|k|s\b)")
 _INDEXED = re.compile(r"\b(v_x|v_y|a_x|a_y|e_y|l_f|l_r|A_d|T_freeze)\b")
 _RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
@@ -74,13 +96,16 @@ def printed(text: str) -> str:
     return raised.replace("`", "").replace("->", "→").replace("+-", "±")
 
 
+def sentence(line: str) -> str:
+    """Return a line of a command's output as a sentence of a report."""
+    text = printed(line)
+    return f"{text[:1].upper()}{text[1:]}."
+
+
 class Headline(NamedTuple):
-    """A number that a hurried reader looks for: with its unit, and what it is, plain text.
+    """A number that a hurried reader decides by: with its unit, and what it is, plain text."""
 
-    value : the number, or those of several axles, a line each.
-    """
-
-    value: str | Sequence[Marked]
+    value: str
     meaning: str
     tone: Tone = ""
 
@@ -124,6 +149,11 @@ class Picture:
             raise ValueError(f"the picture {self.caption!r} must be SVG, PNG, GIF or WebP")
         object.__setattr__(self, "image", data)
 
+    @property
+    def zoom(self) -> Zoom:
+        """Panels that a browser draws in its place; none of most."""
+        return getattr(self.image, "zoom", ())
+
 
 Block = str | Table | Picture  # running text is a str
 
@@ -144,9 +174,9 @@ class Report(NamedTuple):
     """All that a page says.
 
     summary : what a hurried reader should know, plain text.
-    numbers : what stands at the top, with units; none where there is nothing to count.
-    lead : what is looked at first, above the warnings.
-    warnings : what speaks against the results, plain text; what is marked bad refuses them.
+    numbers : the three that decide, with units; others belong into a table.
+    lead : what is looked at first, above the notes.
+    notes : what speaks against the results, plain text.
     """
 
     title: str
@@ -154,19 +184,22 @@ class Report(NamedTuple):
     summary: str = ""
     numbers: Sequence[Headline] = ()
     lead: Sequence[Block] = ()
-    warnings: Sequence[str | Marked] = ()
+    notes: Sequence[str | Note] = ()
 
 
 def report_html(report: Report) -> str:
     """Return a report as one HTML page; tables and figures are numbered through."""
     title = html(report.title)
-    tables, figures = count(1), count(1)
+    tables, figures, zooms = count(1), count(1), dict[str, Zoom]()
 
     def written(block: Block) -> str:
         if isinstance(block, Table):
             return _table(block, next(tables))
         if isinstance(block, Picture):
-            return _picture(block, next(figures))
+            number = next(figures)
+            if block.zoom:
+                zooms[f"figure-{number}"] = block.zoom
+            return _picture(block, number)
         return f"<p>{_inline(block)}</p>"
 
     lead = [written(block) for block in report.lead]
@@ -192,9 +225,10 @@ def report_html(report: Report) -> str:
         f"<h1>{title}</h1>",
         f'<p class="summary">{_inline(report.summary)}</p>',
     ]
-    head += _numbers(report.numbers) + lead + _warnings(report.warnings)
+    head += _numbers(report.numbers) + lead + _notes(report.notes)
     contents = ['<nav aria-label="Contents">', "<ol>", *entries, "</ol>", "</nav>"]
-    return "\n".join([*head, *contents, *parts, "</body>", "</html>"]) + "\n"
+    body = [*head, *contents, *parts, plots_html(zooms)]
+    return "\n".join([*body, "</body>", "</html>"]) + "\n"
 
 
 def write_report(folder: Path, report: Report) -> None:
@@ -202,21 +236,20 @@ def write_report(folder: Path, report: Report) -> None:
 
 
 def _inline(text: str) -> str:
-    """Return text for the page, with the indices of our letters lowered."""
-    return _INDEXED.sub(
+    """Return text for the page: indices of our letters lowered, words of a verdict colored."""
+    lowered = _INDEXED.sub(
         lambda found: "<i>{}</i><sub>{}</sub>".format(*found[1].split("_")), html(text)
     )
+    return _WORD.sub(lambda found: f'<span class="{_WORDS[found[0]]}">{found[0]}</span>', lowered)
 
 
 def _numbers(numbers: Sequence[Headline]) -> list[str]:
     if not numbers:
         return []
-    cards = []
-    for value, meaning, tone in numbers:
-        parts = [Marked(value)] if isinstance(value, str) else value
-        pair = ' class="pair"' if len(parts) > 1 else ""
-        given = "".join(f"<dd{pair}>{_marked(one)}</dd>" for one in parts)
-        cards.append(f"<div{_class(tone)}><dt>{_inline(meaning)}</dt>{given}</div>")
+    cards = [
+        f"<div{_class(tone)}><dt>{_inline(meaning)}</dt><dd>{_inline(value)}</dd></div>"
+        for value, meaning, tone in numbers
+    ]
     return ['<dl class="numbers">', *cards, "</dl>"]
 
 
@@ -230,20 +263,60 @@ def _marked(one: Marked) -> str:
     return text + (f'<small class="unknown">{_inline(one.note)}</small>' if one.note else "")
 
 
-def _warnings(warnings: Sequence[str | Marked]) -> list[str]:
-    if not warnings:
-        return ['<p class="fine">No warnings.</p>']
-    marked = [one if isinstance(one, Marked) else Marked(one) for one in warnings]
-    refused = any(one.tone == "bad" for one in marked)
-    lines = [f"<li{_class(one.tone)}>{_inline(one.text)}</li>" for one in marked]
-    return [f'<ul class="warnings{" refusals" if refused else ""}">', *lines, "</ul>"]
+def _as_one(notes: Iterable[Note], varies: str, key: Callable[[Note], str]) -> list[list[Note]]:
+    """Return notes that say the same but for what varies, together."""
+    found: dict[tuple[str, ...], list[Note]] = {}
+    for one in notes:
+        found.setdefault((one.tone, key(one), re.sub(varies, "#", one.text)), []).append(one)
+    return list(found.values())
+
+
+def _listed(words: Iterable[str], last: str = " and ", between: str = ", ") -> str:
+    """Return words in one: a, b and c; those that are all alike once."""
+    *others, end = words
+    return end if {*others} <= {end} else between.join(others) + last + end
+
+
+def _text_of(notes: Sequence[Note], varies: str, *signs: str) -> str:
+    parts = zip(*(re.split(f"({varies})", one.text) for one in notes), strict=True)
+    return "".join(_listed(part, *signs) for part in parts)
+
+
+def merged(notes: Iterable[str | Note]) -> list[Note]:
+    """Return notes with each finding once: axles and drives of the same in one, refusals first."""
+    given = (one if isinstance(one, Note) else Note(one) for one in notes)
+    of_drives = [
+        some[0]._replace(text=_text_of(some, _VARIES_BY_AXLE, " / ", " / "))
+        for some in _as_one(dict.fromkeys(given), _VARIES_BY_AXLE, lambda one: one.where)
+    ]
+    found = [
+        Note(_text_of(some, _VARIES), some[0].tone, _listed(one.where for one in some))
+        for some in _as_one(of_drives, _VARIES, lambda one: str(bool(one.where)))
+    ]
+    return sorted(found, key=lambda one: ("bad", "doubt", "").index(one.tone))
+
+
+def _notes(notes: Sequence[str | Note]) -> list[str]:
+    found = merged(notes)
+    lines = [
+        f"<li{_class(tone)}>{_inline(f'{where}: {text}' if where else text)}</li>"
+        for text, tone, where in found
+    ]
+    first, rest = lines[:_NOTES], lines[_NOTES:]
+    if not lines:
+        return ['<p class="fine">No notes.</p>']
+    refused = any(one.tone == "bad" for one in found)
+    folded = f"{len(rest)} more note{'s' * (len(rest) > 1)}"
+    more = ["<details>", f"<summary>{folded}</summary>", "<ul>", *rest, "</ul>", "</details>"]
+    opening = f'<div class="notes{" refusals" if refused else ""}">'
+    return [opening, "<ul>", *first, "</ul>", *(more if rest else []), "</div>"]
 
 
 def _table(table: Table, number: int) -> str:
     columns = list(zip(*table.rows, strict=True)) or [()] * len(table.header)
     words = table.verbatim
-    opening = '<table class="verbatim">' if words else "<table>"
-    numeric = [any(_is_number(cell) for cell in column) and not words for column in columns]
+    kind = "verbatim" if words else "wide" if len(table.header) >= _WIDE else "narrow"
+    numeric = [_numbers_in(column) and not words for column in columns]
     kinds = [' class="number"' if right else "" for right in numeric]
     header = "".join(
         f'<th scope="col"{kind}>{_inline(name)}</th>'
@@ -252,13 +325,20 @@ def _table(table: Table, number: int) -> str:
     lines = [
         '<figure class="table">',
         f"<figcaption><b>Table {number}.</b> {_inline(table.caption)}</figcaption>",
-        f'<div class="scroll">{opening}\n<thead><tr>{header}</tr></thead>\n<tbody>',
+        f'<div class="scroll"><table class="{kind}">\n<thead><tr>{header}</tr></thead>\n<tbody>',
     ]
     for row in table.rows:
-        written = [html(_text(one)) if words else _marked(_of(one)) for one in row]
-        cells = (f"<td{kind}>{one}</td>" for one, kind in zip(written, kinds, strict=True))
+        written = [html(_text(one)) if words else _in_cell(_marked(_of(one))) for one in row]
+        cells = (
+            f'<td data-of="{html(name)}"{kind}>{one}</td>'
+            for name, one, kind in zip(table.header, written, kinds, strict=True)
+        )
         lines.append(f"<tr>{''.join(cells)}</tr>")
     return "\n".join([*lines, "</tbody>\n</table></div>", "</figure>"])
+
+
+def _in_cell(markup: str) -> str:
+    return _BREAKS.sub(r"\1<wbr>", _JOINED.sub("\N{NO-BREAK SPACE}", markup))
 
 
 def _picture(picture: Picture, number: int) -> str:
@@ -281,6 +361,12 @@ def _picture(picture: Picture, number: int) -> str:
 
 def _of(cell: Cell) -> Marked:
     return cell if isinstance(cell, Marked) else Marked(_text(cell))
+
+
+def _numbers_in(column: Sequence[Cell]) -> bool:
+    """Return whether at least half of the cells that are not empty are numbers."""
+    given = [cell for cell in column if cell is not None and _text(cell) not in ("", "-")]
+    return bool(given) and 2 * sum(map(_is_number, given)) >= len(given)
 
 
 def _is_number(cell: Cell) -> bool:

@@ -6,7 +6,9 @@ from numbers import Real
 from os import PathLike
 from pathlib import Path
 
+from codegen import markup
 from codegen.arrays import Array
+from codegen.errors import TireidError
 from identifier.certificate import Certificate
 from identifier.method import Method
 from identifier.run import History
@@ -122,3 +124,11 @@ class Run:
 
     def __repr__(self) -> str:
         return f"<Run of {type(self.method).__name__} over {self.recording!r}>"
+
+    def _repr_html_(self) -> str:
+        try:
+            found = [self.verdict._repr_html_(), self.tire._repr_html_()]
+        except TireidError as error:  # it estimates a signal, or diverged
+            found = [markup.line(str(error), "No tires:")]
+        method = markup.line(f"over {self.recording.name}", type(self.method).__name__)
+        return markup.card(method, *found, self.recording._repr_html_())

@@ -10,11 +10,22 @@ from identifier.day import Day
 from identifier.measured import NOT_IDENTIFIABLE, printed_unit, with_doubt
 from identifier.tire_model import AXLES, Axle, TireModel, stored_verdict
 from identifier.verdict import Number, Verdict
-from identifier.verdict.verdict import LARGEST_MODEL_ERROR, PERCENT
+from identifier.verdict.verdict import BEYOND_KNOWN, LARGEST_MODEL_ERROR, PERCENT
 from models.recordings import Recording
 from tireid.output import text_table
 from tireid.progress import complain
-from tireid.report import Block, Cell, Headline, Marked, Section, Table, Tone, printed
+from tireid.report import (
+    Block,
+    Cell,
+    Headline,
+    Marked,
+    Note,
+    Section,
+    Table,
+    Tone,
+    printed,
+    sentence,
+)
 
 Verdicts = Mapping[str, Verdict]  # by the name of the drive
 _HEADER = ("", "front", "is", "rear", "is")
@@ -99,29 +110,32 @@ def sensors_section(model: TireModel, recordings: Iterable[Recording]) -> list[S
     rows: list[list[Cell]] = [
         [name, *(day.words.get(title, "") for title in titles)] for name, day in days
     ]
-    caption = "Errors that were found from its motion with the tires held, and taken off."
+    caption = (
+        "Errors of the sensors, estimated from the motion with the tires fixed, and subtracted."
+    )
     return [Section("Sensors of each log", [Table(caption, ["log", *titles], rows)])]
 
 
-def verdict_headline(verdict: Verdict, others: Sequence[str | Marked] = ()) -> Headline:
-    """Return the verdict as the first number of a report: green, red; amber with notes, or open."""
-    if not verdict.valid:
-        meaning = f"the verdict on this answer: {verdict.against}"
-        return Headline(verdict.word, meaning, "bad" if verdict.judged else "doubt")
-    notes = len(verdict.findings) + len(others)
-    noted = f", with {notes} note{'s' * (notes > 1)}" if notes else ""
-    meaning = f"the verdict on this answer: it reproduces the measured motion{noted}"
-    return Headline("valid", meaning, "doubt" if notes else "good")
+def tone_of(verdict: Verdict) -> Tone:
+    """Return the color of a verdict: green, red, or amber where the drive cannot judge."""
+    return "good" if verdict.valid else "bad" if verdict.judged else "doubt"
+
+
+def verdict_headline(verdict: Verdict) -> Headline:
+    """Return the verdict as the first number of a report."""
+    reason = "the model reproduces the measured motion" if verdict.valid else verdict.against
+    return Headline(verdict.word, f"the verdict: {reason}", tone_of(verdict))
 
 
 def of_answer(verdict: Verdict, numbers: Sequence[Headline]) -> list[Headline]:
     """Return numbers of a report as the verdict leaves them: of a refused answer none is right.
 
-    Those that are not bad are grey there.
+    Those that are neither bad nor in doubt are grey there.
     """
     if verdict.valid:
         return list(numbers)
-    return [one if one.tone == "bad" else one._replace(tone="refused") for one in numbers]
+    spoken = ("bad", "doubt")
+    return [one if one.tone in spoken else one._replace(tone="refused") for one in numbers]
 
 
 def model_error_headline(verdict: Verdict) -> list[Headline]:
@@ -134,30 +148,16 @@ def model_error_headline(verdict: Verdict) -> list[Headline]:
         return []
     front, rear = (f"{PERCENT * share:.1f}" for share in errors)
     limit = f"limit {PERCENT * LARGEST_MODEL_ERROR:.0f} %"
-    meaning = f"error over the force in the motion, front / rear ({limit})"
+    meaning = f"model error over the force in the motion, front / rear ({limit})"
     tone: Tone = "" if all(share <= LARGEST_MODEL_ERROR for share in errors) else "bad"
     return [Headline(f"{front} / {rear} %", meaning, tone)]
 
 
-def number_headlines(verdict: Verdict) -> list[Headline]:
-    """Return stiffness, grip and relaxation length of both axles, as numbers of a report."""
-    return [
-        Headline(
-            [_marked_number(verdict, by_axle[axle]) for axle in AXLES], f"{title}, front / rear"
-        )
-        for title, by_axle in _numbers_by_title(verdict).items()
-        if len(by_axle) == len(AXLES)
-    ]
-
-
-def verdicts_headline(verdicts: Verdicts, meaning: str, fine: Tone = "") -> list[Headline]:
-    """Return how many of several verdicts are valid, as a number of a report, if there are any.
-
-    fine : what it is worth where all are.
-    """
+def verdicts_headline(verdicts: Verdicts, meaning: str) -> list[Headline]:
+    """Return how many of several verdicts are valid, as a number of a report, if there are any."""
     words = [verdict.word for verdict in verdicts.values()]
     valid, refused = words.count("valid"), words.count("NOT VALID")
-    tone: Tone = fine if valid == len(words) else "bad" if refused else "doubt"
+    tone: Tone = "good" if valid == len(words) else "bad" if refused else "doubt"
     return [Headline(f"{valid} of {len(verdicts)}", meaning, tone)] * bool(verdicts)
 
 
@@ -166,56 +166,51 @@ def known_headline(model: TireModel) -> list[Headline]:
     if model.known_slip is None:
         return []
     front, rear = (with_doubt(float(slip)) for slip in np.degrees(model.known_slip))
-    return [Headline(f"{front} / {rear}°", "known up to this slip, front / rear")]
+    return [Headline(f"{front} / {rear}°", "identified slip range, front / rear")]
 
 
-def verdict_warnings(verdict: Verdict, prefix: str = "") -> list[str | Marked]:
-    """Return the findings as warnings of a report; those that refuse the answer are marked."""
+def verdict_notes(verdict: Verdict, where: str = "") -> list[Note]:
+    """Return the findings as notes of a report.   where : the drive that they are about."""
     return [
-        Marked(prefix + printed(finding.line), "bad" if finding.refuses else "")
-        for finding in verdict.findings
+        Note(
+            printed(one.line.removeprefix("note: ")),
+            "bad" if one.refuses else "doubt" if one.silent else "",
+            where,
+        )
+        for one in verdict.findings
+        if one.code != BEYOND_KNOWN  # which a report says of all drives in one note
     ]
 
 
-def verdicts_warnings(verdicts: Verdicts, prefix: str) -> list[str | Marked]:
-    """Return the findings of verdicts on several drives, each behind the name of the drive.
-
-    prefix : in which {} stands for the name.
-    """
-    return [
-        said
-        for name, verdict in verdicts.items()
-        for said in verdict_warnings(verdict, prefix.format(name))
-    ]
+def verdicts_notes(verdicts: Verdicts) -> list[Note]:
+    """Return the findings of verdicts on several drives, each with the name of the drive."""
+    return [note for name, one in verdicts.items() for note in verdict_notes(one, name)]
 
 
-def verdict_section(verdict: Verdict) -> Section:
-    """Return the section of a report that holds a verdict; its findings are the warnings above."""
+def verdict_section(verdict: Verdict, model: TireModel) -> Section:
+    """Return the section of a report that holds a verdict; its findings are the notes above."""
     rows: list[list[Cell]] = [
         [title, *(_marked_number(verdict, by_axle.get(axle)) for axle in AXLES)]
         for title, by_axle in _numbers_by_title(verdict).items()
     ]
-    lines = (verdict.headline, verdict.model_error_line, *verdict.unobservable)
+    rows += [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
+    caption = (
+        "Estimates, ± one standard deviation. Grey was not identified; struck through is not valid."
+    )
+    lines = (verdict.headline, *verdict.unobservable)
     blocks: list[Block] = [
-        (
-            "The frozen model is replayed over the drive and must reproduce the force in "
-            "the motion, at each axle, on identification and validation drives. ± is one "
-            "standard deviation."
-        ),
-        *(printed(line) for line in lines if line),
-        Table(
-            "Estimates. Grey was not identified; struck through is not valid.", ("", *AXLES), rows
-        ),
+        Table(caption, ("", *AXLES), rows),
+        "The frozen model is replayed over the drive and must reproduce the force in the motion, "
+        "at each axle.",
+        *map(sentence, lines),
     ]
     return Section("Verdict", blocks)
 
 
-def stored_warning(path: Path | str) -> list[Marked]:
-    """Return what speaks against a stored model that was found not valid when it was learnt."""
-    if stored_verdict(path) is not False:
-        return []
-    text = f"{path} was not valid on its identification drive: see its summary.json"
-    return [Marked(text, "bad")]
+def stored_notes(path: Path | str) -> list[Note]:
+    """Return what speaks against a stored model without a valid verdict when it was learnt."""
+    text = f"{path} has no valid verdict on its identification drive: see its summary.json"
+    return [Note(text, "doubt")] * (stored_verdict(path) is False)
 
 
 def warn_of(verdict: Verdict, what: str) -> None:

@@ -232,7 +232,7 @@ class AxleModel(TireModel):
         lines = list(TireModel.facts(self))
         if (known > 0.0).all():
             unsure = 100.0 * np.diag(self.band.relative_sd(known))
-            lines.append(Fact("standard deviation there over the prior's", unsure, "%"))
+            lines.append(Fact("standard deviation there, of the prior's", unsure, "%"))
         lines.append(Fact("time of learning", self.excitation[:, 1], "s"))
         return (*lines, *self._of_downforce())
 

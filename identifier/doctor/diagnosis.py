@@ -199,6 +199,6 @@ def _unobservable(recording: Recording, gross: Screened) -> tuple[str, ...]:
         sizes = "offsets, delays, lever arms, scales, center of gravity, inertia"
         lines.append(f"{sizes}: {gross.blind}")
     elif recording.a_y is None:
-        speeds = "units of speed against one another"
-        lines.append(f"bank of the road, and {speeds}: there is no a_y in the log")
+        speeds = "a v_x of 0.9 to 1.2 times the right one, units of speed against one another"
+        lines.append(f"bank of the road, {speeds}: there is no a_y in the log")
     return tuple(lines)

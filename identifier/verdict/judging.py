@@ -24,6 +24,7 @@ from identifier.run import History, state_index
 from identifier.tire_model import AXLES, Reached, TireModel
 from identifier.verdict.friction import RoadFriction, road_friction
 from identifier.verdict.verdict import (
+    BEYOND_KNOWN,
     LARGEST_MODEL_ERROR,
     PERCENT,
     WITHOUT_V_Y,
@@ -305,7 +306,7 @@ def _beyond(evaluated: _Evaluated) -> Iterator[Objection]:
                 f"{PERCENT * share:.0f} % of the samples exceed the identified slip range "
                 f"({np.degrees(slip):.1f} deg); there the curve is extrapolated"
             )
-            yield Objection("beyond_known", axle, text, False)
+            yield Objection(BEYOND_KNOWN, axle, text, False)
 
 
 def _turning(evaluated: _Evaluated) -> Iterator[Objection]:

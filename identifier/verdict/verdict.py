@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+from codegen import markup
 from codegen.arrays import Array
 from identifier.measured import NOT_IDENTIFIABLE, printed_value
 from identifier.tire_model import Axle
@@ -11,6 +12,7 @@ from identifier.verdict.friction import RoadFriction
 
 LARGEST_MODEL_ERROR = 0.12  # share of the force, rms, that the frozen model may miss at an axle
 PERCENT = 100.0
+BEYOND_KNOWN = "beyond_known"  # code of the finding that a drive slips beyond the identified range
 
 UNOBSERVABLE = (
     "a wrong mass, which scales all forces alike: weigh the car",
@@ -197,3 +199,12 @@ class Verdict:
             for finding in self.findings
         )
         return f"<Verdict: {self.word.lower()}{f': {codes}' if codes else ''}>"
+
+    def _repr_html_(self) -> str:
+        color = markup.GREEN if self.valid else markup.RED if self.judged else markup.AMBER
+        said = self.headline.removeprefix(f"verdict: {self.word}").lstrip(", ")
+        return markup.card(
+            markup.line(said, self.word, color),
+            *map(markup.line, self.lines[1 : -len(self.unobservable)]),
+            markup.folded("not observable in this drive", [*UNOBSERVABLE, *self.blind]),
+        )

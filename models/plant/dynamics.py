@@ -198,17 +198,15 @@ def _rotate(x: Any, y: Any, angle: Any) -> tuple[Any, Any]:
 
 
 def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.Function:
-    """Return f(x, command, v_ref, mu, places, aside) -> (x_dot, *OUTPUTS), an SX function.
+    """Return f(x, command, v_ref, mu, places, slope) -> (x_dot, *OUTPUTS), an SX function.
 
-    `aside` is what pushes the body to the left at its center of gravity beside the tires, over its
-    mass [m/s^2]: the slope of a banked road, which an accelerometer does not feel, and wind.
+    `slope` is what a banked road pulls the body to the left [m/s^2]: no accelerometer feels it.
     """
     m, I_z, l_f, l_r = vehicle.mass, vehicle.yaw_inertia, vehicle.l_f, vehicle.l_r
     c, h = vehicle.require_chassis(), vehicle.roll_arm
     x = ca.SX.sym("x", N_STATES)
     command, v_ref, mu = ca.SX.sym("command", 2), ca.SX.sym("v_ref"), ca.SX.sym("mu")
-    places, aside = ca.SX.sym("places", 3, MAX_PLACES), ca.SX.sym("aside", 2)
-    slope, wind = aside[0], aside[1]
+    places, slope = ca.SX.sym("places", 3, MAX_PLACES), ca.SX.sym("slope")
     v_x, v_y, r, roll, roll_rate, X, _, psi = ca.vertsplit(x[:8])
     slip, delta, F_lagged, a_x_lagged, integral = x[8:12], x[12:14], x[14:16], x[16], x[17]
 
@@ -250,7 +248,7 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
     X_dot, Y_dot = _rotate(v_x, v_y, psi)
     x_dot = ca.vertcat(
         a_x + v_y * r,
-        a_y + slope + wind - v_x * r,
+        a_y + slope - v_x * r,
         r_dot,
         roll_rate,
         roll_acceleration,
@@ -264,10 +262,10 @@ def dynamics(vehicle: Vehicle, tires: tuple[Tire, Tire], driver: Driver) -> ca.F
         integral_dot,
     )
     outputs = [ca.vertcat(*v) for v in (F_x, F_y)] + [F_z]
-    outputs += [ca.vertcat(*v) for v in (alpha, axle_force, (a_x, a_y + wind))]
+    outputs += [ca.vertcat(*v) for v in (alpha, axle_force, (a_x, a_y))]
     return ca.Function(
-        "car", [x, command, v_ref, mu, places, aside], [x_dot, *outputs],
-        ["x", "command", "v_ref", "mu", "places", "aside"], ["x_dot", *_OUTPUTS],
+        "car", [x, command, v_ref, mu, places, slope], [x_dot, *outputs],
+        ["x", "command", "v_ref", "mu", "places", "slope"], ["x_dot", *_OUTPUTS],
     )  # fmt: skip
 
 

@@ -134,7 +134,7 @@ def _compiled_loop(
     """
     car, constants = lifted(dynamics(vehicle, tires, driver))
     step = runge_kutta(car, dt)
-    over = ("command", "v_ref", "mu", "aside")
+    over = ("command", "v_ref", "mu", "slope")
     return _CompiledLoop(Scan(step, carry=("x",), over=over, flags=_FLAGS), constants)
 
 
@@ -195,7 +195,6 @@ class Plant:
         speed: _OverTime,
         friction: Friction | None = None,
         bank: _OverTime = 0.0,
-        wind: _OverTime = 0.0,
         dt: float = 1e-3,
         sample_time: float = 0.01,
         name: str | None = None,
@@ -205,7 +204,6 @@ class Plant:
         friction : of the road; None is what the tire was measured on.
         bank : slope of the road across the car [rad], positive where it falls to the left; wheel
             loads stay those of a level road. A number or a function of the times.
-        wind : side force on the body at its center of gravity, positive to the left [N]; the same.
         dt : step of the integration [s].
         sample_time : step of the record [s], a multiple of `dt`.
         name : of the run; None takes the name of the maneuver's class.
@@ -219,10 +217,10 @@ class Plant:
         t = dt * np.arange(n, dtype=np.float64)
         middle = t + 0.5 * dt  # inputs are held over a step: at its middle they are not late
         command = maneuver.steering(middle)
-        v_ref, slope, push = (
-            one(middle) if callable(one) else np.full(n, float(one)) for one in (speed, bank, wind)
+        v_ref, slope = (
+            one(middle) if callable(one) else np.full(n, float(one)) for one in (speed, bank)
         )
-        inputs = {"steering": command, "speed": v_ref, "bank": slope, "wind": push}
+        inputs = {"steering": command, "speed": v_ref, "bank": slope}
         for label, given in inputs.items():
             shape = (n, 2) if label == "steering" else (n,)
             if np.shape(given) != shape or not np.isfinite(given).all():
@@ -234,7 +232,7 @@ class Plant:
         start[0] = v_ref[0]
         values = {"x": start, "command": command, "v_ref": v_ref}
         values |= {"mu": road.over_time(middle), "places": road.over_place()}
-        values["aside"] = np.column_stack((GRAVITY * np.sin(slope), push / self.vehicle.mass))
+        values["slope"] = GRAVITY * np.sin(slope)
         scan, values["constants"] = self.loop(dt)
         record = scan(n, values, every=every)
         finite = np.isfinite(record["x"]).all(axis=1)

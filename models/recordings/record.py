@@ -19,12 +19,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from codegen import markup
 from codegen.arrays import LONG, Array, blocks, filled, large
 from models.bicycle import measured_slip
 from models.files import write_atomically
 from models.logs.log import RecordingError
-from models.logs.signals import COLUMNS, QUANTITIES
-from models.logs.units import FORCE, TABLES
+from models.logs.signals import COLUMNS, MEANINGS, QUANTITIES, signal_name
+from models.logs.units import FORCE, SI, TABLES
 from models.rules import LARGEST_FORCE
 
 MINIMUM_SAMPLES = 10  # of a segment: fewer are no recording
@@ -341,6 +342,17 @@ class Recording:
             f"<Recording {self.name!r}: {self.t.size} samples{pieces} of {self.dt:g} s at "
             f"{self.v_x.min():.3g} to {self.v_x.max():.3g} m/s{truth}>"
         )
+
+    def _repr_html_(self) -> str:
+        segments = f" in {len(self.segments)} segments" if self.breaks else ""
+        size = f"{self.duration:.4g} s{segments}, {len(self)} samples at {1.0 / self.dt:.4g} Hz"
+        rows = [["signal", "", "unit", "from", "to"]]
+        for column, signal in list(_columns(self).items())[1:]:
+            name = signal_name(column) or column
+            ends = (f"{one:.4g}" for one in (signal.min(), signal.max()))
+            rows.append([name, MEANINGS[name], SI[QUANTITIES[name]], *ends])
+        notes = markup.folded(f"{len(self.notes)} notes", self.notes)
+        return markup.card(markup.line(size, self.name), markup.table(rows), notes)
 
 
 def peak(signal: Array) -> float:

@@ -7,25 +7,22 @@ d periods later.
 import math
 from collections import deque
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-from models.sensors import is_measured
 from mpc.cars import CarState, DoubleTrackCar
+from mpc.loop.guide import Guide, Place
 from mpc.loop.lateral import LateralVelocity
 from mpc.loop.pace import Earned
 from mpc.loop.record import COMPLETED, Drive, Recorder
 from mpc.loop.sensing import CarSensors, Measured, Measures
 from mpc.path.path import Path, Projection
 from mpc.path.speed import SpeedProfile
-from mpc.realtime.instance import Measurement
 from mpc.realtime.tracker import Tracker
 
 _SPUN = math.radians(45.0)  # side slip of the center of gravity [rad]
 _SLOWEST = 1.0  # m/s
-
-GUIDES = ("X", "Y", "psi", "v_x")  # without which a car does not know where it is, for long
 
 
 class LearningTires(Protocol):
@@ -88,39 +85,29 @@ def drive(
     tracker.reset(state.delta)
     waiting = deque([state.delta] * delay)
     record = Recorder(plan_every)
-    here, last_s = path.project(state.X, state.Y, 0.0), 0.0
-    place = _Place(state.X, state.Y, state.psi, state.v_x, 0.0, 0.0, (0.0,) * len(GUIDES))
+    here = path.project(state.X, state.Y, 0.0)
+    start = Place(state.X, state.Y, state.psi, state.v_x)
+    guide = Guide(path, tracker, car.speed_gain, start, here)
     ending = ""
     while not ending:
         sensed = measured = sensors.measure(state, rng)
         given = None if lateral is None else lateral.tell(sensed)
         if given is not None:
             measured = given.in_place_of(sensed)
-        place = _located(measured, place, car.period)
+        guide.locate(measured, car.period)
+        place, s = guide.place, guide.here.s
         for channel in place.just_lost(car.period):
             record.note(state.t, f"{channel} is no number: dead reckoning")
-        projected = path.project(place.X, place.Y, last_s)
-        last_s = projected.s
         if learner is not None:
             record.note(state.t, learner.observe(measured, tracker))
         if earned is not None:
-            record.note(state.t, earned.observe(measured, projected.s, place.v_x))
+            record.note(state.t, earned.observe(measured, s, place.v_x))
             profile = earned.profile
-        ahead = profile.ahead(projected.s, place.v_x, tracker.times, car.speed_gain)
-        situation = Measurement(
-            e_y=projected.e_y,
-            e_psi=projected.heading_error(place.psi),
-            v_y=measured.v_y if is_measured("v_y", measured.v_y) else math.nan,
-            r=measured.r if is_measured("r", measured.r) else math.nan,
-            kappa=ahead.kappa,
-            v_x=ahead.v_x,
-        )
-        command = tracker.step(situation)
+        command = guide.steer(measured, profile)
         v_ref = profile.reference(here.s, car.speed_gain)
         if record.plan_is_due:
-            there = profile.ahead(projected.s, place.v_x, tracker.plan_times, car.speed_gain)
-            record.plan(command, there.s)
-        record.add(state, here, sensed, projected.e_y, v_ref, command, given)
+            record.plan(command, guide.ahead(profile, tracker.plan_times).s)
+        record.add(state, here, sensed, guide.here.e_y, v_ref, command, given)
         waiting.append(command.steering)
         try:
             state = car.step(state, waiting.popleft(), v_ref)
@@ -132,57 +119,6 @@ def drive(
             progress(min(here.s / goal, 1.0))
         ending = _ending(state, here, goal, widest, time_limit) or place.complaint(blind)
     return record.drive(name or path.name, path, car, ending)
-
-
-class _Place(NamedTuple):
-    """Where the car is taken to be, [m, rad], and how it moves, [m/s, rad/s].
-
-    silent : for how long each of `GUIDES` has shown no number [s].
-    """
-
-    X: float
-    Y: float
-    psi: float
-    v_x: float
-    v_y: float
-    r: float
-    silent: tuple[float, ...]
-
-    def just_lost(self, dt: float) -> tuple[str, ...]:
-        """Return the guides that show no number since this sample.
-
-        dt : period [s].
-        """
-        pairs = zip(GUIDES, self.silent, strict=True)
-        return tuple(channel for channel, time in pairs if 0.0 < time < 1.5 * dt)
-
-    def complaint(self, blind: float) -> str:
-        """Return which guide has been silent for too long, or nothing.
-
-        blind : longest time [s].
-        """
-        pairs = zip(GUIDES, self.silent, strict=True)
-        lost = ", ".join(channel for channel, time in pairs if time >= blind * (1.0 - 1e-9))
-        return f"no number of {lost} for {blind:g} s" if lost else ""
-
-
-def _located(measured: Measured, last: _Place, dt: float) -> _Place:
-    """Return the measured place; what shows no number goes on by dead reckoning."""
-
-    def value_of(channel: str, otherwise: float) -> float:
-        value: float = getattr(measured, channel)
-        return value if is_measured(channel, value) else otherwise
-
-    v_x, v_y, r = value_of("v_x", last.v_x), value_of("v_y", last.v_y), value_of("r", last.r)
-    psi = value_of("psi", last.psi + dt * r)
-    cos_psi, sin_psi = math.cos(psi), math.sin(psi)
-    X = value_of("X", last.X + dt * (v_x * cos_psi - v_y * sin_psi))
-    Y = value_of("Y", last.Y + dt * (v_x * sin_psi + v_y * cos_psi))
-    silent = tuple(
-        0.0 if is_measured(channel, getattr(measured, channel)) else time + dt
-        for channel, time in zip(GUIDES, last.silent, strict=True)
-    )
-    return _Place(X, Y, psi, v_x, v_y, r, silent)
 
 
 def _ending(

@@ -17,10 +17,13 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from identifier.inertial import InertialIdentifier
 from identifier.inertial.beliefs import Body
 from identifier.run import OnlineIdentifier
+from identifier.tire_model import TireModel
 from models.rules import Positive
 from models.sensors import is_measured
+from models.vehicle import Vehicle
 from mpc.loop.sensing import Measured
 
 _UNKNOWN = 1.0  # m/s: standard deviation of v_y where nothing is known
@@ -101,6 +104,14 @@ class LateralVelocity:
         self._P = np.diag([0.0, _UNKNOWN**2, self.trust.bias**2, self._body.sd_roll**2])
         self._surprise = 1.0  # mean square of the identifier's errors over what it tells of them
         self._last: tuple[Measured, float] | None = None  # a sample ago, and a + b - v_x r of it
+
+    @classmethod
+    def beginning_with(
+        cls, tire: TireModel | None, vehicle: Vehicle, period: float
+    ) -> "LateralVelocity":
+        """Return the estimate of a car by an inertial identifier on its tires, if any are known."""
+        method, start = InertialIdentifier.beginning_with(tire, vehicle, dt=period)
+        return cls(OnlineIdentifier(method, vehicle, period, start))
 
     def tell(self, measured: Measured) -> LateralEstimate:
         """Take a sample; return what it tells.

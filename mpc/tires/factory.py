@@ -38,7 +38,9 @@ def prediction_tire(source: Any, vehicle: Vehicle | None = None) -> PredictionTi
             if vehicle is None:
                 raise ValueError(f"{kind.__name__} needs the vehicle that it is mounted on")
             return of_tire(vehicle, source)
-    raise TypeError(f"no prediction tire can be made of {type(source).__name__}")
+    raise TypeError(
+        f"no prediction tire can be made of {type(source).__name__}: give a TireModel, as run.tire"
+    )
 
 
 MODELS: Mapping[str, Callable[[Any], PredictionTire]] = {

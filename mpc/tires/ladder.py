@@ -76,7 +76,9 @@ def fitted_ladder(alpha: Array, force: Array) -> tuple[Array, Array]:
 SIDES: tuple[Literal["left"], Literal["right"]] = ("left", "right")
 
 
-def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> PredictionTire:
+def oracle_tire(
+    vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0, *, rear: Tire | None = None
+) -> PredictionTire:
     """Return the axle curves of a car on its true tires, lagged by their relaxation lengths.
 
     Load transfer and camber are quasi-steady; drive forces are left out. With downforce curves are
@@ -84,13 +86,16 @@ def oracle_tire(vehicle: Vehicle, tire: Tire | None = None, mu: float = 1.0) -> 
     Formula is fitted to 0.2 % of its peak, a tire with a kink, as Dugoff's, to 1.2 %.
     tire : of all four wheels; None reads the file that the chassis names.
     mu : friction of the road over that of the measurement [-]: scales the peak and its slip.
+    rear : of the rear wheels, where they have another.
     """
     tire = tire_of(vehicle) if tire is None else tire
+    tires = tire, tire if rear is None else rear
     alpha = slip_grid(_LARGEST_SLIP * min(mu, 1.0))
     grid = np.append(0.0, alpha)
-    force = np.stack([cornering_force(vehicle, tire, axle, grid, mu) for axle in (0, 1)])
+    pairs = enumerate(tires)
+    force = np.stack([cornering_force(vehicle, one, axle, grid, mu) for axle, one in pairs])
     force = force[:, 1:] - force[:, :1]  # wheels that are not mirrored push at zero slip, too
-    lengths = np.array(relaxation_lengths(vehicle, (tire, tire)))
+    lengths = np.array(relaxation_lengths(vehicle, tires))
     return _fitted_tire(vehicle, alpha, force, lengths)
 
 

@@ -36,16 +36,16 @@ def car():
 def test_cars_are_of_their_class_and_drive(kind):
     drawn = [random_car(kind, generator(k)) for k in range(40)]
     for one in drawn:
-        vehicle, told = one.vehicle, one.told
+        vehicle, declared = one.vehicle, one.declared
         assert CLASSES[kind].mass[0] <= vehicle.mass <= CLASSES[kind].mass[1]
         assert CLASSES[kind].wheelbase[0] <= vehicle.wheelbase <= CLASSES[kind].wheelbase[1]
-        assert told.chassis is None
-        assert (told.mass, told.l_f, told.yaw_inertia) == (
+        assert declared.chassis is None
+        assert (declared.mass, declared.l_f, declared.yaw_inertia) == (
             vehicle.mass,
             vehicle.l_f,
             vehicle.yaw_inertia,
         )
-        share = told.cornering_stiffness_rear / vehicle.cornering_stiffness_rear
+        share = declared.cornering_stiffness_rear / vehicle.cornering_stiffness_rear
         assert 0.7 <= share <= 1.4
         assert one.tires[0] != one.tires[1]
     assert {type(one.tires[0]) for one in drawn} == {FialaTire, DugoffTire, MagicFormula}
@@ -175,11 +175,11 @@ def test_every_kind_of_beginning_is_drawn_and_is_of_its_kind(car, kind):
 def test_every_case_at_random_makes_a_log_and_a_car(kind):
     one = random_car(kind, generator(13))
     exact = random_drive(one, generator(14)).exact
-    chance = [random_case(one.told, generator(15, k)) for k in range(150)]
+    chance = [random_case(one.declared, generator(15, k)) for k in range(150)]
     for case in chance:
-        log, told = case.log(exact), case.car(one.told)
+        log, declared = case.log(exact), case.car(one.declared)
         assert len(log) > 1000
         assert (log is exact) == (case.fault is None)
-        assert (told is one.told) == (case.told is None)
+        assert (declared is one.declared) == (case.told is None)
     kinds = {type(case.fault) for case in chance} | {type(case.told) for case in chance}
     assert len(kinds) >= 16

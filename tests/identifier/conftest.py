@@ -39,7 +39,7 @@ def drawn(kind, seed):
     """A random car of a class as it is told, and its drive by good sensors."""
     rng = np.random.default_rng(seed)
     drive = random_drive(random_car(kind, rng), rng)
-    return drive.car.told, drive.log(rng)
+    return drive.car.declared, drive.log(rng)
 
 
 def codes_of(findings):

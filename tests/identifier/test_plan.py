@@ -82,12 +82,12 @@ def test_a_car_of_other_tires_learns_more_from_the_first_than_from_the_last(kind
     rng = np.random.default_rng([seed, 31])
     car = random_car(kind, rng)
     asked = random_drive(car, rng).exact
-    ranked = plan(car.told, friction=friction, speeds=[4.0 * car.told.froude_speed])
+    ranked = plan(car.declared, friction=friction, speeds=[4.0 * car.declared.froude_speed])
     errors = []
     for one in (ranked[0], ranked[-1]):
         run = car.plant.simulate(one.maneuver, speed=one.speed)
         log = car.sensors.apply(run.recording(), np.random.default_rng(1))
-        tire = fit([replace(log, axle_force=None)], car.told).model
+        tire = fit([replace(log, axle_force=None)], car.declared).model
         errors.append(np.mean(force_error(tire, asked)) / 100.0)
     assert errors[1] > 1.5 * errors[0]
     assert errors[0] < 2.0 * ranked[0].error

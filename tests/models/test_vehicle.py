@@ -70,7 +70,9 @@ def test_axle_loads_balance_weight_and_pitch_moment():
         (SIX.replace("1500", "nan"), "mass must be positive"),
         (SIX + "chassis = 3\n", "chassis must be a table"),
         (SIX + "[chassis]\ntrack = 1.5\n", "chassis.track is unknown"),
-        (SIX + "[chassis]\ntrack_front = 1.5\n", "chassis.track_rear is missing"),
+        (SIX + "[chassis]\ncg_height = -0.5\n", "cg_height must be positive"),
+        (SIX + "[chassis]\nroll_stiffness = 100.0\n", "roll_stiffness must exceed"),
+        (SIX + "[chassis]\nestimated = []\n", "chassis.estimated is unknown"),
         ("mass = -1\nl_f = 1\nl_r = 1\n", "mass must be positive"),
         ("mass = 1e308\nl_f = 1\nl_r = 1\n", "mass must lie between"),
         ("mass = 1500\nl_f = nan\nl_r = 1\n", "l_f must be positive"),
@@ -190,3 +192,20 @@ def test_what_braking_wants_to_know_comes_back_from_files(tmp_path):
     plain = car_of(tmp_path, SIX)
     assert [plain.lengthwise(name) for name in _OF_CHASSIS] == [None] * 3
     assert plain.drag == pytest.approx(0.5 * 1.2 * 0.7 / 1500.0)
+
+
+def test_what_a_chassis_leaves_out_is_typical_of_the_size_of_the_car(tmp_path):
+    """The rules give back the built-in sedan to a fifth; what is stated stays."""
+    car = replace(sedan(), chassis=None, cg_height=0.55).with_chassis()
+    c = car.require_chassis()
+    for one in c.estimated:
+        assert getattr(c, one) == pytest.approx(getattr(CHASSIS, one), rel=0.2), one
+        assert f"{one} = " in car.assumed
+    written(tmp_path, SIX + "[chassis]\ntrack_front = 1.9\n").replace(tmp_path / "part.toml")
+    part = Vehicle.from_toml(tmp_path / "part.toml")
+    inner = part.require_chassis()
+    assert inner.track_front == 1.9 and "track_front" not in inner.estimated
+    assert part.lengthwise("cg_height") is None, "nobody declared it"
+    part.to_toml(tmp_path / "again.toml")
+    again = Vehicle.from_toml(tmp_path / "again.toml")
+    assert again == part and again.require_chassis().estimated == inner.estimated

@@ -14,6 +14,7 @@ from models.plant import Plant
 from models.recordings import read_recording, write_recording
 from models.vehicle import sedan
 from tests.pages import faults_of
+from tests.tireid.browser import opened_tab
 from tireid.cli import main
 from tireid.commands.demo_story import run_story
 
@@ -65,6 +66,12 @@ def story():
 def out(tmp_path):
     """Where a command is told to write its results; not there yet."""
     return tmp_path / "out"
+
+
+@pytest.fixture
+def tab(tmp_path):
+    with opened_tab(tmp_path) as tab:
+        yield tab
 
 
 @pytest.fixture

@@ -6,12 +6,14 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from xml.etree import ElementTree
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import tireid as ti
+from codegen.markup import AXLE_COLORS
 from identifier.methods import make_method
 from models.recordings import RecordingError
 from mpc.prediction import build_dynamics
@@ -22,6 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("codegen", "models", "identifier", "mpc", "tireid")
 HEAVY = {"matplotlib", "control", "scipy", "casadi", "numpy"}
 KINDS = ("axle", "integral", "linear", "lagged_ekf")
+MARKUP = 20_000  # bytes that a notebook stores of a run, at most
 STATES = ((0.0, 0.0, 0.02), (0.3, 0.4, 0.05), (-1.2, 0.2, -0.1))  # v_y, r, delta
 
 
@@ -135,8 +138,9 @@ def test_all_errors_have_one_base_and_the_builtin_of_their_meaning():
     for path in (path for name in PACKAGES for path in (ROOT / name).rglob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             bases = [one.id for one in getattr(node, "bases", []) if isinstance(one, ast.Name)]
-            if {base for base in bases if hasattr(builtins, base)} and node.name != "TireidError":
-                assert not hasattr(builtins, bases[0]), f"{path}: {node.name}"
+            errors = [issubclass(getattr(builtins, one, object), BaseException) for one in bases]
+            if any(errors) and node.name != "TireidError":
+                assert not errors[0], f"{path}: {node.name}"
     for error in [one for one in vars(ti.errors).values() if isinstance(one, type)]:
         assert issubclass(error, ti.TireidError)
         meanings = ValueError | ArithmeticError | RuntimeError
@@ -341,3 +345,20 @@ def test_logs_runs_and_tires_are_equal_to_themselves_alone(log, run, tires):
     for one in (log, run, ti.replay(log, tires["axle"]), *tires.values()):
         assert one == one and len({one, one}) == 1
     assert log != replace(log) and tires["axle"] != run.freeze()
+
+
+def test_a_notebook_displays_the_answers_of_a_run(log, car, tires):
+    hostile = replace(log, name="<script>a</script> & b", notes=("<i>read</i>",))
+    run = ti.identify(hostile, car)
+    page = run._repr_html_()
+    assert len(page) < MARKUP and run.verdict.word in page
+    for part in (run.recording, run.tire, run.verdict):
+        assert part._repr_html_() in page
+    words = " ".join(" ".join(ElementTree.fromstring(page).itertext()).split())  # well-formed
+    for text in (hostile.name, "<i>read</i>", "yaw rate rad/s", *run.verdict.lines[1:2]):
+        assert text in words
+    for color in AXLE_COLORS:
+        assert page.count(color) == 4  # name, band, curve as far as it is known and beyond
+    assert all("<polyline" in tire._repr_html_() for tire in tires.values())
+    filtered = ti.identify(log, car, make_method("linear_kf", car))._repr_html_()
+    assert "No tires:" in filtered and "<svg" not in filtered

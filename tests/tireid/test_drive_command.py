@@ -229,22 +229,31 @@ def test_tires_of_another_car_lead_somewhere(bend, tmp_path, out, capsys, undraw
     tire = ti.identify(log, car).freeze()
     heavy = replace(tire, vehicle=replace(car, mass=1.1 * car.mass, name="heavy"))
     heavy.save(tmp_path / "heavy.json")
+    car.to_toml(tmp_path / "sedan.toml")
     words = ["drive", "--path", bend, "--weights", tmp_path / "heavy.json"]
-    said = refusal(capsys, [*words, "--out", out])
-    masses = f"(mass {1.1 * car.mass:.6g} there, {car.mass:.6g} here)"
-    assert (
-        f"was identified on the car 'heavy', driven is 'sedan' {masses}: give that car by" in said
-    )
-    assert "tireid init" in said and "docs/driving.md" in said
+    said = refusal(capsys, [*words, "--vehicle", tmp_path / "sedan.toml", "--out", out])
+    masses = f"(mass {1.1 * car.mass:.6g}, driven {car.mass:.6g})"
+    assert f"heavy.json is of another car {masses}: leave --vehicle out" in said
     replace(tire, vehicle=replace(car, name="mine")).save(tmp_path / "mine.json")
     words = ["drive", "--path", bend, "--weights", tmp_path / "mine.json", "--film", "none"]
     words += ["--speed", "0.7g"]
     assert typed(*[*words, "--out", out]) == 0
 
 
-def test_a_car_without_chassis_leads_to_the_table(bend, tmp_path, capsys):
+def test_a_car_without_chassis_is_driven_on_its_identified_tires(bend, tmp_path, capsys, undrawn):
+    """What identify was given is enough; what is assumed of the rest is said and stored."""
     assert typed("init", tmp_path / "car.toml") == 0
-    words = ["drive", "--path", bend, "--vehicle", tmp_path / "car.toml", "--out", tmp_path / "out"]
-    said = refusal(capsys, words)
-    assert "`tireid init car.toml` writes one" in said
-    assert "docs/driving.md (The car that is driven)" in said
+    words = ["drive", "--path", bend, "--out", tmp_path / "out", "--film", "none"]
+    own = [*words, "--vehicle", tmp_path / "car.toml"]
+    assert len(said := refusal(capsys, own)) <= 120 and "or drive with --weights" in said
+    tire = ti.identify(ti.sample_recording(), ti.Vehicle.from_toml(tmp_path / "car.toml")).tire
+    tire.save(tmp_path / "weights.json")
+    for given in (own, words):
+        assert typed(*given, "--weights", tmp_path / "weights.json", "--force") == 0
+        said = capsys.readouterr().err
+        assumed = said[said.index("simulated on the sedan's tires") :].split("  ISO")[0]
+        assert "track_front = 1.54" in assumed and "cg_height = 0.54" in assumed
+        assert max(map(len, assumed.splitlines()[:4])) <= 120
+        summary = summary_of(tmp_path / "out")
+        assert "cg_height" in summary["inputs"]["chassis"]["estimated"]
+        assert summary["completed"] and summary["rms_e_y_m"] < 0.1

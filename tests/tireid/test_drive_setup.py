@@ -8,12 +8,13 @@ import pytest
 from identifier.speed_limits import SpeedLimits
 from models.vehicle import GRAVITY, sedan
 from mpc.path import Path, handling_course, speed_profile
+from mpc.tires.ladder import cornering_force, oracle_tire
 from tests.identifier.export.test_emitted import fitted, network
 from tireid.commands.drive import parse_fault
 from tireid.driving import runs
 from tireid.driving.results import headline
 from tireid.driving.runs import Conditions
-from tireid.driving.setup import Setup, SpeedWish, _profile
+from tireid.driving.setup import Setup, SpeedWish, _profile, simulated
 
 AROUND = np.linspace(0.0, 2.0 * np.pi, 101)[:-1]
 COURSE = Path.from_waypoints(90.0 * np.cos(AROUND), 40.0 * np.sin(AROUND), closed=True, name="oval")
@@ -95,6 +96,21 @@ def test_a_drop_comes_at_a_place_along_x_and_at_a_time_elsewhere():
     (around,) = setup(COURSE, SpeedWish(speed=16.0), drops).friction().changes
     assert around.at_place is None and around.at_time == pytest.approx(60.0 / 16.0)
     assert setup(LANE, SpeedWish(speed=16.0), mu=0.7).friction().scale == 0.7
+
+
+def test_a_car_without_tire_file_has_stiffness_and_grip_of_its_identified_tires():
+    """In steady cornering, load transfer included; one that names its tires is left alone."""
+    tire = fitted()
+    car, tires = simulated(replace(sedan(), chassis=None), tire)
+    slip = np.linspace(0.0, 0.4, 401)
+    for axle in (0, 1):
+        force = cornering_force(car, tires[axle], axle, slip, 1.0)
+        assert force[1] / slip[1] == pytest.approx(tire.stiffness[axle], rel=0.01)
+        identified = tire.force(np.linspace(0.0, 2.0 * tire.known_slip[axle], 101))[:, axle]
+        assert force.max() == pytest.approx(identified.max(), rel=0.01)
+    both = setup(LANE, SpeedWish(speed=9.0))._replace(vehicle=car, tires=tires).oracle()
+    assert not np.allclose(both.weights, oracle_tire(car, tires[0]).weights)
+    assert simulated(sedan(), tire) == (sedan(), None)
 
 
 def said(drive, delay=2, noise=True, faults=(), **more):

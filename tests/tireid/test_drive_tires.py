@@ -13,7 +13,7 @@ from mpc.tires import prediction_tire
 from mpc.tires.tire import curves_at
 from tests.tireid.test_drive_setup import LANE, setup
 from tireid.driving.results import _known_curves
-from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE
+from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Known
 from tireid.driving.setup import SpeedWish
 from tireid.figures.drive import AT_THE_END
 
@@ -37,13 +37,18 @@ def test_the_true_tire_is_shown_on_the_first_and_on_the_last_friction():
     assert most.sum() == pytest.approx(CAR.mass * cornering_limit(CAR, mu=0.9), rel=0.1)
 
 
-def test_what_a_tracker_was_told_later_is_shown_as_the_end():
-    soft = prediction_tire(replace(CAR, cornering_stiffness_front=4e4))
+def test_what_a_tracker_got_later_is_drawn_as_the_end_up_to_its_known_slip():
+    first, soft = prediction_tire(CAR), prediction_tire(replace(CAR, cornering_stiffness_front=4e4))
     same = SimpleNamespace(label=FROZEN, model=soft, final=soft)
-    changed = SimpleNamespace(label=LEARNING, model=prediction_tire(CAR), final=soft)
-    labels = [curve.label for curve in _known_curves([same, changed], SETUP, None)]
-    assert FROZEN in labels and FROZEN + AT_THE_END not in labels
-    assert LEARNING + AT_THE_END in labels and LEARNING not in labels
+    known = [Known(0.0, first.weights, soft.weights, np.array([0.02, 0.03])),
+             Known(1.0, soft.weights, soft.weights, np.array([0.101, np.nan]))]  # fmt: skip
+    changed = SimpleNamespace(label=LEARNING, model=first, final=soft, known=known)
+    curves = {curve.label: curve for curve in _known_curves([same, changed], SETUP, None)}
+    assert FROZEN in curves and FROZEN + AT_THE_END not in curves
+    assert LEARNING + AT_THE_END in curves and LEARNING not in curves
+    drawn = np.isfinite(curves[LEARNING + AT_THE_END].force)
+    np.testing.assert_array_equal(drawn[:, 0], np.abs(ALPHA) <= 0.101)
+    assert drawn[:, 1].all()  # where nobody says how far it is known
 
 
 @pytest.mark.parametrize("v_x", [8.0, 16.0])

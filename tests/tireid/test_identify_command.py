@@ -202,11 +202,12 @@ def test_the_first_screen_says_what_is_missed_and_shows_the_curve(ended, law):
     front, rear = (f"{100.0 * share:.1f}" for share in verdict["measures"]["force_missed"])
     page = page_in(result)
     tiles = re.findall(r"<dt>(.*?)</dt><dd>(.*?)</dd>", page)
-    assert tiles[1][1] == f"{front} / {rear} %"
+    assert len(tiles) == 3 and tiles[1][1] == f"{front} / {rear} %"
     assert f"model error over the force in the motion: {front} / {rear} %" in printed
     curve = page.index("Figure 1.</b> ")
-    assert re.match("(NOT VALID. )?Axle force over slip angle", page[curve + 14 :])
-    notes = page.index('<ul class="warnings' if '<ul class="warnings' in page else "No warnings.")
+    refusal = '<span class="bad">NOT VALID</span>. '
+    assert page[curve + 14 :].removeprefix(refusal).startswith("Axle force over slip angle")
+    notes = page.index('<div class="notes' if '<div class="notes' in page else "No notes.")
     assert page.index("<dl") < curve < notes
     refused = 'class="bad"><dt>the verdict' in page
     assert refused == (not verdict["valid"])
@@ -215,7 +216,9 @@ def test_the_first_screen_says_what_is_missed_and_shows_the_curve(ended, law):
         assert 'class="struck"' not in page
         assert verdict["valid"] and json_of(result / "weights.json")["valid"] is True
         assert (stiff["axle"], stiff["state"]) == ("front", "valid")
-    assert printed_value(stiff["value"], stiff["sd"], "N/rad") in page
+    assert printed_value(stiff["value"], stiff["sd"], "N/rad") in outline(page).text.replace(
+        "\xa0", " "
+    )
     assert "cornering stiffness [kN/rad]" in printed and " N/rad" not in printed
 
 
@@ -532,11 +535,11 @@ def test_what_is_not_valid_exits_with_three_unless_it_is_accepted(logs, tmp_path
         assert "NOT VALID" in page
         assert "Verdict" in page
         assert '<div class="bad"><dt>the verdict' in page
-        assert page.count('class="struck"') >= 4, "numbers of the refused axles"
+        assert page.count('class="struck"') >= 2, "numbers of the refused axles"
         assert '<div class="good">' not in page
     ask = ["predict", tmp_path / "refused" / "weights.json", logs / "quick.csv"]
     assert typed(*ask, "--accept", "--out", tmp_path / "asked") == 0
-    assert "was not valid on its identification drive" in capsys.readouterr().err
+    assert "has no valid verdict on its identification drive" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("law", ["axle", "integral", "lagged_ekf"])

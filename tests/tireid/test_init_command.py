@@ -38,7 +38,7 @@ def test_with_the_comment_signs_taken_away_it_is_a_car_that_can_be_simulated(tmp
     assert (car.estimated, car.estimates) == ((), "")
     assert car.bicycle == sedan().bicycle
     for one in fields(Chassis):
-        if one.name != "tire":
+        if one.name not in ("tire", "estimated"):
             ours, theirs = (getattr(c.require_chassis(), one.name) for c in (car, sedan()))
             assert ours == theirs, one.name
     assert car.require_chassis().tire == tmp_path / "my_tire.tir"
@@ -85,4 +85,4 @@ def test_the_documented_table_is_the_one_that_is_read():
     page = (DOCS / "driving.md").read_text(encoding="utf-8")
     section = page.partition("## The car that is driven")[2].partition("\n## ")[0]
     documented = re.findall(r"`(\w+)`", "\n".join(re.findall(r"(?m)^\| (`.*?) \|", section)))
-    assert documented == [one.name for one in fields(Chassis)]
+    assert documented == [one.name for one in fields(Chassis) if one.name != "estimated"]

@@ -75,7 +75,7 @@ def test_it_leaves_a_report_with_figures(model, logs, blind, tmp_path, capsys):
             capsys.readouterr().out
         )
         assert '<div class="good"><dt>the verdict' in page
-        assert page.index("Axle force over slip angle") < page.index("No warnings.")
+        assert page.index("Axle force over slip angle") < page.index("No notes.")
 
 
 def test_without_truth_it_says_what_of_the_motion_is_explained(model, blind, out, capsys, undrawn):
@@ -104,7 +104,7 @@ def test_a_model_of_half_the_force_explains_less_and_looks_refused(
     page = page_in(tmp_path / "half")
     assert '<div class="bad"><dt>the verdict' in page and 'class="struck"' in page
     assert "NOT VALID. Axle force over slip angle" in page
-    assert '<li class="bad">' in page and "was not valid on its identification drive" in page
+    assert '<li class="bad">' in page and "has no valid verdict on its identification" in page
     assert '<div class="good">' not in page
 
 

@@ -2,20 +2,24 @@
 
 import re
 from base64 import b64decode
+from itertools import product
 from pathlib import Path
 
 import pytest
 from matplotlib.figure import Figure
 
 from tests.pages import faults_of, outline
+from tests.tireid.conftest import learn_words, typed
 from tireid.figures.style import figure_png
 from tireid.report import (
     Headline,
     Marked,
+    Note,
     Picture,
     Report,
     Section,
     Table,
+    merged,
     report_html,
     write_report,
 )
@@ -38,8 +42,8 @@ SECTIONS = [
 ]
 
 
-def page_of(title, sections, summary=""):
-    return report_html(Report(title=title, sections=sections, summary=summary))
+def page_of(title, sections, summary="", **more):
+    return report_html(Report(title=title, sections=sections, summary=summary, **more))
 
 
 def outside_references(page):
@@ -84,8 +88,8 @@ def test_report_says_everything_it_was_given_and_nothing_as_markup():
 def test_columns_of_numbers_are_aligned_right_and_gaps_are_dashes():
     table = Table("c", ["a", "b"], [["x", -1.5], ["y", float("nan")]])
     page = page_of("T", [Section("h", [table])])
-    assert '<td>x</td><td class="number">\N{MINUS SIGN}1.5</td>' in page
-    assert '<td>y</td><td class="number">\N{EN DASH}</td>' in page
+    assert 'data-of="a">x</td><td data-of="b" class="number">\N{MINUS SIGN}1.5</td>' in page
+    assert 'data-of="a">y</td><td data-of="b" class="number">\N{EN DASH}</td>' in page
 
 
 def test_rows_that_do_not_fit_and_pictures_that_are_none_are_refused(tmp_path):
@@ -99,33 +103,40 @@ def test_rows_that_do_not_fit_and_pictures_that_are_none_are_refused(tmp_path):
 
 
 def test_what_something_is_worth_is_seen():
-    table = Table(
-        "c",
-        ["", "front"],
-        [["stiffness", Marked("127 ± 5", "struck", "not valid")]],
-    )
+    rows = [["stiffness", Marked("127 ± 5", "struck", "not <valid>")], ["b", "cannot judge"]]
     page = report_html(
         Report(
             title="t",
-            sections=[Section("h", [table])],
-            numbers=[
-                Headline("NOT VALID", "the verdict", "bad"),
-                Headline([Marked("1"), Marked("2", "unknown", "not <known>")], "two axles"),
-            ],
-            lead=[Picture(PNG, "the curve")],
-            warnings=[Marked("not valid: a", "bad"), "note: b"],
+            sections=[Section("h", [Table("c", ["", "front"], rows)])],
+            numbers=[Headline("NOT VALID", "the verdict", "bad")],
+            lead=[Picture(PNG, "Cannot judge. The curve")],
+            notes=["b", Note("not valid: a", "bad")],
         )
     )
-    assert '<div class="bad"><dt>the verdict</dt><dd>NOT VALID</dd></div>' in page
-    assert '<span class="unknown">2</span><small class="unknown">not &lt;known&gt;</small>' in page
-    struck = (
-        '<td class="number"><span class="struck">127 ± 5</span><small class="unknown">not valid'
-    )
+    assert '<div class="bad"><dt>the verdict</dt><dd><span class="bad">NOT VALID' in page
+    struck = '<span class="struck">127 ±\N{NO-BREAK SPACE}5</span><small class="unknown">not &lt;'
     assert struck in page
-    assert '<ul class="warnings refusals">' in page
-    assert '<li class="bad">not valid: a</li>' in page and "<li>note: b</li>" in page
-    assert page.index("NOT VALID") < page.index("Figure 1.") < page.index("note: b")
+    assert page.count('<span class="doubt">') == 2, "in the caption and the table"
+    assert '<div class="notes refusals">\n<ul>\n<li class="bad">not valid: a</li>\n<li>b' in page
+    assert page.index("NOT VALID") < page.index("Figure 1.") < page.index("<li>b")
     assert faults_of(page) == []
+
+
+def test_a_finding_of_several_axles_and_drives_is_one_note_and_few_stand_above_the_sections():
+    said = [
+        Note(f"{axle} axle: {share} % of the samples slip too far", where=drive)
+        for drive, shares in (("a", (3, 9)), ("b", (69, 9)))
+        for axle, share in zip(("front", "rear"), shares, strict=True)
+    ]
+    (one,) = merged([*said, *said])
+    assert one.text == "front / rear axle: 3 / 9 and 69 / 9 % of the samples slip too far"
+    assert one.where == "a and b"
+    notes = [*said, "second", "third", "fourth", "fifth", Note("refused", "bad"), "second"]
+    page = page_of("T", SECTIONS, notes=notes)
+    above, folded = page.split("<details>\n<summary>3 more notes</summary>")
+    assert above.count("<li") - above.count("<li><a") == 3
+    assert above.index("refused") < above.index("front / rear") < above.index("second")
+    assert "fourth" in folded and folded.index("fifth") < folded.index("<section>")
 
 
 def test_report_replaces_the_old_one_whole(tmp_path, monkeypatch):
@@ -175,3 +186,22 @@ def test_a_film_and_a_drawing_are_embedded_as_what_they_are():
         assert str(image).startswith(f"data:image/{kind};base64,")
         assert b64decode(str(image).split(",")[1]) == content
         assert "how" in parser.text
+
+
+def test_no_table_is_cut_in_a_window_or_on_a_telephone(tab, logs, tmp_path):
+    name, long = "drive_of_a_car_" * 4, "0.0123 ± 0.0045 m/s"
+    tables = [
+        Table("c", [f"a title of the column {k}" for k in range(7)], [[name, *[long] * 6]]),
+        Table("d", ["", "front", "rear"], [["W" * 60, Marked(long, "unknown", "not known"), 1.0]]),
+        Table("e", ["what", "value"], [["command", f"tireid {'/a/path' * 30}"]], verbatim=True),
+    ]
+    write_report(tmp_path, Report(title="T", sections=[Section("h", tables)], notes=[name] * 9))
+    assert typed(*learn_words(logs), "--replay", logs / "quick.csv", "--out", tmp_path / "out") == 0
+    cut = "[...document.querySelectorAll('div.scroll')].filter(e => e.scrollWidth > "
+    for folder, width in product((tmp_path, tmp_path / "out"), (1200, 500)):
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        tab.call("Emulation.setDeviceMetricsOverride", **size)
+        tab.call("Page.navigate", url=(folder / "report.html").as_uri())
+        tab.wait("document.readyState === 'complete' && document.querySelector('table') !== null")
+        assert tab.value(f"{cut} e.clientWidth).map(e => e.textContent).join()") == ""
+        assert tab.value("document.documentElement.scrollWidth") <= width

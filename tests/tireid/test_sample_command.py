@@ -29,7 +29,7 @@ def test_the_car_is_the_one_that_drove_and_both_can_be_learnt_from(written):
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "said"),
     [
         (["log.txt"], ".csv"),
         (["log.csv"], "exists: choose another, or add --force"),
@@ -38,12 +38,12 @@ def test_the_car_is_the_one_that_drove_and_both_can_be_learnt_from(written):
     ],
 )
 def test_what_cannot_be_written_is_refused_before_it_is_driven(
-    written, words, told, capsys, monkeypatch
+    written, words, said, capsys, monkeypatch
 ):
     monkeypatch.chdir(written)
     before = (written / "log.csv").read_bytes()
     assert typed("sample", *words) == 2
-    assert told in capsys.readouterr().err
+    assert said in capsys.readouterr().err
     assert (written / "log.csv").read_bytes() == before
     assert not (written / "new.csv").exists()
 

@@ -13,7 +13,7 @@ Errors are {"front", "rear"} in N; null stands for what diverged or is not there
 import csv
 from collections.abc import Iterator
 from dataclasses import astuple
-from itertools import product
+from itertools import compress, product
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from codegen.writing import naming, write_file
 from identifier.compare.course import INFINITE, same_and_other
 from identifier.compare.study import Comparison, ranking
 from identifier.frozen import vehicle_numbers
-from identifier.methods import make_method, methods
+from identifier.methods import DEFAULT, make_method, methods
 from identifier.reproducibility import AxleRmse, freeze_key
 from tireid import __version__
 from tireid.figures.compare import methods_figure
@@ -35,6 +35,7 @@ from tireid.report import (
     Block,
     Headline,
     Images,
+    Note,
     Report,
     Section,
     Table,
@@ -42,7 +43,8 @@ from tireid.report import (
     origin,
     write_report,
 )
-from tireid.verdicts import Verdicts, verdicts_headline, verdicts_warnings
+from tireid.reports.identify import estimates_notes
+from tireid.verdicts import Verdicts, verdicts_headline, verdicts_notes
 
 
 def summary_rows(comparison: Comparison) -> list[list[str]]:
@@ -217,10 +219,13 @@ def write_compare_report(
 
     verdicts : on what the default learns, by recording.
     """
-    course, rows, said = comparison.course, summary_rows(comparison), remarks(comparison)
+    course, said, rows = comparison.course, remarks(comparison), summary_rows(comparison)
+    slips = ", ".join(f"{row[0]} {row[4]}°" for row in rows[1:] if row[4] != "-")
+    known = [not {*cells} <= {"-", ""} for cells in zip(*rows[1:], strict=True)]
+    rows = [list(compress(row, known)) for row in rows]
     captions = {
-        "methods": "Errors of every method.",
-        "side_slip": "Side slip estimated by methods without a lateral velocity.",
+        "methods": _methods_caption(comparison),
+        "side_slip": f"Side slip estimated without a lateral velocity, rms error: {slips}.",
     }
     blocks: list[Block] = [
         Table(
@@ -231,16 +236,13 @@ def write_compare_report(
         ),
         *drawings(figures, captions),
     ]
-    meaning = "recordings with a valid model of the default"
+    meaning = f"recordings with a valid model of {DEFAULT}, the default"
     report = Report(
         title=f"Methods compared on {course.vehicle.name}",
         summary="Each method is identified on each recording, frozen at its end and replayed on "
         "all.",
-        numbers=[*verdicts_headline(verdicts, meaning, "good"), *_compare_headlines(comparison)],
-        warnings=[
-            *_compare_warnings(comparison),
-            *verdicts_warnings(verdicts, "The default identified on {}: "),
-        ],
+        numbers=[*verdicts_headline(verdicts, meaning), *_compare_headlines(comparison)][:3],
+        notes=[*verdicts_notes(verdicts), *_compare_notes(comparison)],
         sections=[
             Section("Errors of the methods", blocks),
             origin(command, course.vehicle, course.recordings, seed=str(comparison.seed)),
@@ -249,31 +251,43 @@ def write_compare_report(
     write_report(folder, report)
 
 
-def _compare_headlines(comparison: Comparison) -> list[Headline]:
-    numbers = []
-    kind, where = "in_sample", "frozen, same drive"
+def _errors(comparison: Comparison) -> tuple[str, dict[str, float]]:
+    """Return where errors are compared, and the error of each method there, the best first [%]."""
+    kind, where = "in_sample", "on the same recording"
     if len(comparison.names) > 1:
-        kind, where = "other", "frozen, on other recordings"
-    for name in ranking(comparison):
-        value = getattr(comparison.shares(name), kind)
-        if value is not None and np.isfinite(value):
-            meaning = f"error in % of the rms force, {name}, {where}"
-            numbers.append(Headline(f"{value:.1f} %", meaning))
-    return numbers[:4]
+        kind, where = "other", "on other recordings"
+    shares = {name: getattr(comparison.shares(name), kind) for name in ranking(comparison)}
+    finite = {name: one for name, one in shares.items() if one is not None and np.isfinite(one)}
+    return where, finite
 
 
-def _compare_warnings(comparison: Comparison) -> list[str]:
-    vehicle = comparison.course.vehicle
-    said = [f"{vehicle.estimates}."] if vehicle.estimates else []
+def _compare_headlines(comparison: Comparison) -> list[Headline]:
+    where, errors = _errors(comparison)
+    return [
+        Headline(f"{value:.1f} %", f"error of {name} {where}, over the rms force")
+        for name, value in errors.items()
+    ]
+
+
+def _methods_caption(comparison: Comparison) -> str:
+    where, errors = _errors(comparison)
+    ends = [f"{name} {value:.1f} %" for name, value in errors.items()]
+    least = f"; frozen {where} from {ends[0]} to {ends[-1]} of the rms force" if ends else ""
+    return f"Errors of every method{least}."
+
+
+def _compare_notes(comparison: Comparison) -> list[Note]:
+    said = estimates_notes(comparison.course.vehicle)
     if comparison.course.by_motion:
-        said.append(
+        text = (
             "Without true forces, methods are judged by the mean force in the motion over 0.3 s, "
             "sensor noise subtracted. A wrong mass scales all alike."
         )
+        said.append(Note(text))
     for name, trial in comparison.trials.items():
         at = [f"{where} at {freeze_key(t)} s" for where, t in trial.diverged_at.items()]
         if at:
-            said.append(f"{name} diverged on {', '.join(at)}.")
+            said.append(Note(f"{name} diverged on {', '.join(at)}."))
     if len(comparison.names) == 1:
-        said.append("One recording only: give a second one as validation drive.")
+        said.append(Note("One recording only: give a second one as validation drive."))
     return said

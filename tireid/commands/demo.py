@@ -12,14 +12,12 @@ from codegen import find_compiler
 from identifier.export.compiled import CompiledPackage
 from identifier.paper_study import GAINS, NETWORK, STEPS, Study, run_study
 from identifier.run import identify
-from identifier.tire_model import TireModel
-from identifier.verdict import Verdict
 from models.vehicle import GRAVITY
 from mpc.path import BUILT_IN
 from tireid.commands import certificate_table
 from tireid.commands import options as shared
 from tireid.commands.check import draw_check
-from tireid.commands.demo_story import FREEZE, SPEED, STORY, Story, run_story
+from tireid.commands.demo_story import SPEED, STORY, Story, run_story
 from tireid.commands.paper import (
     MEANING,
     MEASURES_MEAN,
@@ -28,15 +26,23 @@ from tireid.commands.paper import (
     table_text,
     write_study,
 )
-from tireid.driving.results import SCORES, Drives, headline, known_blocks, score_rows
+from tireid.driving.results import (
+    SCORES,
+    Drives,
+    errors_caption,
+    film_picture,
+    headline,
+    known_blocks,
+    score_rows,
+)
 from tireid.driving.runs import FROZEN, LEARNING, LINEAR, ORACLE, Conditions
 from tireid.driving.setup import Setup, SpeedWish
 from tireid.exporting import Exported, export, self_test
 from tireid.figures.film import FORMATS
 from tireid.figures.paper import SCHEME
+from tireid.identified import Results
 from tireid.progress import Progress, tell
 from tireid.report import (
-    READ,
     Block,
     Headline,
     Images,
@@ -49,37 +55,15 @@ from tireid.report import (
     printed,
     write_report,
 )
-from tireid.reports.identify import (
-    curve_drawing,
-    identify_headlines,
-    identify_warnings,
-    learnt_blocks,
-)
-from tireid.verdicts import (
-    model_error_headline,
-    number_headlines,
-    verdict_headline,
-    verdict_section,
-    verdict_warnings,
-)
+from tireid.reports.captions import slip_caption
+from tireid.reports.identify import curve_drawing, identify_notes, learnt_blocks, replay_picture
+from tireid.verdicts import model_error_headline, verdict_headline, verdict_notes, verdict_section
 
 LANE_CHANGE, _SLIPPERY = "drive", "drive_slippery"  # folders beside the report
 _FILM = FORMATS[0]
-_CASES = {  # path, a_y in bends [g], drops of friction [m] and to what, tires; in a number's words
-    LANE_CHANGE: (
-        "iso-3888-2",
-        0.79,
-        (),
-        (FROZEN, LINEAR, ORACLE),
-        "in the lane change at 0.79 g",
-    ),
-    _SLIPPERY: (
-        "slalom",
-        0.5,
-        ((110.0, 0.5),),
-        (LEARNING, FROZEN, LINEAR),
-        "where friction drops to half",
-    ),
+_CASES = {  # path, a_y in bends [g], drops of friction [m] and to what, tires
+    LANE_CHANGE: ("iso-3888-2", 0.79, (), (FROZEN, LINEAR, ORACLE)),
+    _SLIPPERY: ("slalom", 0.5, ((110.0, 0.5),), (LEARNING, FROZEN, LINEAR)),
 }
 NOT_DRIVEN = "No C compiler (gcc) was found: the tracker cannot be built, the car did not drive."
 
@@ -99,7 +83,7 @@ def drive_story(story: Story, folder: Path) -> dict[str, Driven]:
     compiler.
     """
     found: dict[str, Driven] = {}
-    for name, (path, a_y, drops, labels, _) in _CASES.items() if find_compiler() else ():
+    for name, (path, a_y, drops, labels) in _CASES.items() if find_compiler() else ():
         wish = SpeedWish(a_y=a_y * GRAVITY)
         setup = Setup(BUILT_IN[path](), story.car, 1.0, drops, wish)
         conditions = Conditions(setup=setup, delay=2, noise=True, seed=0, laps=1.0)
@@ -123,44 +107,37 @@ def drive_section(driven: _Cases, folder: Path) -> Section:
     blocks: list[Block] = [
         (
             "A model predictive tracker steers the car around the cones. It plans 2 s ahead, "
-            "100 times a second, with noisy sensors and 20 ms of delay. In the middle of the "
-            "slalom the friction drops to half, which is the limit of this path, and no tracker "
-            "gets this friction. One tracker goes on identifying: its tire is replaced where "
-            "recent innovations require it and the new one explains the last seconds better. The "
-            "others keep the tires that were frozen before, or the linear ones."
+            "100 times a second, with noisy sensors and 20 ms of delay. In the slalom friction "
+            "drops to half; no tracker gets it. The learning one replaces its tire where "
+            "innovations require it, the others keep frozen or linear tires."
         ),
-        Picture(
-            folder / _SLIPPERY / f"drive.{_FILM}",
-            "The drive of the learning car; outlines are the others.",
-            READ["film"],
-        ),
-        *_scores(slippery, "Deviation and the rest along the path."),
+        film_picture(folder / _SLIPPERY / f"drive.{_FILM}", slippery.drives.runs),
+        *_scores(slippery),
         *known_blocks(slippery.drives.runs, slippery.figures),
         (
-            "The lane change of ISO 3888-2 at 0.79 g, nine tenths of what the tires can give: with "
-            "the frozen model the tracker drives as well as with the true tires. "
-            f"The film is {LANE_CHANGE}/drive.{_FILM}."
+            "The lane change of ISO 3888-2 at 0.79 g, nine tenths of what the tires can give; its "
+            f"film is {LANE_CHANGE}/drive.{_FILM}."
         ),
-        *_scores(driven[LANE_CHANGE], "Deviation and the rest along the lane change."),
+        *_scores(driven[LANE_CHANGE]),
     ]
     return Section(heading, blocks)
 
 
-def _scores(one: Driven, caption: str) -> list[Block]:
+def _scores(one: Driven) -> list[Block]:
     return [
         Table(f"{headline(one.drives.conditions)}.", SCORES, score_rows(one.drives.runs)),
-        *drawings(one.figures, {"errors": caption}),
+        *drawings(one.figures, {"errors": errors_caption(one.drives)}),
     ]
 
 
 def drive_numbers(driven: _Cases) -> list[Headline]:
-    numbers = []
-    for name, one in driven.items():
-        first, second = one.drives.runs[:2]
-        off = f"{first.scores.rms_e_y_m:.3f} / {second.scores.rms_e_y_m:.3f} m"
-        meaning = f"rms off the path {_CASES[name][-1]}, {first.label} / {second.label} tires"
-        numbers.append(Headline(off, meaning))
-    return numbers
+    """Return how much nearer to the slippery path the first tires are than the second."""
+    if _SLIPPERY not in driven:
+        return []
+    first, second = driven[_SLIPPERY].drives.runs[:2]
+    off = f"{first.scores.rms_e_y_m:.3f} / {second.scores.rms_e_y_m:.3f} m"
+    meaning = f"rms off the path where friction drops, {first.label} / {second.label} tires"
+    return [Headline(off, meaning)]
 
 
 FOLDER = "package"
@@ -206,10 +183,9 @@ def shipped_text(shipped: Shipped) -> str:
 def package_section(shipped: Shipped) -> Section:
     name = shipped.exported.package.specialized.name
     intro = (
-        "The axle identifier, beginning with the weights of this drive, is written as a C99 "
-        f"package to the folder {FOLDER}/ beside this report: library, example, self-test and "
-        f"README with its costs, every symbol begins with {name}_. It is what tireid export "
-        "writes; here it is compiled, tested and run over the slalom, beside Python."
+        "The axle identifier with the weights of this drive, as tireid export writes it: a C99 "
+        f"package in {FOLDER}/ beside this report, whose symbols begin with {name}_. Here it is "
+        "compiled, tested and run over the slalom."
     )
     lines = (intro, *shipped_text(shipped).splitlines())
     return Section("The identifier as C for a controller", lines)
@@ -240,15 +216,13 @@ def _demo_report(
         numbers=[
             verdict_headline(verdict),
             *model_error_headline(verdict),
-            *number_headlines(verdict),
-            *identify_headlines(story.axle),
             *drive_numbers(driven),
         ],
-        warnings=[*verdict_warnings(verdict), *identify_warnings(model, runs)],
+        notes=[*verdict_notes(verdict), *identify_notes(model, runs)],
         sections=[
-            verdict_section(verdict),
+            verdict_section(verdict, model),
             drive_section(driven, folder),
-            _learn(figures["identify"], model, verdict),
+            _learn(story.axle, figures["identify"]),
             _predict(story, figures["identify"]),
             package_section(shipped),
             _paper_study(story, study, figures["paper"]),
@@ -257,56 +231,45 @@ def _demo_report(
     )
 
 
-def _learn(figures: Images, model: TireModel, verdict: Verdict) -> Section:
+def _learn(found: Results, figures: Images) -> Section:
+    learnt, verdict = found.runs[0], found.verdict
     return Section(
         "Identified tires",
         [
             (
-                "The car is a double-track model of a mid-size sedan: roll, load transfer, "
-                "tire relaxation and combined slip on Magic Formula tires, integrated at 1 ms. It "
-                f"drives a slalom at {SPEED:g} m/s. The identifier gets what any log has, "
-                "speed, lateral velocity, yaw rate and steering at 100 Hz with sensor noise; it "
-                "gets no force."
+                "The car is a double-track model of a mid-size sedan on Magic Formula tires, in a "
+                f"slalom at {SPEED:g} m/s. The identifier gets speed, lateral velocity, yaw rate "
+                "and steering at 100 Hz with sensor noise; it gets no force."
             ),
             (
-                "Each axle has a force curve of slip, a sum of tanh units that is odd and "
-                "saturates. Slip is lagged by the relaxation of the tire, which is identified "
-                "too, and moved by the sway of the body. The curves are identified by recursive "
-                "least squares from motion alone; where nothing was excited the prior remains. "
-                "It works sample by sample, in a car too; tireid identify makes one estimate of "
-                "a whole log."
+                "Each axle has an odd, saturating force curve of lagged slip. Recursive least "
+                "squares identify it sample by sample; where nothing was excited the prior "
+                "remains. tireid identify makes one estimate of a whole log."
             ),
-            curve_drawing(figures, verdict),
-            *learnt_blocks("the axle identifier", model, figures)[1:],
-            *drawings(
-                figures,
-                {
-                    "forces": "Axle forces: online above, and below replayed with the weights "
-                    f"frozen at {FREEZE:g} s."
-                },
-            ),
+            curve_drawing(figures, verdict, slip_caption(found.model, learnt.recording, learnt)),
+            *learnt_blocks(found, figures)[1:],
+            replay_picture(found, figures, "forces", learnt.recording.name),
         ],
     )
 
 
 def _predict(story: Story, figures: Images) -> Section:
-    columns = ["frozen", "of rms"]
+    columns = [
+        f"{who}, {what}" for who in ("axle", "paper") for what in ("online", "frozen", "of rms")
+    ]
     blocks: list[Block] = [
         (
-            "The same frozen weights predict two other maneuvers, not used for "
-            "identification: beside them the paper's network and law, identified on the same "
-            "slalom with gains from the phase margin of their loop."
+            "The same frozen weights predict two maneuvers that were not used for "
+            "identification. Beside them: the paper's network, identified on the same slalom."
         ),
         Table(
             "RMSE of the axle force, both axles together [kN], and the frozen error as a "
             "share of the rms force.",
-            ["drive", "axle, online", *columns, "paper, online", *columns],
+            ["drive", *columns],
             [[row[0].replace("_", " "), *row[1:]] for row in story.rows()],
         ),
     ]
-    for name in list(STORY)[1:]:
-        caption = f"The axle identifier, frozen after the slalom, on the {name.replace('_', ' ')}."
-        blocks.append(Picture(figures[f"replay_{name}"], caption, READ["replay"]))
+    blocks += [replay_picture(story.axle, figures, f"replay_{name}", name) for name in [*STORY][1:]]
     return Section("Prediction of validation drives", blocks)
 
 

@@ -14,6 +14,8 @@ from tireid.figures.forces import draw_diagnosis
 from tireid.figures.style import save_figures
 from tireid.output import require_free, write_json
 from tireid.progress import say, tell
+from tireid.report import READ, Picture
+from tireid.reports.captions import diagnosis_caption
 
 
 def declare(new: Any) -> None:
@@ -51,8 +53,10 @@ def run(options: argparse.Namespace) -> int:
             left = None if after is None else after.to_dict()
             found = {**diagnosis.to_dict(), "applied": repair.tables(), "after": left}
             write_json(folder / "summary.json", {**found, "version": __version__})
+            caption = diagnosis_caption(recording, vehicle, repaired, car)
+            picture = Picture(images["slip"], caption, READ["doctor"])
             write_doctor_report(
-                folder, recording, vehicle, diagnosis, after, images["slip"], options.words
+                folder, recording, vehicle, diagnosis, after, picture, options.words
             )
     tell(diagnosis_text(diagnosis))
     if options.repair is not None:

@@ -10,12 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from identifier.frozen import VEHICLE_KEYS
 from identifier.tire_model import TireModel, stored_verdict
 from models.faults import KINDS, SIZED, FaultError, SensorFault
 from models.rules import require_within
 from models.schema import require_few
-from models.vehicle import GRAVITY, Vehicle
+from models.vehicle import BICYCLE, GRAVITY, Vehicle, sedan
 from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from mpc.path.speed import SHARE
@@ -23,7 +22,7 @@ from tireid.commands import options as shared
 from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION, learning_drive
 from tireid.driving.results import NO_FILM, Drives, headline, write_drive_report
-from tireid.driving.setup import BY_TIRES, Setup, SpeedWish
+from tireid.driving.setup import BY_TIRES, Setup, SpeedWish, simulated
 from tireid.figures.film import FORMATS
 from tireid.learning import identify
 from tireid.progress import say, tell
@@ -125,13 +124,15 @@ def run(options: argparse.Namespace) -> int:
     """Run the command; return 0 where the first car reached the end of the path, else 1."""
     every = (driving.FROZEN, driving.LINEAR, driving.ORACLE, driving.LEARNING)
     labels = list(dict.fromkeys(every if ALL in options.tires else options.tires))
-    conditions = conditions_of(options)
+    shared.require_one(options, "weights", "method", "paper", "design")
+    stored = shared.model_of_day(options)
+    conditions = conditions_of(options, stored)
     setup = conditions.setup
     driving.require_compiler()
     with shared.folder_of(options) as folder:
         if driving.ORACLE in labels:
             setup.oracle()  # what cannot be is said before the car drives
-        source, learnt = frozen_tires(options, labels, conditions)
+        source, learnt = frozen_tires(options, labels, conditions, stored)
         conditions = conditions.on(learnt)
         hours = options.laps * conditions.setup.time_at(setup.path.s[-2]) / 3600.0
         require_few(ValueError, f"--path {setup.path.name}", hours, "hours", "hours of driving")
@@ -253,16 +254,23 @@ def path_of(options: argparse.Namespace, vehicle: Vehicle) -> Path:
     return Path.from_csv(FilePath(name), minimum_radius=_TIGHTEST * vehicle.wheelbase)
 
 
-def conditions_of(options: argparse.Namespace) -> driving.Conditions:
-    vehicle, wish = shared.read_vehicle(options), _parse_speed(options.speed)
-    path = path_of(options, vehicle)
-    shared.require_one(options, "weights", "method", "paper", "design")
+def conditions_of(
+    options: argparse.Namespace, stored: TireModel | None = None
+) -> driving.Conditions:
+    """Return what is to be driven; the car is by default that of stored tires.   stored : tires."""
+    of_sedan = stored is None or stored.vehicle.bicycle == sedan().bicycle
+    vehicle = shared.read_vehicle(options, None if of_sedan else stored, options.weights)
+    wish = _parse_speed(options.speed)
+    if stored is not None:
+        require_its_car(options, stored.vehicle, vehicle)
+    vehicle, tires = simulated(vehicle, stored)
+    setup = Setup(path_of(options, vehicle), vehicle, options.mu, (), wish, tires=tires)
     drops = tuple(sorted(_parse_drop(text) for text in options.mu_drop))
     for s, _ in drops:
-        if not path.closed and s >= path.length:
-            raise ValueError(f"--mu-drop {s:g} is beyond the path, which is {path.length:.0f} m")
+        if not setup.path.closed and s >= (length := setup.path.length):
+            raise ValueError(f"--mu-drop {s:g} is beyond the path, which is {length:.0f} m")
     return driving.Conditions(
-        setup=Setup(path, vehicle, options.mu, drops, wish),
+        setup=setup._replace(drops=drops),
         delay=driving.delay_periods(1e-3 * options.delay, "--delay"),
         noise=options.noise,
         seed=shared.seed_of(options),
@@ -275,14 +283,16 @@ def conditions_of(options: argparse.Namespace) -> driving.Conditions:
 
 
 def frozen_tires(
-    options: argparse.Namespace, labels: Sequence[str], conditions: driving.Conditions
+    options: argparse.Namespace,
+    labels: Sequence[str],
+    conditions: driving.Conditions,
+    stored: TireModel | None = None,
 ) -> tuple[str, TireModel | None]:
     """Return where frozen tires come from, and the model where one is needed."""
-    setup, stored = conditions.setup, shared.model_of_day(options)
+    setup = conditions.setup
     if not {driving.FROZEN, driving.LEARNING} & set(labels) and setup.wish.share is None:
         return "no tires were identified", None
     if stored is not None:
-        require_its_car(options, stored.vehicle, setup.vehicle)
         if setup.wish.share is not None and stored_verdict(options.weights) is False:
             raise ValueError(f"{options.weights} was not valid when it was learnt: {_TELL}")
         return f"frozen ones from {options.weights}", stored
@@ -310,13 +320,6 @@ def require_its_car(options: argparse.Namespace, learnt: Vehicle, driven: Vehicl
     """Refuse tires that were learnt on another car than is driven, whatever either is called."""
     if learnt.bicycle == driven.bicycle:
         return
-    mine = f"{options.weights} was identified on the car {learnt.name!r}, driven is "
-    apart = "; ".join(
-        f"{key} {getattr(learnt, key):.6g} there, {getattr(driven, key):.6g} here"
-        for key in VEHICLE_KEYS
-        if key != "name" and getattr(learnt, key) != getattr(driven, key)
-    )
-    raise ValueError(
-        f"{mine}{driven.name!r} ({apart}): give that car by --vehicle FILE, with its table "
-        "[chassis] (tireid init writes one, see docs/driving.md), or identify the driven car"
-    )
+    key = next(key for key in BICYCLE if getattr(learnt, key) != getattr(driven, key))
+    apart = f"{key} {getattr(learnt, key):.6g}, driven {getattr(driven, key):.6g}"
+    raise ValueError(f"{options.weights} is of another car ({apart}): leave --vehicle out")

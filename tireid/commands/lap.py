@@ -120,8 +120,6 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"--laps must be a whole number, 1 or more, it is {n:g}")
     elif not path.closed:
         raise ValueError(f"--laps N drives a closed path N times: leave it out for {path.name}")
-    elif vehicle.chassis is None:
-        raise ValueError("--laps drives a car with a chassis: add --vehicle FILE, with [chassis]")
     with shared.folder_of(options) as folder:
         rows, completed = list[dict[str, float]](), True
         if n is None:
@@ -221,7 +219,8 @@ def _write(
     limited: Counter[str] = Counter()
     for why, axle, dt in zip(profile.limited_by, profile.axle, np.diff(profile.t), strict=False):
         limited[why if why in (POWER, TOP) else f"{why}, {axle}"] += dt / profile.lap_time
-    notes = _notes(profile, tire, float(planner.limits.v[-1]))
+    fastest = float(planner.limits.v[-1])
+    notes = _notes(profile, tire, fastest)
     facts = {
         "lap_time_s": profile.lap_time, "length_m": path.length, "least_speed_m_s": v.min(),
         "top_speed_m_s": v.max(), "peak_a_y_m_s2": np.abs(profile.a_y).max(),
@@ -239,9 +238,13 @@ def _write(
     ).format(path.name, *facts.values())
     times = [(why, f"{100.0 * one:.0f} %") for why, one in limited.most_common()]
     tell(head, f"limited by {'; '.join(map(': '.join, times))}", *(f"note: {n}" for n in notes))
+    why = times[0][0]
     captions = {
-        "lap": "Speed and accelerations along the path, and which axle limits them.",
-        "lap_gg": "What the lap asks of the tires; limits at its least and its top speed.",
+        "lap": f"Speed and accelerations along the path: slowest {v.min():.1f} m/s at "
+        f"{path.s[v.argmin()]:.0f} m; {times[0][1]} of the time limited by: {why}.",
+        "lap_gg": f"What the lap asks of the tires, a_y up to {facts['peak_a_y_m_s2']:.1f} and "
+        f"braking up to {facts['peak_braking_m_s2']:.1f} m/s²; limits at its least and its top "
+        "speed.",
     }
     tables = [Table("What limits the speed.", ("limited by", "of the time"), times)]
     if laps:
@@ -251,6 +254,15 @@ def _write(
         Section("The lap", [*drawings(figures, captions), *tables]),
         origin(options.words, tire.vehicle, ()),
     ]
-    number = Headline(f"{profile.lap_time:.2f} s", "lap time, planned")
-    report = Report(f"A lap of {path.name}", sections, f"{head}.", [number], warnings=notes)
+    faster = float((v > fastest).mean())
+    numbers = [
+        Headline(f"{profile.lap_time:.2f} s", "lap time, planned"),
+        Headline(times[0][1], f"of the time limited by: {why}"),
+        Headline(
+            f"{100.0 * faster:.0f} %",
+            f"of the way is faster than the log, {fastest:.1f} m/s",
+            "doubt" if faster else "",
+        ),
+    ]
+    report = Report(f"A lap of {path.name}", sections, f"{head}.", numbers, notes=notes)
     write_report(folder, report)

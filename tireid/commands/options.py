@@ -34,7 +34,7 @@ from tireid.commands import DONE, NOT_VALID
 from tireid.learning import with_v_y
 from tireid.output import output_folder
 from tireid.progress import complain, say
-from tireid.verdicts import stored_warning
+from tireid.verdicts import stored_notes
 
 
 def add_options(parser: Any, kind: type, table: Mapping[str, Any]) -> None:
@@ -117,7 +117,7 @@ def stored_model(path: Path | None) -> TireModel | None:
     if path is None:
         return None
     model = load_model(path)
-    for said in stored_warning(path):
+    for said in stored_notes(path):
         complain(f"warning: {said.text}")
     return model
 

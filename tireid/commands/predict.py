@@ -15,7 +15,6 @@ from identifier.prediction import Prediction
 from identifier.reproducibility import beyond_known
 from identifier.tire_model import TireModel
 from identifier.verdict import within_band
-from identifier.verdict.verdict import PERCENT
 from models.files import digest
 from tireid import __version__, output
 from tireid.commands import options as shared
@@ -28,21 +27,26 @@ from tireid.learning import replay
 from tireid.progress import say, tell
 from tireid.report import (
     Block,
-    Headline,
     Images,
-    Marked,
     Report,
     Section,
     drawings,
     origin,
-    printed,
+    sentence,
     write_report,
+)
+from tireid.reports.captions import (
+    force_caption,
+    friction_caption,
+    motion_caption,
+    slip_caption,
 )
 from tireid.reports.identify import (
     band_sentence,
     curve_drawing,
     error_numbers,
     error_table,
+    estimates_notes,
     extrapolated,
 )
 from tireid.verdicts import (
@@ -51,11 +55,11 @@ from tireid.verdicts import (
     of_answer,
     sensors_section,
     sensors_text,
-    stored_warning,
+    stored_notes,
     verdict_headline,
+    verdict_notes,
     verdict_section,
     verdict_text,
-    verdict_warnings,
 )
 
 
@@ -230,33 +234,36 @@ def write_predict_report(
     lines : what is said of it beside its errors.   source : the model's file.
     """
     model, recording, verdict = prediction.model, prediction.recording, prediction.verdict
-    notes: list[str | Marked] = [*stored_warning(source)]
-    notes += [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
-    notes += extrapolated(model, recording)
+    notes = [
+        *verdict_notes(verdict),
+        *stored_notes(source),
+        *estimates_notes(model.vehicle),
+        *extrapolated(model, recording),
+    ]
     error, found = prediction.against_truth, list[Block]()
     if error is not None:
         found.append(error_table([[recording.name, *error_numbers(error, prediction.true_force)]]))
-    found += [printed(line) for line in lines.splitlines()]
-    captions = {
-        "motion": "Mean force over windows of 0.3 s: from the motion, and from the model.",
-        "replay": "Axle forces over time.",
-        "friction": "Friction of the road over that of the identification drive.",
-    }
+    found += map(sentence, lines.splitlines())
+    captions = {"replay": force_caption(recording, prediction.axle_force, model, verdict)}
+    if verdict.forces is not None:
+        captions = {"motion": motion_caption(verdict), **captions}
+    if verdict.friction is not None:
+        captions["friction"] = friction_caption(verdict.friction)
     found += drawings({**figures, "replay": figures["forces"]}, captions)
     if band := band_sentence(model):
         found.append(band)
     report = Report(
         title=f"Tires of {source.name} on {recording.name}",
-        summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, not used for "
-        "identification.",
+        summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, "
+        "predicted by a stored model.",
         numbers=[
-            verdict_headline(verdict, notes),
-            *of_answer(verdict, [*model_error_headline(verdict), *_predict_headlines(prediction)]),
+            verdict_headline(verdict),
+            *of_answer(verdict, [*model_error_headline(verdict), *known_headline(model)]),
         ],
-        lead=[curve_drawing(figures, verdict)],
-        warnings=[*verdict_warnings(verdict), *notes],
+        lead=[curve_drawing(figures, verdict, slip_caption(model, recording))],
+        notes=notes,
         sections=[
-            verdict_section(verdict),
+            verdict_section(verdict, model),
             Section("What it predicts", found),
             *sensors_section(model, [recording]),
             origin(
@@ -268,19 +275,3 @@ def write_predict_report(
         ],
     )
     write_report(folder, report)
-
-
-def _predict_headlines(prediction: Prediction) -> list[Headline]:
-    """Return what is missed of the true force, explained of the motion, and the known slip."""
-    numbers = []
-    error, size, motion = prediction.against_truth, prediction.true_force, prediction.motion
-    if error is not None and size is not None and min(size.front, size.rear) > 0.0:
-        shares = error.front / size.front, error.rear / size.rear
-        front, rear = (f"{PERCENT * share:.1f}" for share in shares)
-        numbers.append(Headline(f"{front} / {rear} %", "of the rms true force, front / rear"))
-    if motion is not None and None not in motion.explained:
-        lateral, yaw = (f"{PERCENT * max(share or 0.0, 0.0):.1f}" for share in motion.explained)
-        numbers.append(
-            Headline(f"{lateral} / {yaw} %", "explained of the lateral / the yaw acceleration")
-        )
-    return [*numbers, *known_headline(prediction.model)]

@@ -16,7 +16,7 @@ from mpc.cars import BRAKES
 from mpc.path import Path, SpeedProfile, speed_profile
 from mpc.path.speed import SHARE
 from tireid.driving.runs import ClosedLoop, drive
-from tireid.driving.setup import PERIOD
+from tireid.driving.setup import PERIOD, simulated
 from tireid.learning import identify
 from tireid.run import Run
 
@@ -71,6 +71,8 @@ def drive_laps(
     road : friction that the first lap is planned for, over that of the identified tires.
     confidence : as of `speed_limits`.   driven : as of `drive`.
     """
+    if "tires" not in driven:  # the same on every lap
+        vehicle, driven["tires"] = simulated(vehicle, tire)
     limits = first_limits(tire, confidence).scaled(road)
     for number in range(laps):
         profile = speed_profile(path, limits, share=share, **(planned or {"brakes": BRAKES}))

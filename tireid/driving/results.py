@@ -47,6 +47,7 @@ from tireid.report import (
     Block,
     Headline,
     Images,
+    Note,
     Picture,
     Report,
     Section,
@@ -58,6 +59,7 @@ from tireid.report import (
 )
 
 NO_FILM = "none"
+_AT_LIMIT = 0.99  # of a limit: the steering rate is at it
 _Runs = Sequence[ClosedLoop]
 
 
@@ -103,7 +105,7 @@ class Drives(NamedTuple):
         """All that goes into the drives, ready for JSON."""
         conditions, setup = self.conditions, self.conditions.setup
         v, chassis = setup.speeds(), setup.vehicle.require_chassis()
-        tire = None
+        tire = None if setup.tires is None else digest(repr(setup.tires))
         if chassis.tire is not None:  # a hash in place of its file
             tire = digest(Path(chassis.tire).read_text(errors="replace", encoding="utf-8"))
         return {
@@ -126,7 +128,7 @@ class Drives(NamedTuple):
             "weights_hash": None if self.learnt is None else digest(self.learnt.to_dict()),
             "plant": PLANT,
             "vehicle": vehicle_numbers(setup.vehicle),
-            "chassis": {**asdict(chassis), "tire": tire},
+            "chassis": {k: x for k, x in asdict(chassis).items() if x != ()} | {"tire": tire},
             "delay_ms": 1e3 * PERIOD * conditions.delay,
             "period_ms": 1e3 * PERIOD,
             "noise": conditions.noise,
@@ -242,23 +244,33 @@ def _drive_columns(drive: Drive) -> dict[str, Array]:
 
 
 def _known_curves(runs: _Runs, setup: Setup, learnt: TireModel | None) -> list[TireCurve]:
-    """Return the tires of the trackers, and the linear and the true tire beside it."""
-    models = {LINEAR: prediction_tire(setup.vehicle)}
+    """Return the tires of the trackers, and the linear and the true tire beside it.
+
+    An identified one is NaN beyond the slip up to which it was identified.
+    """
+    models, known = {LINEAR: prediction_tire(setup.vehicle)}, {}
     if learnt is not None:
         models[FROZEN] = prediction_tire(learnt, setup.vehicle)
+        known[FROZEN] = learnt.known_slip
     for run in runs:
         if run.label != LEARNING:
             models[run.label] = run.model
         if run.label != ORACLE and run.final is not run.model:
             models[run.label + AT_THE_END] = run.final
+            since = [one.slip for one in run.known if (one.steering == run.final.weights).all()]
+            known[run.label + AT_THE_END] = next(iter(since), None)
     with suppress(CurveFitError):  # a true tire that no curve can follow is not drawn
         models[ORACLE] = setup.oracle()
         if setup.drops:
             models[ORACLE + AT_THE_END] = setup.oracle(setup.drops[-1][1])
     v_x, slip = float(setup.speeds().mean()), np.linspace(-0.35, 0.35, 281)
-    return [
-        TireCurve(label, slip, curves_at(model, slip, v_x).T) for label, model in models.items()
-    ]
+    curves = []
+    for label, model in models.items():
+        force, end = curves_at(model, slip, v_x).T, known.get(label)
+        if end is not None:
+            force = np.where(np.abs(slip)[:, None] > end, np.nan, force)
+        curves.append(TireCurve(label, slip, force))
+    return curves
 
 
 def write_drive_report(
@@ -271,16 +283,17 @@ def write_drive_report(
         title=f"{first.drive.path.name} on {first.label} tires",
         summary=f"{headline(drives.conditions)}.",
         numbers=_drive_headlines(runs),
-        warnings=_drive_warnings(runs),
+        notes=_drive_notes(runs),
         sections=[
-            Section("How the car drove", _drive_blocks(folder, runs, figures, film)),
+            Section("How the car drove", _drive_blocks(folder, drives, figures, film)),
             Section("The tracker's tires", known_blocks(runs, figures)),
-            Section("Timing", drawings(figures, {"solve_times": "How long a step took."})),
+            Section("Timing", drawings(figures, {"solve_times": _timing_caption(first)})),
             origin(
                 command,
                 first.drive.vehicle,
                 (),
                 tires=drives.source,
+                **({"simulated_car": assumed} if (assumed := first.drive.vehicle.assumed) else {}),
                 all_inputs=f"hash {digest(drives.inputs)}, listed in summary.json",
             ),
         ],
@@ -289,58 +302,122 @@ def write_drive_report(
 
 
 def _drive_headlines(runs: _Runs) -> list[Headline]:
-    first, numbers = runs[0], list[Headline]()
-    for run in runs:
-        end = "" if run.scores.completed else f", who {run.drive.ending}"
-        meaning = f"rms deviation from the path, {run.label}{end}"
-        numbers.append(Headline(f"{run.scores.rms_e_y_m:.3f} m", meaning, "bad" if end else ""))
-    peak = f"{first.scores.peak_e_y_m:.3f} m"
-    numbers.insert(1, Headline(peak, f"largest deviation, {first.label}"))
-    given = estimate_scores(first.drive)
-    if given is not None:
-        meaning = f"rms error of the estimated side slip, of {given.rms_deg:.2f}°"
-        numbers.append(Headline(f"{given.rms_error_deg:.2f}°", meaning))
-    times = first.scores.solve_ms
-    took = f"{times['median']:.2g} / {times['p99']:.2g} ms"
-    return [*numbers, Headline(took, "a step: median / 99 of 100")]
+    """Return how far the first car was off its path, and whether a step ends in time."""
+    first, score = runs[0], runs[0].scores
+    s, peak = _farthest(first)
+    end = "" if score.completed else f", who {first.drive.ending}"
+    slow, period = score.solve_ms["p99"], 1e3 * PERIOD
+    return [
+        Headline(
+            f"{score.rms_e_y_m:.3f} m",
+            f"rms deviation from the path, {first.label} tires{end}",
+            "bad" if end else "",
+        ),
+        Headline(f"{peak:.3f} m", f"largest deviation, at {s:.0f} m"),
+        Headline(
+            f"{slow:.2g} ms",
+            f"within which 99 of 100 steps of the tracker end (period {period:g} ms)",
+            "bad" if slow > period else "",
+        ),
+    ]
 
 
-def _drive_warnings(runs: _Runs) -> list[str]:
+def _farthest(run: ClosedLoop) -> tuple[float, float]:
+    """Return where a car is farthest off its path, and by how much [m]."""
+    k = int(np.abs(run.drive.e_y).argmax())
+    return float(run.drive.s[k]), float(abs(run.drive.e_y[k]))
+
+
+def _drive_notes(runs: _Runs) -> list[Note]:
     said = []
     for run in runs:
         scores = run.scores
         if not scores.completed:
-            where = float(run.drive.s[-1])
-            said.append(f"{run.label}: {run.drive.ending} at {where:.0f} m; its numbers end there.")
+            text = f"{run.drive.ending} at {run.drive.s[-1]:.0f} m; its numbers end there."
+            said.append(Note(text, "bad" if run is runs[0] else "", run.label))
         if scores.failures:
             counted = ", ".join(f"{n} {name}" for name, n in scores.failures.items())
-            said.append(f"{run.label}: steps of the tracker failed: {counted}.")
+            said.append(Note(f"steps of the tracker failed: {counted}.", where=run.label))
         if scores.solve_ms["p99"] > 1e3 * PERIOD:
-            said.append(f"{run.label}: one step in a hundred takes longer than the period.")
+            text = "one step in a hundred takes longer than the period."
+            said.append(Note(text, where=run.label))
         for t, text in run.drive.notes:
             if text.startswith(Verdict.FAULT.value) or "dead reckoning" in text:
-                said.append(f"{run.label} at {t:.2f} s: {printed(text)}.")
+                said.append(Note(f"at {t:.2f} s: {printed(text)}.", where=run.label))
     return said
 
 
-def _drive_blocks(folder: Path, runs: _Runs, figures: Images, film: str) -> list[Block]:
-    blocks: list[Block] = [Table("Scores of the drives.", SCORES, score_rows(runs))]
+def errors_caption(drives: Drives) -> str:
+    """Return how far each car is off its path and where, and where friction changes."""
+    most = ", ".join(
+        f"{run.label} {peak:.2f} m at {s:.0f} m"
+        for run in drives.runs
+        for s, peak in [_farthest(run)]
+    )
+    drops = "".join(
+        f"; friction is {mu:g} from {s:g} m on" for s, mu in drives.conditions.setup.drops
+    )
+    return f"Deviation, heading, acceleration and speed. Largest deviation: {most}{drops}."
+
+
+def _steering_caption(run: ClosedLoop) -> str:
+    drive, limits = run.drive, run.problem.limits
+    rate = np.abs(np.diff(drive.command) / np.diff(drive.t))
+    at = np.mean(rate > _AT_LIMIT * limits.steering_rate)
+    most, limit = np.degrees([np.abs(drive.command).max(), limits.steering])
+    return (
+        f"Steering of {run.label}: at most {most:.1f}° (limit {limit:.0f}°), at the limit of "
+        f"its rate in {100.0 * at:.0f} % of the steps."
+    )
+
+
+def _timing_caption(run: ClosedLoop) -> str:
+    ms, period = run.scores.solve_ms, 1e3 * PERIOD
+    late = int(np.count_nonzero(run.drive.solve_time > PERIOD))
+    return (
+        f"Time of a step: median {ms['median']:.2g}, largest {ms['max']:.2g} ms; {late} of "
+        f"{len(run.drive)} steps take longer than the period of {period:g} ms."
+    )
+
+
+def _drive_blocks(folder: Path, drives: Drives, figures: Images, film: str) -> list[Block]:
+    first = drives.runs[0]
+    blocks: list[Block] = [Table("Scores of the drives.", SCORES, score_rows(drives.runs))]
     if film != NO_FILM:
-        caption = f"The drive on {runs[0].label} tires; outlines are the other cars."
-        blocks.append(Picture(folder / f"drive.{film}", caption, READ["film"]))
+        blocks.append(film_picture(folder / f"drive.{film}", drives.runs))
+    ends = [f"{run.label} {run.drive.ending} at {run.drive.s[-1]:.0f} m" for run in drives.runs]
     captions = {
-        "path": "The path from above.",
-        "errors": "Deviation, heading, acceleration and speed along the path.",
-        "steering": "Steering command.",
+        "path": f"The path from above: {'; '.join(ends)}.",
+        "errors": errors_caption(drives),
+        "steering": _steering_caption(first),
     }
     return [*blocks, *drawings(figures, captions)]
 
 
+def film_picture(path: Path, runs: _Runs) -> Picture:
+    first, *others = runs
+    beside = f"; outlines: {', '.join(run.label for run in others)}" if others else ""
+    seconds, v = first.drive.t[-1], first.drive.v_x
+    caption = (
+        f"{seconds:.3g} s of the drive on {first.label} tires, at {v.min():.1f} to "
+        f"{v.max():.1f} m/s{beside}."
+    )
+    return Picture(path, caption, READ["film"])
+
+
 def known_blocks(runs: _Runs, figures: Images) -> list[Block]:
     """Return what trackers believed of the tires, and what they were given on the way."""
+    given, lateral = estimate_scores(runs[0].drive), ""
+    if given is not None:
+        lateral = (
+            f": rms error of the estimate {given.rms_error_m_s:.3f} m/s, "
+            f"{given.rms_error_deg:.2f}° of side slip ({given.rms_deg:.2f}° rms); "
+            f"{100.0 * given.within_two_sd:.0f} % of the errors within two standard deviations"
+        )
     captions = {
-        "tires": "Forces of the first drive, and the tire models of the trackers.",
-        "lateral": "Lateral velocity, which no sensor measured: the truth and the estimate.",
+        "tires": "Forces of the first drive, and the tire models of the trackers. An identified "
+        "curve ends at the slip up to which it was identified.",
+        "lateral": f"Lateral velocity, which no sensor measured{lateral}.",
     }
     blocks: list[Block] = [*drawings(figures, captions)]
     notes = [[run.label, f"{t:.2f}", printed(text)] for run in runs for t, text in run.drive.notes]

@@ -11,14 +11,12 @@ from codegen.arrays import Array
 from codegen.compiler import NoCompilerError
 from identifier.axle import AxleIdentifier, AxleModel
 from identifier.axle.model import begun
-from identifier.inertial import InertialIdentifier
 from identifier.method import CannotFreezeError
 from identifier.methods import continuing
 from identifier.run import DivergedError, OnlineIdentifier
-from identifier.speed_limits import speed_limits
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
-from models.rules import require_positive, require_within
+from models.rules import require_within
 from models.tires import Tire
 from models.vehicle import Vehicle
 from mpc.handover.learner import Learner
@@ -39,7 +37,7 @@ from mpc.path import Path, SpeedProfile
 from mpc.problem import Problem
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.driving.setup import BY_TIRES, PERIOD, WIDEST, Setup, SpeedWish
+from tireid.driving.setup import PERIOD, WIDEST, Setup, SpeedWish, simulated
 from tireid.progress import Progress
 
 _NOTED = 0.1  # change of the grip that is worth a note
@@ -202,14 +200,8 @@ class Conditions:
 
     def on(self, learnt: TireModel | None) -> "Conditions":
         """Return the same on these tires, where they tell how fast."""
-        if learnt is None or self.setup.wish.share is None:
-            return self
-        try:
-            limits = speed_limits(learnt)
-        except ValueError as error:
-            remedy = "say how fast instead: --speed 0.4g, speeds=15.0"
-            raise ValueError(f"no speed follows from these tires: {error}; {remedy}") from None
-        return replace(self, setup=self.setup._replace(limits=limits))
+        limits = self.setup.wish.limits(learnt)
+        return self if limits is None else replace(self, setup=self.setup._replace(limits=limits))
 
     @property
     def sensors(self) -> CarSensors:
@@ -223,9 +215,7 @@ class Conditions:
         """Return what estimates v_y on a drive, None where a sensor measures it."""
         if self.kind == FULL:
             return None
-        car, period = self.setup.vehicle, PERIOD
-        method, start = InertialIdentifier.beginning_with(learnt, car, dt=period)
-        return LateralVelocity(OnlineIdentifier(method, car, period, start))
+        return LateralVelocity.beginning_with(learnt, self.setup.vehicle, PERIOD)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -367,14 +357,15 @@ def drive(
     Parameters
     ----------
     path : to follow, of `tireid.paths`, or `tireid.paths.Path.from_csv`.
-    vehicle : the car, with a chassis.
+    vehicle : the car; where it has no chassis a typical one is assumed.
     tire : the identified tires; None takes the linear tires of the vehicle.
     speeds : a profile of `tireid.speed_profile`, or a constant speed [m/s]; None plans the profile
         of the identified tires.
     confirm : whether the speed has to be earned: it begins at .45 of the limits, and goes on as the
         car holds what it drives and nothing says that the friction is another.
     friction : of the road over that of the tire's measurement [-].
-    tires : that the car truly has, front and rear; None reads the file named by its chassis.
+    tires : that the car truly has, front and rear; None reads the file named by its chassis, or
+        without one scales tires of a sedan to the identified stiffness and grip.
     delay : from a measurement until its command acts, a multiple of 0.01 s [s].
     learning : go on learning from the tire while driving, and hand over what is fit.
     noise : whether sensors are noisy.
@@ -393,26 +384,17 @@ def drive(
     Raises
     ------
     VehicleError
-        Where the vehicle has no chassis.
+        Where the vehicle has no chassis and no identified tires are given.
     ValueError
         Where a number is not that of a drive, there is no tire to go on learning from or to plan
         speeds of, speeds are of another path, or no C compiler is there for the tracker.
     """
-    if isinstance(speeds, SpeedProfile):
-        wish = SpeedWish(profile=speeds)
-    elif speeds is not None:
-        require_positive(ValueError, speeds=speeds)
-        wish = SpeedWish(speed=speeds)
-    else:
-        wish = BY_TIRES
-    for needed, why in (
-        (learning, "learning goes on from a tire"),
-        (wish is BY_TIRES, "speeds such as 15.0 m/s, or a tire that tells them, are needed"),
-    ):
-        if needed and tire is None:
-            raise ValueError(f"{why}: none is given")
+    if learning and tire is None:
+        raise ValueError("learning goes on from a tire: none is given")
+    wish = SpeedWish.of(speeds, tire)
+    vehicle, true_tires = (vehicle, tires) if tires else simulated(vehicle, tire)
     conditions = Conditions(
-        setup=Setup(path, vehicle, friction, (), wish, tires=tires),
+        setup=Setup(path, vehicle, friction, (), wish, tires=true_tires),
         delay=delay_periods(delay),
         noise=noise,
         seed=seed,

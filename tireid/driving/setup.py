@@ -3,29 +3,41 @@
 How fast it is follows from what is known of its tires or is given, never from the road.
 """
 
+import logging
+import textwrap
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.speed_limits import SpeedLimits
+from identifier.speed_limits import SpeedLimits, speed_limits
+from identifier.tire_model import TireModel
 from models.friction import Friction, FrictionChange
-from models.tires import Tire
-from models.vehicle import GRAVITY, Vehicle
+from models.rules import require_positive
+from models.tires import MagicFormula, Tire
+from models.vehicle import GRAVITY, Vehicle, sedan
 from mpc.cars import BRAKES, DoubleTrackCar
 from mpc.path import Path, SpeedProfile, speed_profile, steady_speed
 from mpc.path.speed import SHARE
 from mpc.tires import PredictionTire, oracle_tire
+from mpc.tires.ladder import cornering_force
 
 WIDEST = 2.0  # deviation at which a car is off the path [m]
 FASTEST = 30.0  # m/s
 # Share of a given lateral acceleration to drive and brake with: 2 and 3 m/s² on a dry road.
 _DRIVES, _BRAKES = 0.22, 0.33
 PERIOD = 0.01  # control period [s]
+_BEYOND = 2.0  # identified slips, up to which the grip of a tire is read, as `speed_limits` does
+_SLIPS = np.linspace(1e-3, 0.4, 81)  # rad, within which a tire has its peak
+_LIKE = "the sedan's tires, scaled to the identified stiffness and grip"
+_WIDTH = 116  # characters of a line that is logged
+_ROUNDS = 4  # after which stiffness and grip are those of the identified tire to 1 %
 
 PLANT = "double-track"
+_log = logging.getLogger("tireid")
 
 
 _oracle: Callable[..., PredictionTire] = cache(oracle_tire)
@@ -43,6 +55,28 @@ class SpeedWish(NamedTuple):
     speed: float | None = None
     profile: SpeedProfile | None = None
 
+    @classmethod
+    def of(cls, speeds: SpeedProfile | float | None, tire: TireModel | None) -> "SpeedWish":
+        """Return the wish for a profile, for a speed [m/s], or for what a tire allows."""
+        if isinstance(speeds, SpeedProfile):
+            return cls(profile=speeds)
+        if speeds is not None:
+            require_positive(ValueError, **{"speeds in m/s": speeds})
+            return cls(speed=speeds)
+        if tire is None:
+            raise ValueError("no tire is given that tells the speed: give speeds, such as 15.0 m/s")
+        return BY_TIRES
+
+    def limits(self, tire: TireModel | None) -> SpeedLimits | None:
+        """Return what the tires allow where the wish is a share of it."""
+        if tire is None or self.share is None:
+            return None
+        try:
+            return speed_limits(tire)
+        except ValueError as error:
+            remedy = "say how fast instead: --speed 0.4g, speeds=15.0"
+            raise ValueError(f"no speed follows from these tires: {error}; {remedy}") from None
+
     @property
     def words(self) -> str:
         """What is not seen of the speeds themselves."""
@@ -52,6 +86,38 @@ class SpeedWish(NamedTuple):
 
 
 BY_TIRES = SpeedWish(share=SHARE)
+
+
+def simulated(vehicle: Vehicle, tire: TireModel | None) -> tuple[Vehicle, tuple[Tire, Tire] | None]:
+    """Return a car that can be simulated, and its front and rear tire where its file names none.
+
+    Without a chassis it has a typical one; without a tire file it has those of the sedan, scaled to
+    the stiffness and the grip of the identified tires. Without these the car is as it was.
+    What is assumed is logged.
+    """
+    if tire is None or (vehicle.chassis and vehicle.chassis.tire):
+        return vehicle, None
+    vehicle = vehicle.with_chassis()
+    front, rear = (_scaled_tire(vehicle, tire, axle) for axle in (0, 1))
+    for line in textwrap.wrap(f"simulated on {_LIKE}; {vehicle.assumed}".rstrip("; "), _WIDTH):
+        _log.info(line)
+    return vehicle, (front, rear)
+
+
+def _scaled_tire(vehicle: Vehicle, like: TireModel, axle: int) -> Tire:
+    """Return the tire that in steady cornering has stiffness and grip of an identified axle."""
+    known = like.known_slip
+    alpha = np.linspace(0.0, _SLIPS[-1] if known is None else _BEYOND * float(known[axle]), 61)[1:]
+    grip = float(like.force(alpha)[:, axle].max())
+    tire = MagicFormula.from_tir(str(sedan().require_chassis().tire))
+    c = replace(tire.coefficients, FNOMIN=0.5 * vehicle.axle_loads[axle])
+    for _ in range(_ROUNDS):  # roll, camber and load depend on what they change
+        tire = replace(tire, coefficients=c, name=_LIKE)
+        force = cornering_force(vehicle, tire, axle, _SLIPS, 1.0)
+        stiffer, firmer = like.stiffness[axle] * _SLIPS[0] / force[0], grip / force.max()
+        scales = {"LKY": stiffer, "LMUX": firmer, "LMUY": firmer}
+        c = replace(c, **{name: getattr(c, name) * float(x) for name, x in scales.items()})
+    return replace(tire, coefficients=c)
 
 
 class Setup(NamedTuple):
@@ -84,7 +150,9 @@ class Setup(NamedTuple):
 
         mu : its friction; None is that of the start.
         """
-        return _oracle(self.vehicle, self.car(open_field=True).tire, self.mu if mu is None else mu)
+        car = self.car(open_field=True)
+        given = self.mu if mu is None else mu
+        return _oracle(self.vehicle, car.tire, given, rear=self.tires and self.tires[1])
 
     def profile(self) -> SpeedProfile:
         """Return the wanted speed along the path.

@@ -27,6 +27,7 @@ from codegen.writing import write_file
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse
 from identifier.run import History
+from tireid.zoom import ZOOMED, Drawn, zoom_of
 
 PAGE = 7.16  # width of both columns of a paper [in]
 RESOLUTION = 200  # [dots per inch]
@@ -195,9 +196,11 @@ def figure_png(figure: Figure, *, resolution: int = RESOLUTION) -> bytes:
 
 def save_figures(folder: Path, figures: Mapping[str, Figure]) -> dict[str, bytes]:
     """Write figures as PNG under their names; return these, which a report shows, too."""
-    images = {name: figure_png(one) for name, one in figures.items()}
-    for name, image in images.items():
-        write_file(folder / f"{name}.png", image)
+    images = dict[str, bytes]()
+    for name, one in figures.items():
+        images[name] = drawn = Drawn(figure_png(one))
+        drawn.zoom = zoom_of(one) if name in ZOOMED else ()
+        write_file(folder / f"{name}.png", drawn)
     return images
 
 

@@ -13,14 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
+from models.logs.clock import FASTER, ON_STEP
 from models.recordings.map import LONGEST_GAP
 from tireid.live.state import Counts
 
-_ON_GRID = 0.01  # of a step
-_BACK = 1.0  # s, from which a clock that goes back begins anew: less is a sample that is late
-_FAST = 1.5  # samples a step, from which means are taken
+DT = 0.01  # s between two instants of the recursion
+BACK = 1.0  # s, from which a clock that goes back begins anew: less is a sample that is late
 _MISSING = 1.5  # usual intervals, beyond which a sample was lost
-_GAP = 2.5  # usual intervals, beyond which nothing is known of the way there, as beyond _BACK
+_GAP = 2.5  # usual intervals, beyond which nothing is known of the way there, as beyond BACK
 _FAR = 60.0  # s, from which a clock that goes on jumped: no samples were lost
 _SAME = 1e-6  # s, below which two times are one: what waits for the next instant stays bounded
 _USUAL = 0.05  # weight of a new interval in the usual one
@@ -60,7 +60,7 @@ class Clock:
         h, counts = t - self._last[-1][0] if self._last else math.inf, self._counts
         if abs(h) < _SAME:
             counts.doubled += 1
-        elif -_BACK < h < 0.0:
+        elif -BACK < h < 0.0:
             counts.late += 1
         elif h < 0.0:
             counts.jumps += 1
@@ -68,12 +68,12 @@ class Clock:
         elif not self._last:
             yield self._begin(t, values)
         else:
-            usual = self._usual or min(max(h, self._dt), _BACK)
+            usual = self._usual or min(max(h, self._dt), BACK)
             if h >= _FAR:
                 counts.jumps += 1
             elif h > _MISSING * usual:
                 counts.lost += round(h / usual) - 1
-            if h > max(LONGEST_GAP * (1.0 + 1e-6), min(_GAP * usual, _BACK)):
+            if h > max(LONGEST_GAP * (1.0 + 1e-6), min(_GAP * usual, BACK)):
                 yield self._begin(t, values, gap=True)
                 return
             self._usual = usual + _USUAL * (min(h, _MISSING * usual) - usual)
@@ -88,7 +88,7 @@ class Clock:
     def _between(self, t: float, values: Array) -> Iterator[Instant]:
         dt, last = self._dt, self._last
         last.append((t, values))
-        if _FAST * self._usual < dt:
+        if FASTER * self._usual < dt:
             while self._instant + 0.5 * dt <= t:
                 yield self._next(self._mean())
             while len(last) > 2 and last[1][0] <= self._instant - 0.5 * dt:
@@ -97,7 +97,7 @@ class Clock:
         while len(last) > 2:
             last.popleft()
         before, old = last.popleft()
-        if abs(t - self._instant) <= _ON_GRID * dt:
+        if abs(t - self._instant) <= ON_STEP * dt:
             yield self._next(values)
         slope = (values - old) / (t - before)
         while self._instant <= t:

@@ -33,10 +33,9 @@ from mpc.handover.judge import Judge, Window
 from mpc.handover.road import RoadWatch, at_friction, fit_friction
 from mpc.handover.rules import Rules
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.live.clock import Clock, Instant
+from tireid.live.clock import DT, Clock, Instant
 from tireid.live.state import LIVE, SLIP, STORED, Counts, Point, State
 
-DT = 0.01  # s between two instants of the recursion
 EVERY = 20  # instants between two states
 AT_ONCE = 5  # samples that are taken together
 LOOK = 10  # instants between two looks at the road; with twice the evidence that drives ask for
@@ -288,8 +287,9 @@ class Live:
         except (DivergedError, ValueError) as error:
             self._complaint = f"no tires follow from what was driven: {error}"
             return
+        point = self._point(model)  # its first forces are those of the prior
+        self._points.append(_NO_POINT if self._model is None else point)
         self._model, self._live = model, _numbers(model)
-        self._points.append(self._point(model))
         self._states_with_force += np.abs(self._points[-1][1]) >= RULES.force
         explains, self._complaint = self._judged(model, identifier.state())
         if breaks > EVERY // 2:

@@ -22,7 +22,7 @@ TOPIC = "/tireid/state"
 _BACKLOG = 64  # messages that wait for a client: 13 s of them, 0.3 MB
 _CHUNK = 1 << 16  # bytes of a recording between writes: 3 s of it are lost where the run is killed
 _PATIENCE = 1.0  # s for a server to end: a client that does not read would have it wait for ever
-_PARTS = ("../report.css", "uplot/uPlot.min.css", "uplot/uPlot.iife.min.js")  # of the page
+_PARTS = ("../report.css", "../uplot/uPlot.min.css", "../uplot/uPlot.iife.min.js")  # of the page
 
 
 class Outputs(ExitStack):

@@ -27,6 +27,7 @@ from models.logs.signals import BETA, INSTEAD, POSE, WHEELS, Signal, quantity_of
 from models.logs.units import PER_SECOND, TIME, is_given, time_unit, to_si
 from models.recordings.choice import column_of, has_v_y, missing_signals
 from models.recordings.map import AXES, LARGEST_PACKET, LogMap
+from tireid.live.clock import BACK, DT
 from tireid.live.state import Counts
 
 _READ = ("v_x", "v_y", BETA, "r", "delta_f", "a_y")
@@ -34,11 +35,9 @@ _JSON = json.JSONDecoder()
 _NUMBERS = {int, float, NoneType, EllipsisType}  # types, or nothing
 _TIME = "t"  # name that is the time where no other is declared
 _FIRST = 50  # packets, 0.5 s at 100 Hz, after which a name that never came is missing
-_DT = 0.01  # s, of the clock of all methods
-_NEAR = ON_STEP * _DT  # s, within which two instants are one
+_NEAR = ON_STEP * DT  # s, within which two instants are one
 _OBSERVED = 1.0  # s, of which rates of a bus are learnt; a signal that did not come is missing
 _MOST = 8192  # samples of a channel that wait for others: 8 s at 1 kHz
-_BACK = 1.0  # s, from which a clock that goes back begins anew
 
 
 class Sample(NamedTuple):
@@ -195,14 +194,14 @@ class _Channel:
 
     def at(self, t: float) -> float:
         """Return the value at an instant [s], as `models.logs.clock` has it; NaN in a gap."""
-        while len(self.last) > 2 and self.last[2][0] <= t - _DT:
+        while len(self.last) > 2 and self.last[2][0] <= t - DT:
             self.last.popleft()
         there = [one for one in self.last if one[0] <= t + _NEAR]
         if not there or t - there[-1][0] > max(self._longest, GAP_INTERVALS * self.interval):
             return math.nan
         here, now = there[-1]
-        if self.interval < _DT / FASTER:
-            recent = [value for time, value in there if time > t - _DT + _NEAR] or [now]
+        if self.interval < DT / FASTER:
+            recent = [value for time, value in there if time > t - DT + _NEAR] or [now]
             return sum(recent) / len(recent)
         before, old = there[-2] if len(there) > 1 else (here, now)
         step, ahead = here - before, t - here
@@ -259,7 +258,7 @@ class Frames:
         self._zero = t if math.isnan(self._zero) else self._zero
         if self._zero > CALENDAR:  # as `models.logs.stamps.since`
             t = round((t - self._zero) * 1e6) / 1e6
-        if not t >= self._newest - _BACK:
+        if not t >= self._newest - BACK:
             self._first = t
             self.waiting.clear()
             for one in self._channels:
@@ -285,7 +284,7 @@ class Frames:
         for one in self._channels:
             one.interval = float(np.median(np.diff([t for t, _ in one.last])))
         # Rates that differ by jitter alone are equal: the first counts.
-        base = min(self._channels, key=lambda one: round(abs(math.log(one.interval / _DT)), 3))
+        base = min(self._channels, key=lambda one: round(abs(math.log(one.interval / DT)), 3))
         begin = max(one.last[0][0] for one in self._channels) - 1e-9
         self.waiting.extend(t for t, _ in base.last if t >= begin)
         return base

@@ -16,32 +16,40 @@ from identifier.reproducibility import (
     online_error,
 )
 from identifier.run import History
-from identifier.tire_model import AXLES, TireModel
+from identifier.tire_model import TireModel
 from identifier.verdict import Verdict
 from identifier.verdict.verdict import PERCENT
 from models.files import digest
 from models.recordings import Recording
+from models.vehicle import Vehicle
 from tireid import verdicts
-from tireid.diagnoses import diagnosis_section, diagnosis_warnings
-from tireid.identified import Results
+from tireid.diagnoses import diagnosis_notes, diagnosis_section
+from tireid.identified import Results, file_name
 from tireid.report import (
     READ,
     Block,
     Cell,
-    Headline,
     Images,
     Marked,
+    Note,
     Picture,
     Report,
     Section,
     Table,
-    Tone,
     drawings,
     origin,
+    sentence,
     write_report,
 )
+from tireid.reports.captions import (
+    force_caption,
+    inputs_caption,
+    percents,
+    settled_caption,
+    slip_caption,
+)
 
-_EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a warning
+_EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a note
 
 
 def write_identify_report(
@@ -53,29 +61,27 @@ def write_identify_report(
 ) -> None:
     """Write the report of what was learnt."""
     learnt, model, verdict, evaluated = found.runs[0], found.model, found.verdict, found.evaluated
-    notes = [*diagnosis_warnings(diagnosis), *identify_warnings(model, found.runs)]
-    numbers = [
-        *verdicts.model_error_headline(verdict),
-        *_evaluated_headlines(evaluated),
-        *verdicts.number_headlines(verdict),
-        *identify_headlines(found),
-    ]
+    online = learnt if learnt.online else None
+    meaning = "validation drives on which the model is valid"
+    third = verdicts.verdicts_headline(evaluated, meaning) or verdicts.known_headline(model)
+    numbers = [*verdicts.model_error_headline(verdict), *third]
     report = Report(
         title=f"Tires of {learnt.vehicle.name}, identified on {learnt.recording.name}",
         summary=_how_learnt(learnt),
         numbers=[
-            verdicts.verdict_headline(verdict, notes),
+            verdicts.verdict_headline(verdict),
             *verdicts.of_answer(verdict, numbers),
         ],
-        lead=[curve_drawing(figures, verdict)],
-        warnings=[
-            *verdicts.verdict_warnings(verdict),
-            *verdicts.verdicts_warnings(evaluated, "{}, replayed: "),
-            *notes,
+        lead=[curve_drawing(figures, verdict, slip_caption(model, learnt.recording, online))],
+        notes=[
+            *verdicts.verdict_notes(verdict),
+            *verdicts.verdicts_notes(evaluated),
+            *diagnosis_notes(diagnosis, verdict),
+            *identify_notes(model, found.runs),
         ],
         sections=[
-            verdicts.verdict_section(verdict),
-            Section("Identified tires", learnt_blocks(found.method, model, figures)),
+            verdicts.verdict_section(verdict, model),
+            Section("Identified tires", learnt_blocks(found, figures)),
             *verdicts.sensors_section(model, found.drives),
             Section(
                 "How well it predicts",
@@ -83,7 +89,7 @@ def write_identify_report(
             ),
             Section(
                 "What went in",
-                drawings(figures, {"inputs": f"Signals of {learnt.recording.name}."}),
+                drawings(figures, {"inputs": inputs_caption(learnt.recording)}),
             ),
             diagnosis_section(diagnosis),
             origin(
@@ -123,85 +129,61 @@ def side_slip_text(learnt: History) -> str:
     )
 
 
-def identify_headlines(found: Results) -> list[Headline]:
-    """Return the errors of a frozen model, other drives first, and up to which slip it knows."""
-    numbers, runs = [], found.runs
-    for kind, some in (("of validation", runs[1:]), ("of identification", runs[:1])):
-        shares = []
-        for run in some:
-            size, error = force_rms(run), found.replays[run.recording.name].against_truth
-            if size and error and size.both > 0.0:
-                shares.append(error.both / size.both)
-        if shares:
-            meaning = f"of the rms force: error on drives {kind}, frozen"
-            numbers.append(Headline(f"{100.0 * float(np.mean(shares)):.1f} %", meaning))
-    return [*numbers, *verdicts.known_headline(found.model)]
-
-
-def _evaluated_headlines(evaluated: verdicts.Verdicts) -> list[Headline]:
-    """Return on how many validation drives a model is valid, and its error."""
-    meaning = "replayed validation drives with a valid prediction"
-    numbers = verdicts.verdicts_headline(evaluated, meaning)
-    shares = [one.model_error for one in evaluated.values() if one.model_error is not None]
-    if shares:
-        front, rear = (f"{PERCENT * share:.1f}" for share in np.mean(shares, axis=0))
-        meaning = "error over the force in the motion of these drives, front / rear"
-        numbers.append(Headline(f"{front} / {rear} %", meaning))
-    return numbers
-
-
-def curve_drawing(figures: Images, verdict: Verdict) -> Picture:
+def curve_drawing(figures: Images, verdict: Verdict, caption: str) -> Picture:
     """Return the learnt curve with its band, the first figure of a report."""
     word = "" if verdict.valid else f"{verdict.word[0].upper()}{verdict.word[1:]}. "
-    caption = f"{word}Axle force over slip angle: drive, curve and its band."
-    return drawings(figures, {"slip": caption})[0]
+    return drawings(figures, {"slip": f"{word}{caption}"})[0]
 
 
-def identify_warnings(model: TireModel, runs: Sequence[History]) -> list[str]:
+def identify_notes(model: TireModel, runs: Sequence[History]) -> list[Note]:
     """Return what speaks against a frozen model: divergence, extrapolation, no truth."""
-    said = [f"{model.vehicle.estimates}."] if model.vehicle.estimates else []
+    said = estimates_notes(model.vehicle)
     for run in runs:
-        name, recording = run.recording.name, run.recording
+        name = run.recording.name
         if run.diverged_at is not None:
-            said.append(f"{name}: learning diverged at {freeze_key(run.diverged_at)} s.")
-        if recording.axle_force is None and run.online:
             said.append(
-                f"{name} has no true forces: errors are against the forces identified online."
+                Note(f"learning diverged at {freeze_key(run.diverged_at)} s.", "doubt", name)
             )
-        said += extrapolated(model, recording)
+        if run.recording.axle_force is None and run.online:
+            text = "no true forces: errors are against the forces identified online."
+            said.append(Note(text, where=name))
+        said += extrapolated(model, run.recording)
     if model.known_slip is None:
-        said.append("This kind of model does not report the slip range that it was identified for.")
+        text = "This kind of model does not report the slip range that it was identified for."
+        said.append(Note(text))
     return said
 
 
-def extrapolated(model: TireModel, recording: Recording) -> list[str]:
-    """Return at which axles a drive exceeds the identified slip range, in words."""
+def estimates_notes(vehicle: Vehicle) -> list[Note]:
+    """Return what of a car was not measured, as a note."""
+    return [Note(f"{vehicle.estimates}.")] * bool(vehicle.estimates)
+
+
+def extrapolated(model: TireModel, recording: Recording) -> list[Note]:
+    """Return how much of a drive exceeds the identified slip range, as a note."""
     beyond = beyond_known(model, recording)
-    if model.known_slip is None or beyond is None:
+    if model.known_slip is None or beyond is None or max(beyond) <= _EXTRAPOLATED:
         return []
-    return [
-        f"{recording.name}: {100.0 * share:.0f} % of the samples exceed the identified slip range "
-        f"of the {axle} axle ({known:.1f}°). There the curve is extrapolated."
-        for axle, share, known in zip(AXLES, beyond, np.degrees(model.known_slip), strict=True)
-        if share > _EXTRAPOLATED
-    ]
+    front, rear = np.degrees(model.known_slip)
+    text = (
+        f"{percents(beyond)} of the samples exceed the identified slip range (front / rear, "
+        f"{front:.1f} / {rear:.1f}°). There the curve is extrapolated."
+    )
+    return [Note(text, where=recording.name)]
 
 
-def learnt_blocks(law: str, model: TireModel, figures: Images) -> list[Block]:
-    facts = [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
+def learnt_blocks(found: Results, figures: Images) -> list[Block]:
     blocks: list[Block] = [
         (
             "Slip has the sign of the paper, so that curves rise: positive slip pushes to the "
             "left. curve.csv has the curve with its uncertainty, weights.json the model."
         )
     ]
-    if facts:
-        blocks.append(Table(f"Parameters of the tires, {law}.", ["", *AXLES], facts))
-    if band := band_sentence(model):
+    if band := band_sentence(found.model):
         blocks.append(band)
     captions = {
-        "side_slip": "Side slip as it was estimated.",
-        "learnt": "Estimates over time.",
+        "side_slip": sentence(side_slip_text(found.runs[0]) or "side slip as estimated"),
+        "learnt": settled_caption(found.runs[0]) if "learnt" in figures else "",
         "error": "Norm of the observer's error.",
         "weights": "Weights of the network.",
     }
@@ -227,15 +209,10 @@ def _evaluated(evaluated: verdicts.Verdicts) -> list[Block]:
     for name, verdict in evaluated.items():
         errors = verdict.model_error or (None, None)
         shares = [None if one is None else with_doubt(PERCENT * one) for one in errors]
-        tone: Tone = "" if verdict.valid else "bad" if verdict.judged else "doubt"
-        rows.append([name, Marked(verdict.word, tone), *shares])
-    if not rows:
-        return []
-    caption = (
-        "The verdict on each replayed drive, as of tireid predict, and the error over the force "
-        "in the motion."
-    )
-    return [Table(caption, ["drive", "verdict", "front [%]", "rear [%]"], rows)]
+        rows.append([name, Marked(verdict.word, verdicts.tone_of(verdict)), *shares])
+    caption = "Verdict on each validation drive, and the model error over the force in the motion."
+    header = ["validation drive", "verdict", "front [%]", "rear [%]"]
+    return [Table(caption, header, rows)] if rows else []
 
 
 def _errors(found: Results, figures: Images) -> list[Block]:
@@ -248,18 +225,24 @@ def _errors(found: Results, figures: Images) -> list[Block]:
         for key, replays in found.frozen.items():
             error = replays[name].against_truth or replays[name].against_online
             rows.append([f"{name}, frozen, {key} s", *error_numbers(error, size)])
-    blocks: list[Block] = [
-        error_table(rows, "; without one it is against what was identified online" * online)
-    ]
-    if "forces" in figures:
-        caption = f"Axle forces over time: {'online, and ' * online}replayed with frozen weights."
-        read = READ["forces" if online else "replay"]
-        blocks.append(Picture(figures["forces"], caption, read))
-    for name, image in figures.items():
-        if name.startswith("replay_"):
-            caption = f"The frozen model on {name.removeprefix('replay_')}."
-            blocks.append(Picture(image, caption, READ["replay"]))
+    against = "; without one it is against what was identified online" * online
+    blocks: list[Block] = [error_table(rows, against)] if any(row[1] for row in rows) else []
+    blocks.append(replay_picture(found, figures, "forces", learnt.recording.name))
+    for one in (run.recording for run in others):
+        blocks.append(replay_picture(found, figures, f"replay_{file_name(one)}", one.name))
     return blocks
+
+
+def replay_picture(found: Results, figures: Images, figure: str, name: str) -> Picture:
+    """Return a figure of the frozen model on a drive, with its error.
+
+    figure : by the name of its file.   name : of the drive.
+    """
+    learnt, replay = found.runs[0], found.replays[name]
+    verdict = {learnt.recording.name: found.verdict, **found.evaluated}[name]
+    caption = force_caption(replay.recording, replay.axle_force, found.model, verdict)
+    online = learnt.online and figure == "forces"
+    return Picture(figures[figure], caption, READ["forces" if online else "replay"])
 
 
 def error_table(rows: Sequence[Sequence[Cell]], more: str = "") -> Table:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import tireid as ti
 from benchmarks.doctor_cases import planted
 from benchmarks.everyday_drives import drawn_everyday
 from benchmarks.faults import Late, Misaligned
@@ -50,7 +51,7 @@ def driven():
     """A minute of a sedan with a slalom in it: the car as told, a log, and the exact drive."""
     drive = drawn_everyday("sedan", "slalom", 1)
     log = drive.log(np.random.default_rng([1, 1]))
-    return drive.car.told, replace(log, axle_force=None), drive.exact
+    return drive.car.declared, replace(log, axle_force=None), drive.exact
 
 
 def test_nothing_is_found_on_a_clean_drive_and_little_is_unseen(driven):
@@ -59,6 +60,15 @@ def test_nothing_is_found_on_a_clean_drive_and_little_is_unseen(driven):
     assert said.findings == ()
     assert all("is not observable" in line for line in said.unobservable)
     assert len(said.unobservable) < 3
+
+
+@pytest.mark.parametrize(("scale", "found"), [(1.0, []), (0.87, [("factor", "v_x")])])
+def test_a_scale_of_v_x_without_a_y_is_found_where_roll_does_not_explain_it(scale, found):
+    log = ti.sample_recording(seed=2)
+    said = examine(replace(log, v_x=scale * log.v_x, a_y=None, axle_force=None), ti.sedan())
+    assert [(one.code, one.channel) for one in said.findings] == found
+    for one in said.findings:
+        assert abs(one.size - scale) < 2.0 * one.deviation < 0.1 and not one.sure
 
 
 @pytest.mark.sweep("offset v_y")
@@ -149,7 +159,7 @@ def test_a_number_of_the_car_is_a_note_and_neither_an_alarm_nor_sure(driven):
 
 def test_swapped_lengths_are_a_note_that_names_the_swap():
     drive = drawn_everyday("sedan", "lane change", 7000)
-    log, car = drive.log(np.random.default_rng([7000, 1])), drive.car.told
+    log, car = drive.log(np.random.default_rng([7000, 1])), drive.car.declared
     assert abs(car.l_f - car.l_r) > 0.5
     swapped = replace(car, l_f=car.l_r, l_r=car.l_f)
     (found, *_) = found_in(replace(log, axle_force=None), swapped)
@@ -266,7 +276,7 @@ def test_a_sensor_that_no_car_carries_is_never_sure(driven, ahead, sure):
     doubtful = one._replace(value=search.deviation(one))  # of a Gaussian 68 % lie within one
     found = search.finding(doubtful, (0.9, 0.5), (one,), sure=False)
     assert (found.confidence, found.group) == pytest.approx((0.6827 * 0.9, 0.6827 * 0.5), abs=1e-3)
-    assert found.text.endswith("on this drive it looks like: velocity sensor x v_y")
+    assert found.text.endswith("this drive cannot separate it from: velocity sensor x v_y")
 
 
 def test_a_size_is_believed_that_stands_out_and_that_devices_have(driven):
@@ -367,7 +377,7 @@ def test_a_valley_of_one_number_is_found_within_steps_of_three_widths():
 @pytest.mark.parametrize(("names", "sign"), [(("r", "a_y"), 1.0), (("v_y", "delta_f"), -1.0)])
 def test_two_channels_that_are_late_alike_are_one_device(names, sign):
     """Where v_y and the steering are early by as much, the others are late."""
-    car = drawn_everyday("sedan", "slalom", 1).car.told
+    car = drawn_everyday("sedan", "slalom", 1).car.declared
 
     def late(channel, size, **other):
         return Finding(code="delay", channel=channel, size=size, deviation=0.002, **other)

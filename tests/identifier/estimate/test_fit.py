@@ -181,15 +181,15 @@ def test_a_play_of_the_steering_is_found_and_its_curve_is_the_tires(seed):
     car = random_car("tenth", rng)
     loose = replace(car, tires=(Loose(car.tires[0]), car.tires[1]))
     log, other = (random_drive(loose, rng).log(rng) for _ in range(2))
-    model = fit([log], car.told).model
+    model = fit([log], car.declared).model
     assert model["steering_play"] == pytest.approx(PLAY, rel=0.2)
-    without = Priors.of(car.told).without(["steering_play"])
-    firm = replace(model, p=estimate([Drive.of(log, car.told)], car.told, without).p)
+    without = Priors.of(car.declared).without(["steering_play"])
+    firm = replace(model, p=estimate([Drive.of(log, car.declared)], car.declared, without).p)
     assert (missed(model, other) < [0.05, 0.05]).all()
     assert missed(model, other)[0] < 0.8 * missed(firm, other)[0]
     (note,) = (text for code, text in model.drives.notes if code == "steering_play")
     assert "deg of play" in note
-    (found,) = (one for one in examine(log, car.told).findings)
+    (found,) = (one for one in examine(log, car.declared).findings)
     assert found.code == "play" and found.size == pytest.approx(PLAY, rel=0.2)
 
 

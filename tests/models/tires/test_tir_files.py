@@ -336,8 +336,8 @@ def test_a_symmetric_tire_loses_conicity_and_plysteer(tmp_path):
     assert tire.forces(0.0, 0.0, 0.0, 4000.0).F_y == 0.0
 
 
-def test_a_file_that_is_not_there_is_an_os_error(tmp_path):
-    with pytest.raises(FileNotFoundError):
+def test_a_file_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(TirError, match=r"nowhere\.tir: there is no such file"):
         MagicFormula.from_tir(tmp_path / "nowhere.tir")
 
 

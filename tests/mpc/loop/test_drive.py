@@ -9,7 +9,8 @@ from models.friction import Friction
 from models.sensors import Sensor
 from models.vehicle import sedan
 from mpc.cars import DoubleTrackCar
-from mpc.loop.drive import COMPLETED, GUIDES, drive
+from mpc.loop.drive import COMPLETED, drive
+from mpc.loop.guide import GUIDES
 from mpc.loop.record import scores
 from mpc.loop.sensing import CarSensors, Measured, inertial_unit
 from mpc.path import Path, SpeedProfile

@@ -70,7 +70,7 @@ def packets(drive):
     return [json.dumps(dict(zip(names, row, strict=True))).encode() for row in rows]
 
 
-def carried(carrier, packets, tmp_path, monkeypatch, live):
+def carried(carrier, packets, request, live):
     """Return the tires that are identified of packets."""
     if carrier == "udp":
         with (
@@ -83,18 +83,10 @@ def carried(carrier, packets, tmp_path, monkeypatch, live):
                     out.sendto(one, ("127.0.0.1", port))
                 found = identified(source, live, min(100, N - 1 - first))
             return found
-    zenoh = pytest.importorskip("zenoh")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    config = {"mode": "peer", "scouting": {"multicast": {"enabled": False}}}
-    here = tmp_path / "zenoh.json5"
-    here.write_text(json.dumps(config | {"listen": {"endpoints": [f"tcp/127.0.0.1:{port}"]}}))
-    monkeypatch.setenv("ZENOH_CONFIG", str(here))
-    there = json.dumps(config | {"connect": {"endpoints": [f"tcp/127.0.0.1:{port}"]}})
+    peer = request.getfixturevalue("zenoh_peer")
     with (
         open_source("zenoh:car", LogMap(), live.counts, vehicle=ti.sedan()) as source,
-        zenoh.open(zenoh.Config.from_json5(there)) as session,
+        peer() as session,
     ):
         while not live.counts.unreadable:  # until both know of one another
             session.put("car", b"no sample")
@@ -107,10 +99,10 @@ def carried(carrier, packets, tmp_path, monkeypatch, live):
 
 
 @pytest.mark.parametrize("carrier", ["udp", "zenoh"])
-def test_packets_identify_the_tires_of_their_log(carrier, drive, tmp_path, monkeypatch):
+def test_packets_identify_the_tires_of_their_log(carrier, drive, tmp_path, request):
     live = Live(ti.sedan())
     write_recording(drive, tmp_path / "log.csv")
-    found = carried(carrier, packets(drive), tmp_path, monkeypatch, live)
+    found = carried(carrier, packets(drive), request, live)
     assert_same_tires(found, tmp_path / "log.csv")
     assert live.counts.lost == live.counts.late == live.counts.refused == 0
 

@@ -1,13 +1,9 @@
 """The page of a live run, in a browser: what it says, how wide it is, what it remembers."""
 
 import base64
-import json
 import os
-import shutil
 import socket
-import subprocess
 import time
-import urllib.request
 from contextlib import suppress
 from pathlib import Path
 
@@ -17,7 +13,6 @@ import pytest
 from tests.tireid.live.test_outputs import FREE, address, made
 from tireid.live.outputs import OutputError, Outputs
 
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser")
 WIDE, NARROW = 1200, 500  # px
 # A folder into which each picture is written, to be looked at.
 PICTURES = os.environ.get("TIREID_PICTURES")
@@ -30,71 +25,19 @@ UNKNOWN = {
 }
 
 
-class Tab:
-    """A page in a browser without a window, by the protocol of its developer tools."""
-
-    def __init__(self, port):
-        connect = pytest.importorskip("websockets.sync.client", reason="needs websockets").connect
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json") as answer:
-            tab = next(one for one in json.load(answer) if one["type"] == "page")
-        self.link = connect(tab["webSocketDebuggerUrl"], max_size=None, legacy=True)
-        self.calls, self.errors = 0, []
-        self.call("Runtime.enable")
-
-    def call(self, method, **values):
-        self.calls += 1
-        self.link.send(json.dumps({"id": self.calls, "method": method, "params": values}))
-        while True:
-            said = json.loads(self.link.recv(timeout=20))
-            if said.get("method") == "Runtime.exceptionThrown":
-                self.errors.append(said["params"]["exceptionDetails"])
-            if said.get("id") == self.calls:
-                return said["result"]
-
-    def value(self, expression):
-        return self.call("Runtime.evaluate", expression=expression)["result"].get("value")
-
-    def wait(self, expression, send=lambda: None):
-        """Go on sending until an expression is true."""
-        end = time.monotonic() + 15.0
-        while not self.value(expression):
-            assert time.monotonic() < end, (expression, self.value("document.body.innerText"))
-            send()
-            time.sleep(0.02)
-
-    def look(self, name):
-        """Look at both widths: nothing is cut off at the right, nothing went wrong."""
-        for width in (WIDE, NARROW):
-            size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
-            self.call("Emulation.setDeviceMetricsOverride", **size)
-            self.wait("plots.slip.width > 0 && plots.slip.width <= $('slip').clientWidth")
-            assert self.value("document.documentElement.scrollWidth") <= width
-            if PICTURES:
-                time.sleep(0.3)
-                picture = self.call("Page.captureScreenshot", captureBeyondViewport=True)["data"]
-                path = Path(PICTURES) / f"{name}_{width}.png"
-                path.write_bytes(base64.b64decode(picture))
-        assert not self.errors
-
-
-@pytest.fixture
-def tab(tmp_path):
-    if BROWSER is None:
-        pytest.skip("needs chromium")
-    words = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--remote-debugging-port=0"]
-    with subprocess.Popen(
-        [*words, f"--user-data-dir={tmp_path}", "about:blank"], stderr=subprocess.DEVNULL
-    ) as browser:
-        try:
-            port, end = tmp_path / "DevToolsActivePort", time.monotonic() + 20.0
-            while not port.exists() or not port.read_text():
-                assert time.monotonic() < end
-                time.sleep(0.05)
-            tab = Tab(port.read_text().split()[0])
-            yield tab
-            tab.link.close()
-        finally:
-            browser.terminate()
+def look(tab, name):
+    """Look at both widths: nothing is cut off at the right, nothing went wrong."""
+    for width in (WIDE, NARROW):
+        size = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+        tab.call("Emulation.setDeviceMetricsOverride", **size)
+        tab.wait("plots.slip.width > 0 && plots.slip.width <= $('slip').clientWidth")
+        assert tab.value("document.documentElement.scrollWidth") <= width
+        if PICTURES:
+            time.sleep(0.3)
+            picture = tab.call("Page.captureScreenshot", captureBeyondViewport=True)["data"]
+            path = Path(PICTURES) / f"{name}_{width}.png"
+            path.write_bytes(base64.b64decode(picture))
+    assert not tab.errors
 
 
 def free_pair():
@@ -135,17 +78,17 @@ def test_the_page_says_what_is_known_and_when_nothing_comes(tab):
         shown = tab.value(text)
         for words in ("100.0 ± 2.0", "0.57 ± 0.23", "lost\t3", "-0.34 ± 0.04", "1.74"):
             assert words in shown
-        tab.look("good")
+        look(tab, "good")
         alarm = "friction 0.62 of the reference"
         bad = made(420.4, valid=False, reason="another road", alarm=alarm, friction=0.62)
         tab.wait(f"{text}.includes({alarm!r})", lambda: outputs.send(bad))
         assert tab.value("[$('valid').className, $('alarm').className].join()") == "doubt,bad"
-        tab.look("alarm")
+        look(tab, "alarm")
         nothing = made(420.6, valid=False, origin="stored", **UNKNOWN)
         tab.wait(f"{text}.includes('the curves are stored')", lambda: outputs.send(nothing))
         assert "Understeer gradient [deg/g]\t-\nLargest a_y [m/s²]\t-" in tab.value(text)
-        tab.look("unknown")
+        look(tab, "unknown")
         tab.wait(f"{text}.includes('nothing came for 2 s')")
-        tab.look("old")
+        look(tab, "old")
     with served(place) as outputs:  # the next run, at the same ports
         tab.wait(good, lambda: outputs.send(made(0.0)))

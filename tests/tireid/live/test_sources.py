@@ -377,22 +377,13 @@ def test_a_signal_that_does_not_come_on_the_bus_is_named(tmp_path):
             first(source, 1)
 
 
-def test_zenoh_gives_the_packets_that_are_put(tmp_path, monkeypatch):
-    zenoh = pytest.importorskip("zenoh")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    config = {"mode": "peer", "scouting": {"multicast": {"enabled": False}}}
-    here = tmp_path / "zenoh.json5"
-    here.write_text(json.dumps(config | {"listen": {"endpoints": [f"tcp/127.0.0.1:{port}"]}}))
-    monkeypatch.setenv("ZENOH_CONFIG", str(here))
-    there = json.dumps(config | {"connect": {"endpoints": [f"tcp/127.0.0.1:{port}"]}})
+def test_zenoh_gives_the_packets_that_are_put(zenoh_peer):
     counts = Counts()
     with pytest.raises(RecordingError, match="cannot be opened"):
         opened("zenoh:/not a key//")
     with (
         opened("zenoh:car/state", counts=counts) as source,
-        zenoh.open(zenoh.Config.from_json5(there)) as session,
+        zenoh_peer() as session,
     ):
         found, end = [], time.monotonic() + 20.0
         while not found and time.monotonic() < end:  # until both know of one another

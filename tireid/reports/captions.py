@@ -1,0 +1,161 @@
+"""What a figure shows, in a sentence computed from the data that it draws."""
+
+import numpy as np
+
+from codegen.arrays import Array
+from identifier.doctor.readings import Motion, Reading, forces_and_slips
+from identifier.run import History
+from identifier.tire_model import TireModel
+from identifier.verdict import Verdict, within_band
+from identifier.verdict.friction import RoadFriction
+from identifier.verdict.verdict import LARGEST_MODEL_ERROR, PERCENT
+from models.recordings import Recording
+from models.vehicle import Vehicle
+
+_CURVE = 200  # points at which a band is compared with the points of a drive
+_SETTLED = 0.1  # of its last value: an estimate within it has converged
+_PLACES = ("at small slip", "near the end of the identified slip", "beyond the identified slip")
+
+
+def percents(shares: Array | tuple[float, ...], digits: int = 0) -> str:
+    """Return shares of front and rear: 3 / 9 %."""
+    return " / ".join(f"{PERCENT * share:.{digits}f}" for share in shares) + " %"
+
+
+def slip_caption(model: TireModel, recording: Recording, online: History | None = None) -> str:
+    """Return how many of the drawn points lie outside the band, where, and with the tires' lag."""
+    modelled, force, what = model.predict(recording), recording.axle_force, "true forces"
+    if force is None and online is not None:
+        force, what = online.axle_force, "forces identified online"
+    said, band, known = "Axle force over slip angle", model.band, model.known_slip
+    if band is None or known is None:
+        return f"{said} of {recording.name}, and the frozen curve."
+    points = modelled if force is None else force
+    moves = recording.v_x >= model.min_speed
+    slip = recording.alpha(model.vehicle.l_f, model.vehicle.l_r)[moves]
+    at = np.linspace(slip.min(), slip.max(), _CURVE)
+    low, high = band.at(at)
+    outside = np.stack(
+        [
+            (y < np.interp(x, at, low[:, k])) | (y > np.interp(x, at, high[:, k]))
+            for k, (x, y) in enumerate(zip(slip.T, points[moves].T, strict=True))
+        ],
+        axis=1,
+    )
+    places = np.sum(np.abs(slip[..., None]) > known[:, None] * [0.5, 1.0], axis=2)[outside]
+    counts = np.bincount(places, minlength=3)
+    most = f", most {_PLACES[counts.argmax()]}" if 2 * counts.max() > places.size else ""
+    if force is not None:
+        left = np.abs(force - modelled)[moves] > band.over(recording)[moves]
+        lagged = f" With the lag of the tires it is {percents(left.mean(axis=0))}."
+    else:
+        what, inside = "modelled forces", within_band(model, recording)
+        share = "" if inside is None else percents(inside)
+        lagged = (
+            f" With the lag of the tires {share} of the force in the motion lies in it."
+            * bool(share)
+        )
+    drawn = f"{percents(outside.mean(axis=0))} of the {what}"
+    return f"{said}: {drawn} lie outside the steady band (front / rear){most}.{lagged}"
+
+
+def force_caption(
+    recording: Recording, force: Array, model: TireModel, verdict: Verdict | None
+) -> str:
+    """Return how well a frozen model replays a drive.   verdict : on it; None leaves it out."""
+    said, truth = f"Axle forces of {recording.name}, replayed with the frozen model", []
+    if recording.axle_force is not None:
+        moves = recording.v_x >= model.min_speed
+        known, t = recording.axle_force[moves], recording.t[moves]
+        error = force[moves] - known
+        size, rms = (np.sqrt(np.mean(one**2, axis=0)) for one in (known, error))
+        row, axle = np.unravel_index(np.abs(error).argmax(), error.shape)
+        if size.min() > 0.0:
+            truth.append(f"{percents(rms / size, 1)} of the true force (front / rear)")
+        truth.append(
+            f"largest {np.abs(error).max():.0f} N at {t[row]:.4g} s, {('front', 'rear')[axle]}"
+        )
+    elif verdict is not None and verdict.model_error is not None:
+        truth.append(
+            f"{percents(verdict.model_error, 1)} of the force in the motion (front / rear)"
+        )
+    if verdict is not None and not verdict.valid:
+        said = f"{verdict.word[0].upper()}{verdict.word[1:]}. {said}"
+    return f"{said}: error {', '.join(truth)}." if truth else f"{said}."
+
+
+def settled_caption(learnt: History) -> str:
+    """Return from when on the first estimate of an identifier stays near its last value."""
+    found = [(block.part, learnt.tracks_over(block)[0]) for block in learnt.blocks()]
+    values = np.concatenate([track.values for _, track in found])
+    far = np.abs(values / values[-1] - 1.0) > _SETTLED
+    last = [int(np.flatnonzero(axle)[-1]) if axle.any() else 0 for axle in far.T]
+    front, rear = (f"{learnt.recording.t[k]:.3g}" for k in last)
+    return (
+        f"Estimates over time: the {found[0][1].title} stays within {PERCENT * _SETTLED:.0f} % of "
+        f"its last value from {front} / {rear} s on (front / rear)."
+    )
+
+
+def inputs_caption(recording: Recording) -> str:
+    """Return the range of the signals of a log."""
+    v, most = (
+        recording.v_x,
+        {
+            "steering": (np.degrees(recording.delta_f), "°"),
+            "yaw rate": (np.degrees(recording.r), "°/s"),
+            "a_y": (recording.a_y, " m/s²"),
+        },
+    )
+    ranges = [
+        f"{name} up to {np.abs(one).max():.3g}{unit}"
+        for name, (one, unit) in most.items()
+        if one is not None
+    ]
+    return (
+        f"Signals of {recording.name}: v_x {v.min():.3g} to {v.max():.3g} m/s, {', '.join(ranges)}."
+    )
+
+
+def motion_caption(verdict: Verdict) -> str:
+    """Return how far the mean forces of a model are from those in the motion, and where most."""
+    windows, errors = verdict.forces, verdict.model_error
+    assert windows is not None
+    far = np.abs(windows.modelled - windows.measured)
+    row, axle = np.unravel_index(far.argmax(), far.shape)
+    limit = f"limit {PERCENT * LARGEST_MODEL_ERROR:.0f} %"
+    rms = "" if errors is None else f" {percents(errors, 1)} rms (front / rear, {limit}),"
+    return (
+        f"Mean force over windows of 0.3 s, from the motion and of the model: error{rms} largest "
+        f"at {windows.t[row]:.4g} s, {('front', 'rear')[axle]}, {far.max():.2g} of the static load."
+    )
+
+
+def friction_caption(friction: RoadFriction) -> str:
+    """Return the friction of a road over that of the identification drive, and its extremes."""
+    low, middle, high = np.quantile(friction.ratio, [0.0, 0.5, 1.0])
+    roads = "; ".join(road.text for road in friction.roads)
+    return (
+        f"Friction of the road over that of the identification drive: median {middle:.2f}, "
+        f"{low:.2f} to {high:.2f}{f'; {roads}' if roads else ', no other road reported'}."
+    )
+
+
+def diagnosis_caption(
+    recording: Recording, vehicle: Vehicle, repaired: Recording, car: Vehicle
+) -> str:
+    """Return how far force and slip rise together, as logged and as repaired."""
+    logs = {"as logged": (recording, vehicle)}
+    if repaired is not recording:
+        logs["repaired"] = (repaired, car)
+    found = []
+    for name, (one, given) in logs.items():
+        motion = Motion.of(one)
+        if motion is not None:
+            axles = forces_and_slips(motion, given, Reading())
+            pairs = zip(axles.slip, axles.force, strict=True)
+            front, rear = (np.corrcoef(slip, force)[0, 1] for slip, force in pairs)
+            found.append(f"{front:.2f} / {rear:.2f} {name}")
+    if not found:
+        return "Force over slip angle: too little is driven."
+    return f"Force over slip angle: correlation {', '.join(found)} (front / rear)."
