@@ -411,7 +411,7 @@ class Vehicle:
 
     @property
     def froude_time(self) -> float:
-        """Time that scales with the size of a car, sqrt(L/g) [s]: 0.5 for a sedan."""
+        """Time that scales with the size of a car, sqrt(L/g) [s], 0.5 for a sedan."""
         return math.sqrt(self.wheelbase / GRAVITY)
 
     @property
