@@ -110,9 +110,9 @@ def alike(shown: str, printed: str) -> bool:
     """Whether two lines are the same but for one in the last digit of a number, and blanks."""
     words = [line.split() for line in (shown, printed)]
     return len(words[0]) == len(words[1]) and all(
-        a == b
-        or (NUMBER.fullmatch(a) and NUMBER.fullmatch(b))
-        and abs(float(a) - float(b)) < 1.5 * 10.0 ** -len(a.partition(".")[2])
+        abs(float(a) - float(b)) < 1.5 * 10.0 ** -len(a.partition(".")[2])
+        if NUMBER.fullmatch(a) and NUMBER.fullmatch(b)
+        else a == b
         for a, b in zip(*words, strict=True)
     )
 

@@ -94,7 +94,7 @@ def test_blocks_run_in_order_in_one_namespace_and_folder(tmp_path):
         ("<!-- background -->\n```sh\necho bad; exit 4\n```\n<!-- run: sleep 0.3 -->\n", "bad"),
         ("<!-- c: int d; -->\n\n```c\nd = 1;\ne = 2;\n```\n", "page.md:5:"),
         ("```toml\na = = 1\n```\n", "page.md:1: Invalid value (at line 2"),
-        ("```python\nprint(0.52)\n```\n<!-- printed -->\n```text\n0.54\n```\n", "page.md:6: is not"),
+        ("```sh\necho 0.52\n```\n<!-- printed -->\n```text\n0.54\n```\n", "page.md:6: is not"),
         ("```fortran\nEND\n```\n", "page.md:1: nothing runs a block of fortran"),
     ],
 )
