@@ -18,8 +18,7 @@ from identifier.verdict import within_band
 from models.files import digest
 from tireid import __version__, output
 from tireid.commands import options as shared
-from tireid.figures.forces import prediction_figure
-from tireid.figures.predict import friction_figure, motion_figure
+from tireid.figures.forces import friction_figure, prediction_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import slip_figure
 from tireid.identified import error_cells
@@ -38,7 +37,6 @@ from tireid.report import (
 from tireid.reports.captions import (
     force_caption,
     friction_caption,
-    motion_caption,
     slip_caption,
 )
 from tireid.reports.identify import (
@@ -103,11 +101,9 @@ def run(options: argparse.Namespace) -> int:
         output.write_json(folder / "summary.json", facts)
         say("drawing figures")
         figures = {
-            "slip": slip_figure(model, recording),
-            "forces": prediction_figure(prediction),
+            "slip": slip_figure(model, recording, verdict.forces),
+            "forces": prediction_figure(prediction, verdict.forces),
         }
-        if verdict.forces is not None:
-            figures["motion"] = motion_figure(verdict.forces, model.vehicle)
         if friction is not None:
             figures["friction"] = friction_figure(friction)
         images = save_figures(folder, figures)
@@ -245,8 +241,6 @@ def write_predict_report(
         found.append(error_table([[recording.name, *error_numbers(error, prediction.true_force)]]))
     found += map(sentence, lines.splitlines())
     captions = {"replay": force_caption(recording, prediction.axle_force, model, verdict)}
-    if verdict.forces is not None:
-        captions = {"motion": motion_caption(verdict), **captions}
     if verdict.friction is not None:
         captions["friction"] = friction_caption(verdict.friction)
     found += drawings({**figures, "replay": figures["forces"]}, captions)
@@ -260,7 +254,7 @@ def write_predict_report(
             verdict_headline(verdict),
             *of_answer(verdict, [*model_error_headline(verdict), *known_headline(model)]),
         ],
-        lead=[curve_drawing(figures, verdict, slip_caption(model, recording))],
+        lead=[curve_drawing(figures, verdict, slip_caption(model, recording, verdict.forces))],
         notes=notes,
         sections=[
             verdict_section(verdict, model),

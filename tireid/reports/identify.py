@@ -61,7 +61,7 @@ def write_identify_report(
 ) -> None:
     """Write the report of what was learnt."""
     learnt, model, verdict, evaluated = found.runs[0], found.model, found.verdict, found.evaluated
-    online = learnt if learnt.online else None
+    slip = slip_caption(model, learnt.recording, verdict.forces)
     meaning = "validation drives on which the model is valid"
     third = verdicts.verdicts_headline(evaluated, meaning) or verdicts.known_headline(model)
     numbers = [*verdicts.model_error_headline(verdict), *third]
@@ -72,7 +72,7 @@ def write_identify_report(
             verdicts.verdict_headline(verdict),
             *verdicts.of_answer(verdict, numbers),
         ],
-        lead=[curve_drawing(figures, verdict, slip_caption(model, learnt.recording, online))],
+        lead=[curve_drawing(figures, verdict, slip)],
         notes=[
             *verdicts.verdict_notes(verdict),
             *verdicts.verdicts_notes(evaluated),
