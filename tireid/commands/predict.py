@@ -16,6 +16,7 @@ from identifier.reproducibility import beyond_known
 from identifier.tire_model import TireModel
 from identifier.verdict import within_band
 from models.files import digest
+from models.recordings import LogMap
 from tireid import __version__, output
 from tireid.commands import options as shared
 from tireid.figures.forces import friction_figure, prediction_figure
@@ -46,6 +47,7 @@ from tireid.reports.identify import (
     error_table,
     estimates_notes,
     extrapolated,
+    went_in,
 )
 from tireid.verdicts import (
     known_headline,
@@ -107,7 +109,10 @@ def run(options: argparse.Namespace) -> int:
         if friction is not None:
             figures["friction"] = friction_figure(friction)
         images = save_figures(folder, figures)
-        write_predict_report(folder, prediction, images, lines, options.model, options.words)
+        log_map = shared.given_map(options)
+        write_predict_report(
+            folder, prediction, images, lines, options.model, options.words, log_map
+        )
     error, table = prediction.against_truth, ""
     if error is not None:
         cells = [visible(recording.name), *error_cells(error, prediction.true_force)]
@@ -224,10 +229,12 @@ def write_predict_report(
     lines: str,
     source: Path,
     command: str,
+    log_map: LogMap,
 ) -> None:
     """Write the report of a prediction.
 
     lines : what is said of it beside its errors.   source : the model's file.
+    log_map : how the log was read.
     """
     model, recording, verdict = prediction.model, prediction.recording, prediction.verdict
     notes = [
@@ -260,10 +267,12 @@ def write_predict_report(
             verdict_section(verdict, model),
             Section("What it predicts", found),
             *sensors_section(model, [recording]),
+            Section("What went in", went_in(model, log_map)),
             origin(
                 command,
                 model.vehicle,
                 [recording],
+                channels=f"hash {digest(repr(log_map))}",
                 model=f"{source.name}, hash {digest(model.to_dict())}",
             ),
         ],
