@@ -90,13 +90,13 @@ def slip_figure(
     modelled, reference = modelled / unit.newtons, reference / unit.newtons
     limits, known = force_range(reference, modelled), truth or windows is not None
 
-    look = {**_CLOUD, **{name: (TRUTH if truth else MOTION)[name] for name in ("color", "label")}}
+    look: Look = {**(TRUTH if truth else MOTION), **_CLOUD, "markersize": 3.0, "alpha": 0.35}
     learnt: Look = {**MODEL, **_CLOUD}
     figure, panels = axle_panels([3.2, 1.3] if known else [3.2], sharex="col")
     for axle, (axes, lowest) in enumerate(zip(panels[0], panels[-1], strict=True)):
         x, y, force = alpha[:, axle], modelled[:, axle], reference[:, axle]
         if known:
-            axes.plot(x, drawable(force, limits), **look | {"markersize": 3.0, "alpha": 0.35})
+            axes.plot(x, drawable(force, limits), **look)
             lowest.axhline(0.0, color=look["color"], linewidth=0.6)
             lowest.plot(x, np.clip(y - force, *limits), **learnt)
         axes.plot(x, drawable(y, limits), **learnt)
