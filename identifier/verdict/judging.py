@@ -403,13 +403,20 @@ def _verdict(evaluated: _Evaluated, listed: list[Objection], whole: Recording) -
         )
         for one in model.estimates()
     )
+    loads = np.array(model.vehicle.axle_loads)
+    forces = WindowForces(
+        t=evaluated.middle,
+        measured=loads * found.measured,
+        modelled=loads * found.modelled,
+        slip=found.windows.mean(model.lagged_slip(recording)),
+    )
     return Verdict(
         findings=tuple(listed),
         numbers=numbers,
         measures=measures,
         reach=_reach(model, recording),
         blind=WITHOUT_V_Y if recording.logged_v_y is None else (),
-        forces=WindowForces(evaluated.middle, found.measured, found.modelled),
+        forces=forces,
     )
 
 
