@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from codegen.arrays import Array
 from identifier.evidence import (
     FEWEST,
     WINDOW,
