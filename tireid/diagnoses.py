@@ -48,6 +48,7 @@ NAMES = {  # of findings by their code, where the code is not the word
     "steering_ratio": "angle of the steering wheel, ratio",
     "straight": "hardly any corner",
     "unit": "wrong unit",
+    "v_y_reads": "reads wrong by",
     "velocity_sensor_angle": "velocity sensor turned",
     "velocity_sensor_x": "velocity sensor ahead of the c.g.",
     "yaw_inertia": "yaw inertia, times the right one",
@@ -115,11 +116,9 @@ def diagnosis_notes(diagnosis: Diagnosis, verdict: Verdict | None = None) -> lis
     if verdict is None:
         found = diagnosis.findings
         return [Note(printed(one.text), "bad" if one.matters else "") for one in found]
-    said, texts = (
-        {one.text for one in verdict.findings},
-        (f"doctor: {one.text}" for one in diagnosis.findings),
-    )
-    return [Note(printed(text)) for text in texts if text not in said]
+    said = {word for one in verdict.findings for word in (one.code, one.text)}
+    texts = {f"doctor: {one.text}": one.code for one in diagnosis.findings}
+    return [Note(printed(text)) for text, code in texts.items() if not said & {text, code}]
 
 
 def diagnosis_section(diagnosis: Diagnosis, heading: str = "Doctor") -> Section:

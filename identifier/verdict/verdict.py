@@ -16,7 +16,7 @@ BEYOND_KNOWN = "beyond_known"  # code of the finding that a drive slips beyond t
 
 UNOBSERVABLE = (
     "a wrong mass, which scales all forces alike: weigh the car",
-    "l_f and l_r where all changes are slow, as for a small car: measure them",
+    "l_f and l_r where all changes are slow: weigh the axles",
 )
 
 

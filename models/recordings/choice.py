@@ -316,8 +316,15 @@ def column_word(name: str, proposal: Proposal) -> str:
     guess = proposal.guesses.get(name)
     if guess is None:
         return ""
-    unit, ratio = guess.unit or SI[QUANTITIES[name]], " /RATIO" if guess.hand else ""
-    channels = " + ".join(without_unit(one) for one in guess.channel)
-    sign = f" sign({guess.sign})" if guess.sign else ""
-    ratio += f" *{guess.factor:g}" if guess.factor != 1.0 else ""
-    return f'"{column_of(name)}={channels}{sign} [{unit}]{ratio}"'
+    unit = guess.unit or SI[QUANTITIES[name]]
+    one = Signal(channel=guess.channel, unit=unit, factor=guess.factor, sign=guess.sign)
+    return declaration(name, one, " /RATIO" * guess.hand)
+
+
+def declaration(name: str, one: Signal, ratio: str = "") -> str:
+    """Return the word of --columns that declares a signal.   ratio : where it is not known."""
+    words = column_of(name) + "=" + " + ".join(map(without_unit, one.channel))
+    words += f" sign({one.sign})" * bool(one.sign) + f" [{one.unit}]" * bool(one.unit)
+    words += ratio or f" /{one.ratio:g}" * (one.ratio != 1.0)
+    words += f" *{one.factor:g}" * (one.factor != 1.0) + f" - {one.offset:g}" * bool(one.offset)
+    return f'"{words}"'

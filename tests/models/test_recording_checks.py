@@ -119,9 +119,9 @@ ON_MOTION = {
     "a_y in g": (scaled(a_y=1 / 9.81), "ay must be", "9.81"),
     "a_y to the right": (scaled(a_y=-1.0), "ay must be", "sign of ay"),
     "a_y empty": (scaled(a_y=0.0), "ay must be", "leave the column ay out"),
-    "r to the right": (scaled(r=-1.0), "r contradicts ay", "change its sign"),
+    "r to the right": (scaled(r=-1.0), "r contradicts ay", "change the sign of r"),
 }
-ON_V_Y = {"v_y to the right": (scaled(v_y=-1.0), "vy contradicts ay", "change its sign")}
+ON_V_Y = {"v_y to the right": (scaled(v_y=-1.0), "vy contradicts ay", "change the sign of vy")}
 ON_FORCE = {
     "forces to the right": (forces(-1, -1), "Fyf must push", "sign of Fyf"),
     "front force to the right": (forces(-1, 1), "Fyf must push", "sign of Fyf"),

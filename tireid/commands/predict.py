@@ -215,7 +215,7 @@ def _prediction_text(prediction: Prediction, facts: Mapping[str, Any]) -> str:
         lines.append("friction: that of the identification drive, which explains every part")
     if friction is not None and not friction.roads:
         lines.append(
-            "friction: that of the identification drive, as far as observable"
+            f"friction: that of the identification drive, as far as observable; {friction.text}"
             if friction.unchanged
             else "friction: not observable, slip is too small"
         )

@@ -110,10 +110,9 @@ def inputs_caption(recording: Recording) -> str:
 def friction_caption(friction: RoadFriction) -> str:
     """Return the friction of a road over that of the identification drive, and its extremes."""
     low, middle, high = np.quantile(friction.ratio, [0.0, 0.5, 1.0])
-    roads = "; ".join(road.text for road in friction.roads)
     return (
         f"Friction of the road over that of the identification drive: median {middle:.2f}, "
-        f"{low:.2f} to {high:.2f}{f'; {roads}' if roads else ', no other road reported'}."
+        f"{low:.2f} to {high:.2f}; {friction.text}."
     )
 
 
