@@ -14,8 +14,10 @@ import numpy as np
 import pytest
 
 import tireid as ti
+from codegen import markup
 from codegen.markup import AXLE_COLORS
 from identifier.methods import make_method
+from identifier.verdict import Objection
 from models.recordings import RecordingError
 from mpc.prediction import build_dynamics
 from mpc.tires import prediction_tire
@@ -408,5 +410,19 @@ def test_a_notebook_displays_the_answers_of_a_run(log, car, tires):
     for color in AXLE_COLORS:
         assert page.count(color) == 4  # name, band, curve as far as it is known and beyond
     assert all("<polyline" in tire._repr_html_() for tire in tires.values())
+    assert "line-through" not in page
+    run.__dict__["verdict"] = replace(
+        run.verdict,
+        findings=(Objection("force_missed", "front", "it misses", True),),
+        numbers=tuple(one._replace(valid=one.axle == "rear") for one in run.verdict.numbers),
+    )
+    page = run._repr_html_()
+    assert page.count(markup.STRUCK) == page.count(f'{markup.REFUSED}">') > 3  # front, rear
     filtered = ti.identify(log, car, make_method("linear_kf", car))._repr_html_()
     assert "No tires:" in filtered and "<svg" not in filtered
+
+
+def test_plot_draws_tires_with_their_band_and_a_run_with_its_samples(run):
+    for what, label in ((run.tire, "identified curve"), (run, "frozen weights")):
+        labels = {text.get_text() for one in ti.plot(what).legends for text in one.get_texts()}
+        assert labels >= {label, "band of 90 %"}
