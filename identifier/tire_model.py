@@ -299,6 +299,10 @@ class TireModel(ABC):
         """
         return self.setup(recording.dt).output(recording, "axle_force")
 
+    def lagged_slip(self, recording: Recording) -> Array:
+        """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
+        return recording.alpha(self.vehicle.l_f, self.vehicle.l_r)
+
     @overload
     def force(self, alpha: float, axle: Axle, *, v_x: float | None = None) -> float: ...
     @overload

@@ -395,14 +395,20 @@ def _verdict(evaluated: _Evaluated, listed: list[Objection], whole: Recording) -
         for one in model.estimates()
     )
     clock, starts, n = whole.t[evaluated.portion.samples], found.windows.starts, found.windows.n
-    middle = 0.5 * (clock[starts] + clock[starts + n])
+    loads = np.array(model.vehicle.axle_loads)
+    forces = WindowForces(
+        t=0.5 * (clock[starts] + clock[starts + n]),
+        measured=loads * found.measured,
+        modelled=loads * found.modelled,
+        slip=found.windows.mean(model.lagged_slip(recording)),
+    )
     return Verdict(
         findings=tuple(listed),
         numbers=numbers,
         measures=measures,
         reach=_reach(model, recording),
         blind=WITHOUT_V_Y if recording.logged_v_y is None else (),
-        forces=WindowForces(middle, found.measured, found.modelled),
+        forces=forces,
     )
 
 

@@ -84,14 +84,15 @@ class Number(NamedTuple):
 
 
 class WindowForces(NamedTuple):
-    """Forces over the windows that an answer is judged by [static axle loads].
+    """Forces over the windows that an answer is judged by [N].
     t : middle of each window (m,) [s].   measured : mean force in the motion (m, 2).
-    modelled : that of the model (m, 2).
+    modelled : that of the model (m, 2).   slip : mean of the slip that makes it (m, 2) [rad].
     """
 
     t: Array
     measured: Array
     modelled: Array
+    slip: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

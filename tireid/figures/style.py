@@ -1,6 +1,6 @@
 """One look for every figure, set for the time of drawing only: matplotlib's globals stay untouched.
 
-Truth is black, what was identified online blue, frozen weights orange and dashed, the linear tire
+Truth is black, what was identified online blue, the frozen model orange and dashed, the linear tire
 grey and dotted; the colors are those of Okabe and Ito, which color-blind readers tell apart.
 """
 
@@ -52,10 +52,13 @@ SERIES = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, GREY)
 
 Look = Mapping[str, Any]  # of a curve, as words of matplotlib
 TRUTH: Look = {"color": BLACK, "linewidth": 1.5, "label": "truth"}
+_POINTS: Look = {"linestyle": "", "marker": ".", "markersize": 3.0}
+MOTION: Look = {**_POINTS, "color": BLACK, "label": "force from the motion"}
 ONLINE: Look = {"color": BLUE, "linewidth": 0.9, "label": "online"}
 FROZEN: Look = {
-    "color": ORANGE, "linestyle": (0, (3.5, 1.2)), "linewidth": 1.1, "label": "frozen weights",
+    "color": ORANGE, "linestyle": (0, (3.5, 1.2)), "linewidth": 1.1, "label": "model",
 }  # fmt: skip
+MODEL: Look = {**_POINTS, "color": ORANGE, "label": "model"}
 LINEAR: Look = {
     "color": GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.2, "label": "linear tire",
 }  # fmt: skip
