@@ -8,7 +8,7 @@ import importlib
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, overload
@@ -421,24 +421,29 @@ class TireModel(ABC):
         band = [] if self.band is None else [f"band: {self.band.origin}"]
         return [*band, self.vehicle.estimates] if self.vehicle.estimates else band
 
-    def _repr_html_(self) -> str:
+    def drawn_slip(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Return slip angles for a drawing [rad] (k,), and whether each axle knows them (k, 2)."""
         known = np.full(2, np.inf) if self.known_slip is None else self.known_slip
         reach = _REACH * float(known.max())
         slip = np.linspace(-1.0, 1.0, _POINTS) * (reach if 0.0 < reach < np.inf else _UNKNOWN_REACH)
+        return slip, np.abs(slip)[:, None] <= known
+
+    def _repr_html_(self, looks: Sequence[str] = ("", "")) -> str:
+        slip, known = self.drawn_slip()
         force, ends = self.force(slip), () if self.band is None else self.band.at(slip)
         curves = [
             markup.Curve(
                 axle,
                 color,
                 force[:, k] / 1e3,
-                np.abs(slip) <= known[k],
+                known[:, k],
                 [end[:, k] / 1e3 for end in ends],
             )
             for k, (axle, color) in enumerate(zip(AXLES, markup.AXLE_COLORS, strict=True))
         ]
         return markup.card(
             markup.line(f"of {self.vehicle.name}", type(self).__name__),
-            markup.table(self._rows()),
+            markup.table(self._rows(), ("", *looks)),
             markup.chart(np.degrees(slip), curves, "slip angle [deg]", "lateral force [kN]"),
             *map(markup.line, self._remarks()),
         )

@@ -21,7 +21,16 @@ from codegen.arrays import Array, root_mean_square
 from models.logs.axes import Triad, along_axes, ground, triads
 from models.logs.clock import kept, without_codes
 from models.logs.log import Channel, Heading, LogFile, RecordingError
-from models.logs.signals import BETA, COLUMNS, POSE, QUANTITIES, WHEELS, Signal, quantity_of
+from models.logs.signals import (
+    BETA,
+    COLUMNS,
+    ESTIMATED,
+    POSE,
+    QUANTITIES,
+    WHEELS,
+    Signal,
+    quantity_of,
+)
 from models.logs.spelling import unit_in_name, without_units
 from models.logs.stamps import typical_rate
 from models.logs.units import (
@@ -235,6 +244,8 @@ def _name_confidence(signal: str, name: str) -> float:
     if name in ours:
         return _STANDARD
     listed = _words_of(name)
+    if not listed or name == ESTIMATED:
+        return 0.0
     if signal in WHEELS:
         return _NAMES_WORDS if _wheel_words(signal, listed) else 0.0
     while name.startswith("/") and len(listed) > 1 and listed[-1] in _GENERIC:
