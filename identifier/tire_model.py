@@ -30,7 +30,7 @@ from models.files import write_atomically
 from models.recordings import Recording
 from models.recordings.portion import Portion
 from models.schema import Table, read_json
-from models.vehicle import DOWNFORCE_SPEED, Vehicle
+from models.vehicle import AREAS, BICYCLE, DOWNFORCE_SPEED, Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
     from identifier.day import Day
@@ -264,6 +264,19 @@ class TireModel(ABC):
         raise ValueError(
             f"forces of a {type(self).__name__} do not scale with load: {vehicle.name}"
         )
+
+    def require_car(
+        self,
+        driven: Vehicle,
+        name: str = "tire",
+        remedy: str = "give that car, or tire.mounted_on(car)",
+    ) -> None:
+        """Refuse another car than the tires were learnt on, whatever either is called."""
+        for key in (*BICYCLE, *AREAS):
+            mine, theirs = getattr(self.vehicle, key), getattr(driven, key)
+            if mine != theirs:
+                apart = f"{key} {mine:.6g}, driven {theirs:.6g}"
+                raise ValueError(f"{name} is of another car ({apart}): {remedy}")
 
     def at_friction(self, ratio: float) -> "TireModel":
         """Return the tires on a road of another friction, φ(α) → μ φ(α/μ): the stiffness stays.

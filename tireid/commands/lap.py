@@ -30,7 +30,6 @@ from tireid.commands.drive import (
     add_path,
     path_of,
     quantity,
-    require_its_car,
 )
 from tireid.driving.laps import drive_laps
 from tireid.driving.runs import FRICTIONS
@@ -105,7 +104,7 @@ def run(options: argparse.Namespace) -> int:
         )
     tire = load_model(source)
     vehicle = shared.read_vehicle(options, tire, source)
-    require_its_car(options, tire.vehicle, vehicle)
+    tire.require_car(vehicle, source, "leave --vehicle out")
     path = path_of(options, vehicle)
     try:
         limits = speed_limits(tire, confidence=options.confidence).scaled(ratio)
