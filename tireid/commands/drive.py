@@ -126,10 +126,10 @@ def run(options: argparse.Namespace) -> int:
     labels = list(dict.fromkeys(every if ALL in options.tires else options.tires))
     shared.require_one(options, "weights", "method", "paper", "design")
     stored = shared.model_of_day(options)
-    conditions = conditions_of(options, stored)
-    setup = conditions.setup
     driving.require_compiler()
     with shared.folder_of(options) as folder:
+        conditions = conditions_of(options, stored)
+        setup = conditions.setup
         if driving.ORACLE in labels:
             setup.oracle()  # what cannot be is said before the car drives
         source, learnt = frozen_tires(options, labels, conditions, stored)
@@ -263,8 +263,9 @@ def conditions_of(
     wish = _parse_speed(options.speed)
     if stored is not None:
         stored.require_car(vehicle, options.weights, "leave --vehicle out")
+    path = path_of(options, vehicle)
     vehicle, tires = simulated(vehicle, stored)
-    setup = Setup(path_of(options, vehicle), vehicle, options.mu, (), wish, tires=tires)
+    setup = Setup(path, vehicle, options.mu, (), wish, tires=tires)
     drops = tuple(sorted(_parse_drop(text) for text in options.mu_drop))
     for s, _ in drops:
         if not setup.path.closed and s >= (length := setup.path.length):
