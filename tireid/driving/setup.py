@@ -16,17 +16,19 @@ from codegen.arrays import Array
 from identifier.speed_limits import SpeedLimits, speed_limits
 from identifier.tire_model import TireModel
 from models.friction import Friction, FrictionChange
-from models.rules import require_positive
+from models.rules import require_within
 from models.tires import MagicFormula, Tire
 from models.vehicle import GRAVITY, Vehicle, sedan
 from mpc.cars import BRAKES, DoubleTrackCar
 from mpc.path import Path, SpeedProfile, speed_profile, steady_speed
 from mpc.path.speed import SHARE
+from mpc.problem import Guards
 from mpc.tires import PredictionTire, oracle_tire
 from mpc.tires.ladder import cornering_force
 
 WIDEST = 2.0  # deviation at which a car is off the path [m]
 FASTEST = 30.0  # m/s
+SPEEDS = Guards().min_speed, Guards().max_speed  # m/s, within which the tracker plans
 # Share of a given lateral acceleration to drive and brake with: 2 and 3 m/s² on a dry road.
 _DRIVES, _BRAKES = 0.22, 0.33
 PERIOD = 0.01  # control period [s]
@@ -61,7 +63,8 @@ class SpeedWish(NamedTuple):
         if isinstance(speeds, SpeedProfile):
             return cls(profile=speeds)
         if speeds is not None:
-            require_positive(ValueError, **{"speeds in m/s": speeds})
+            name = "speeds in m/s, or a profile of speed_profile,"
+            require_within(ValueError, *SPEEDS, **{name: speeds})
             return cls(speed=speeds)
         if tire is None:
             raise ValueError("no tire is given that tells the speed: give speeds, such as 15.0 m/s")
