@@ -37,7 +37,7 @@ from mpc.path import Path, SpeedProfile
 from mpc.problem import Problem
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.driving.setup import PERIOD, WIDEST, Setup, SpeedWish, simulated
+from tireid.driving.setup import PERIOD, Setup, SpeedWish, simulated
 from tireid.progress import Progress
 
 _NOTED = 0.1  # change of the grip that is worth a note
@@ -279,14 +279,13 @@ def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> Prediction
 
 def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> ClosedLoop:
     """Drive the path once with the tracker on a tire."""
-    setup, problem = conditions.setup, Problem()
+    setup = conditions.setup
     profile = setup.profile()
     model = given_tire(label, setup, learnt)
     lag = setup.vehicle.require_chassis().steering_lag
     try:
         tracker = Tracker(
             model,
-            problem,
             period=PERIOD,
             delay=conditions.delay * PERIOD + lag,
             caution=conditions.caution,
@@ -318,7 +317,7 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         lateral=conditions.lateral(learnt),
         laps=conditions.laps,
         time_limit=max(_GIVEN_UP[0], _GIVEN_UP[1] * conditions.laps * profile.lap_time),
-        widest=WIDEST,
+        widest=setup.widest,
         plan_every=_PLAN_EVERY,
         name=f"{setup.path.name}, {label}",
         progress=Progress(f"driving on {label} tires"),
@@ -327,7 +326,7 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         label=label,
         model=model,
         final=tracker.tire,
-        problem=problem,
+        problem=tracker.problem,
         drive=driven,
         scores=scores(driven),
         learner=learner,

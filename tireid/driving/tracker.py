@@ -2,6 +2,7 @@
 
 import math
 from collections import deque
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,13 +18,11 @@ from mpc.loop.lateral import LateralVelocity
 from mpc.loop.record import Plan
 from mpc.loop.sensing import Measured
 from mpc.path import Path, SpeedProfile
-from mpc.problem import Limits, Problem
+from mpc.problem import Problem
 from mpc.realtime.instance import Command, Status
 from mpc.realtime.tracker import Tracker as _Tracker
 from mpc.tires import prediction_tire
 from tireid.driving.setup import PERIOD, Setup, SpeedWish
-
-_LIMITS = Limits()
 
 
 class VehicleState(NamedTuple):
@@ -53,6 +52,9 @@ class VehicleState(NamedTuple):
 class Tracker:
     """Steers a car along a path by a plan of the next 2 s; it is what steers in `tireid.drive`.
 
+    For a model car, of a wheelbase below 1.5 m, lengths, speeds and times of plans and limits are
+    those of its size: at 1:10 it plans 0.6 s and drives from 0.6 m/s on.
+
     Attributes: profile, the wanted speed along the path.
 
     Parameters
@@ -66,8 +68,9 @@ class Tracker:
     period : between two steps [s], at most 0.05.
     delay : from a state until its steering has reached the wheels [s], the lag of the steering
         included; at most 31 periods.
-    max_steering : largest angle of the front road wheels [rad].
-    max_steering_rate : fastest change of it [rad/s].
+    max_steering : largest angle of the front road wheels [rad]; None: 0.5.
+    max_steering_rate : fastest change of it [rad/s]; None: 0.8, of a model car more, such as 2.5 at
+        1:10.
     caution : share of the tires' uncertainty that the plan allows for, from 0 to 1.
 
     Raises
@@ -89,8 +92,8 @@ class Tracker:
         speeds: SpeedProfile | float | None = None,
         period: float = PERIOD,
         delay: float = 0.0,
-        max_steering: float = _LIMITS.steering,
-        max_steering_rate: float = _LIMITS.steering_rate,
+        max_steering: float | None = None,
+        max_steering_rate: float | None = None,
         caution: float = 0.0,
     ) -> None:
         require_kind(Path, "as of paths.Path.from_waypoints or Path.from_csv", path=path)
@@ -98,11 +101,15 @@ class Tracker:
         model = prediction_tire(car if tire is None else tire, car)
         self._known = tire if isinstance(tire, TireModel) else None
         wish = SpeedWish.of(speeds, self._known)
-        require_positive(ValueError, max_steering=max_steering, max_steering_rate=max_steering_rate)
-        limits = Limits(steering=max_steering, steering_rate=max_steering_rate)
-        self._tracker = _Tracker(
-            model, Problem(limits=limits), period=period, delay=delay, caution=caution
+        asked = {"max_steering": max_steering, "max_steering_rate": max_steering_rate}
+        asked = {name: value for name, value in asked.items() if value is not None}
+        require_positive(ValueError, **asked)
+        problem = Problem.of(car, period)
+        limits = replace(
+            problem.limits, **{name.removeprefix("max_"): value for name, value in asked.items()}
         )
+        problem = replace(problem, limits=limits)
+        self._tracker = _Tracker(model, problem, period=period, delay=delay, caution=caution)
         self.profile = Setup(path, car, 1.0, (), wish, wish.limits(self._known)).profile()
         self._path, self._car = path, car
         self._guide: Guide | None = None
