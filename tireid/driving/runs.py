@@ -34,7 +34,7 @@ from mpc.loop.sensing import (
     inertial_unit,
 )
 from mpc.path import Path, SpeedProfile
-from mpc.problem import Problem
+from mpc.problem import Problem, size_of
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
 from tireid.driving.setup import PERIOD, Setup, SpeedWish, simulated
@@ -206,10 +206,11 @@ class Conditions:
     @property
     def sensors(self) -> CarSensors:
         """The sensors of the car, in order; those of one seed are the same unit."""
+        size = size_of(self.setup.vehicle)
         if self.kind == IMU:
             rng = np.random.default_rng([self.seed, 3]) if self.noise else None
-            return imu_and_localization(rng)
-        return inertial_unit() if self.noise else CarSensors()
+            return imu_and_localization(rng, size)
+        return inertial_unit(size) if self.noise else CarSensors()
 
     def lateral(self, learnt: TireModel | None = None) -> LateralVelocity | None:
         """Return what estimates v_y on a drive, None where a sensor measures it."""
