@@ -18,18 +18,18 @@ from models.vehicle import GRAVITY, Vehicle, sedan
 from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from mpc.path.speed import SHARE
+from mpc.problem import size_of
 from tireid.commands import options as shared
 from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION, learning_drive
 from tireid.driving.results import NO_FILM, Drives, headline, write_drive_report
-from tireid.driving.setup import BY_TIRES, Setup, SpeedWish, simulated
+from tireid.driving.setup import BY_TIRES, Setup, SpeedWish, simulated, tightest
 from tireid.figures.film import FORMATS
 from tireid.learning import identify
 from tireid.progress import say, tell
 from tireid.verdicts import warn_of
 
 _NOT_COMPLETED = 1
-_TIGHTEST = 1.1  # radius of a turn over the wheelbase: wheels at 42 deg, as no car goes farther
 CONFIRM = (
     "earn the speed: begin at 45 %% of what the tires allow, and go on as the car holds it and "
     "nothing says that the friction is another"
@@ -169,7 +169,7 @@ def quantity(text: str, *units: Mapping[str, float]) -> tuple[float, str]:
     return math.nan, ""
 
 
-def _parse_speed(text: str) -> SpeedWish:
+def _parse_speed(text: str, vehicle: Vehicle) -> SpeedWish:
     """Return what --speed says.
 
     text : tires, 70% of what they allow, 0.4g or 4m/s2, 17m/s or 60km/h.
@@ -185,7 +185,9 @@ def _parse_speed(text: str) -> SpeedWish:
     if not unit:
         raise ValueError(f"--speed {text} has no unit: write {text}%, {text}g or {text}m/s")
     if unit in SPEEDS:
-        require_within(ValueError, 3.0, 100.0, **{"--speed in m/s": value})
+        size = size_of(vehicle) ** 0.5
+        slowest, fastest = round(3.0 * size, 2), round(100.0 * size, 1)
+        require_within(ValueError, slowest, fastest, **{"--speed in m/s": value})
         return SpeedWish(speed=value)
     if unit in SHARES:
         require_within(ValueError, 5.0, 150.0, **{"--speed in %": 100.0 * value})
@@ -251,7 +253,7 @@ def path_of(options: argparse.Namespace, vehicle: Vehicle) -> Path:
         return BUILT_IN[name]()
     if not FilePath(name).suffix:
         raise ValueError(f"--path: there is no path {name!r}; {', '.join(BUILT_IN)}, or FILE.csv")
-    return Path.from_csv(FilePath(name), minimum_radius=_TIGHTEST * vehicle.wheelbase)
+    return Path.from_csv(FilePath(name), minimum_radius=tightest(vehicle))
 
 
 def conditions_of(
@@ -260,7 +262,7 @@ def conditions_of(
     """Return what is to be driven; the car is by default that of stored tires.   stored : tires."""
     of_sedan = stored is None or stored.vehicle.moves_as(sedan())
     vehicle = shared.read_vehicle(options, None if of_sedan else stored, options.weights)
-    wish = _parse_speed(options.speed)
+    wish = _parse_speed(options.speed, vehicle)
     if stored is not None:
         stored.require_car(vehicle, options.weights, "leave --vehicle out")
     path = path_of(options, vehicle)

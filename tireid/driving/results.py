@@ -28,7 +28,7 @@ from tireid.driving.runs import (
     Conditions,
     run_drive,
 )
-from tireid.driving.setup import PERIOD, PLANT, WIDEST, Setup
+from tireid.driving.setup import PERIOD, PLANT, Setup
 from tireid.figures.drive import (
     AT_THE_END,
     drive_errors_figure,
@@ -158,7 +158,7 @@ class Drives(NamedTuple):
         limits = first.problem.limits
         figures = {
             "path": drive_path_figure(drives),
-            "errors": drive_errors_figure(drives, off_path=WIDEST, **on_the_way),
+            "errors": drive_errors_figure(drives, off_path=setup.widest, **on_the_way),
             "steering": drive_steering_figure(
                 drives, angle_limit=limits.steering, rate_limit=limits.steering_rate, **on_the_way
             ),
@@ -305,7 +305,7 @@ def _drive_headlines(runs: _Runs) -> list[Headline]:
     """Return how far the first car was off its path, and whether a step ends in time."""
     first, score = runs[0], runs[0].scores
     s, peak = _farthest(first)
-    end = "" if score.completed else f", who {first.drive.ending}"
+    end = "" if score.completed else f": {first.drive.ending}"
     slow, period = score.solve_ms["p99"], 1e3 * PERIOD
     return [
         Headline(

@@ -2,6 +2,8 @@
 
 import math
 from collections import deque
+from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,15 +19,14 @@ from mpc.loop.lateral import LateralVelocity
 from mpc.loop.record import Plan
 from mpc.loop.sensing import Measured
 from mpc.path import Path, SpeedProfile
-from mpc.problem import Limits, Problem
+from mpc.problem import Problem
 from mpc.realtime.instance import Command, Status
 from mpc.realtime.tracker import Tracker as _Tracker
 from mpc.tires import PredictionTire, prediction_tire
 from tireid.driving.setup import PERIOD, Setup, SpeedWish
 
-_LIMITS = Limits()
 # Beyond which an angle is one in degrees: wheels turn by 0.7 rad, and in models within 0.1 s.
-_WIDEST, _FASTEST = 1.2, 20.0  # rad, rad/s
+_MOST = {"steering": (1.2, "rad"), "steering_rate": (20.0, "rad/s")}
 
 
 class VehicleState(NamedTuple):
@@ -58,7 +59,7 @@ def _of_car(tire: Any, car: Vehicle) -> PredictionTire:
     return prediction_tire(tire, car)
 
 
-def _require_radians(most: float, unit: str, **values: float) -> None:
+def _require_radians(most: float, unit: str, values: Mapping[str, float]) -> None:
     for name, value in values.items():
         if abs(value) > most:
             raise ValueError(f"{name} must be at most {most:g} {unit}, it is {value:g}: degrees?")
@@ -66,6 +67,9 @@ def _require_radians(most: float, unit: str, **values: float) -> None:
 
 class Tracker:
     """Steers a car along a path by a plan of the next 2 s; it is what steers in `tireid.drive`.
+
+    For a model car, of a wheelbase below 1.5 m, lengths, speeds and times of plans and limits are
+    those of its size: at 1:10 it plans 0.6 s and drives from 0.6 m/s on.
 
     Attributes: profile, the wanted speed along the path.
 
@@ -80,8 +84,9 @@ class Tracker:
     period : between two steps [s], at most 0.05.
     delay : from a state until its steering has reached the wheels [s], the lag of the steering
         included; at most 31 periods.
-    max_steering : largest angle of the front road wheels [rad].
-    max_steering_rate : fastest change of it [rad/s].
+    max_steering : largest angle of the front road wheels [rad]; None: 0.5.
+    max_steering_rate : fastest change of it [rad/s]; None: 0.8, of a model car more, such as 2.5 at
+        1:10.
     caution : share of the tires' uncertainty that the plan allows for, from 0 to 1.
 
     Raises
@@ -104,24 +109,26 @@ class Tracker:
         speeds: SpeedProfile | float | None = None,
         period: float = PERIOD,
         delay: float = 0.0,
-        max_steering: float = _LIMITS.steering,
-        max_steering_rate: float = _LIMITS.steering_rate,
+        max_steering: float | None = None,
+        max_steering_rate: float | None = None,
         caution: float = 0.0,
     ) -> None:
         require_kind(Path, "as of paths.Path.from_waypoints or Path.from_csv", path=path)
         require_kind(Vehicle, "as of Vehicle.from_toml or sedan", car=car)
         model = _of_car(car if tire is None else tire, car)
         self._known = tire if isinstance(tire, TireModel) else None
-        wish = SpeedWish.of(speeds, self._known)
-        require_positive(ValueError, max_steering=max_steering, max_steering_rate=max_steering_rate)
-        _require_radians(_WIDEST, "rad", max_steering=max_steering)
-        _require_radians(_FASTEST, "rad/s", max_steering_rate=max_steering_rate)
-        limits = Limits(steering=max_steering, steering_rate=max_steering_rate)
-        self._tracker = _Tracker(
-            model, Problem(limits=limits), period=period, delay=delay, caution=caution
-        )
+        wish = SpeedWish.of(speeds, self._known, car)
+        problem = Problem.of(car, period)
+        asked = {"steering": max_steering, "steering_rate": max_steering_rate}
+        for name, value in asked.items():
+            if value is not None:
+                require_positive(ValueError, **{f"max_{name}": value})
+                _require_radians(*_MOST[name], {f"max_{name}": value})
+                found: Any = {name: value}
+                problem = replace(problem, limits=replace(problem.limits, **found))
+        self._tracker = _Tracker(model, problem, period=period, delay=delay, caution=caution)
         self.profile = Setup(path, car, 1.0, (), wish, wish.limits(self._known)).profile()
-        self._path, self._car, self._most = path, car, max_steering
+        self._path, self._car, self._most = path, car, problem.limits.steering
         self._guide: Guide | None = None
         self._lateral: LateralVelocity | None = None
         self._steered = deque([0.0], maxlen=1 + round(delay / period))  # and acts the first
@@ -189,7 +196,7 @@ class Tracker:
         if self._path.closed and here.s > 0.5 * length:  # not yet at the start of the first lap
             here = self._path.project(place.X, place.Y, here.s - length)
         wheels = 0.0 if math.isnan(first.delta) else first.delta
-        _require_radians(self._most, "rad", delta=wheels)
+        _require_radians(self._most, "rad", {"delta": wheels})
         self._tracker.reset(wheels)
         self._steered.extend([wheels] * (self._steered.maxlen or 1))
         self._lateral, period = None, self._tracker.period
