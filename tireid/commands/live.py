@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from identifier.measured import with_doubt
+from identifier.measured import stiffness_words
 from tireid.commands.options import (
     add_log_map,
     add_options,
@@ -124,8 +124,7 @@ def _line(state: State) -> str:
     """Return what a driver reads of a state, in one line."""
     known = "valid" if state.valid else f"not valid: {state.reason} ({state.origin} tires)"
     parts = [f"t = {state.t:.1f} s, {known}"]
-    both = map(with_doubt, 1e-3 * state.stiffness, 1e-3 * state.stiffness_sd)
-    parts.append(f"stiffness {' / '.join(both)} kN/rad")
+    parts.append(f"stiffness {stiffness_words(state.stiffness, state.stiffness_sd)}")
     if state.friction is not None:
         parts.append(f"friction {state.friction:.2f}")
     alarm = f"ALARM: {state.alarm}" if state.alarm else ""
