@@ -24,7 +24,13 @@ from identifier.band import AXLES as AXLES
 from identifier.band import Axle as Axle
 from identifier.band import Band, of_axle
 from identifier.frozen import FORMAT, FrozenModelError, require_alive
-from identifier.measured import NOT_IDENTIFIABLE, printed_unit, printed_value
+from identifier.measured import (
+    NOT_IDENTIFIABLE,
+    as_printed,
+    printed_unit,
+    stiffness_words,
+    with_doubt,
+)
 from identifier.setup import Setup
 from models.files import write_atomically
 from models.recordings import Recording
@@ -66,7 +72,7 @@ class Fact(NamedTuple):
     @property
     def words(self) -> list[str]:
         """The values in three digits, 127000 as such and not as 1.27e+05."""
-        return [printed_value(float(value), None, self.unit) for value in self.values]
+        return [with_doubt(float(value)) for value in self.values]
 
 
 class Estimate(NamedTuple):
@@ -86,7 +92,7 @@ class Estimate(NamedTuple):
     @property
     def words(self) -> str:
         """Value and standard deviation in three digits, and whether the drive left it open."""
-        value = printed_value(self.value, self.sd, self.unit)
+        value = with_doubt(self.value, self.sd)
         return value if self.identified else f"{value} ({NOT_IDENTIFIABLE})"
 
     def with_model_error(self, share: float) -> "Estimate":
@@ -421,9 +427,9 @@ class TireModel(ABC):
             fact = Fact("model error on the identification drive", 100.0 * error, "%")
             rows.append([f"{fact.title} [{fact.unit}]", *fact.words])
         by_title: dict[str, dict[str, str]] = {}
-        for one in self.estimates():
+        for one in as_printed(self.estimates()):
             share = 0.0 if error is None else float(error[AXLES.index(one.axle)])
-            title = f"{one.title} [{printed_unit(one.unit)}]"
+            title = f"{one.title} [{one.unit}]"
             by_title.setdefault(title, {})[one.axle] = one.with_model_error(share).words
         rows += [[title, *(cells.get(axle, "") for axle in AXLES)]
                  for title, cells in by_title.items()]  # fmt: skip
@@ -444,20 +450,21 @@ class TireModel(ABC):
     def _repr_html_(self, looks: Sequence[str] = ("", "")) -> str:
         slip, known = self.drawn_slip()
         force, ends = self.force(slip), () if self.band is None else self.band.at(slip)
+        unit, size = printed_unit("N", force)
         curves = [
             markup.Curve(
                 axle,
                 color,
-                force[:, k] / 1e3,
+                force[:, k] / size,
                 known[:, k],
-                [end[:, k] / 1e3 for end in ends],
+                [end[:, k] / size for end in ends],
             )
             for k, (axle, color) in enumerate(zip(AXLES, markup.AXLE_COLORS, strict=True))
         ]
         return markup.card(
             markup.line(f"of {self.vehicle.name}", type(self).__name__),
             markup.table(self._rows(), ("", *looks)),
-            markup.chart(np.degrees(slip), curves, "slip angle [deg]", "lateral force [kN]"),
+            markup.chart(np.degrees(slip), curves, "slip angle [deg]", f"lateral force [{unit}]"),
             *map(markup.line, self._remarks()),
         )
 
@@ -524,14 +531,13 @@ class TireModel(ABC):
         return load_model(path)
 
     def __repr__(self) -> str:
-        front, rear = Fact(STIFFNESS, self.stiffness, "N/rad").words
         known = (
             ""
             if self.known_slip is None
             else ", known to {:.1f} / {:.1f} deg".format(*np.degrees(self.known_slip))
         )
         name = f"{type(self).__name__} of {self.vehicle.name!r}"
-        return f"<{name}: stiffness {front} / {rear} kN/rad{known}>"
+        return f"<{name}: stiffness {stiffness_words(self.stiffness)}{known}>"
 
 
 class StaticModel(TireModel):

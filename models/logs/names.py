@@ -97,8 +97,9 @@ def _spelled(text: str, apart: str = "|") -> str:
     return text
 
 
-_REFERENCE, _CORNERS, _SOURCES, _FILTERED, _SIGN = (
-    frozenset(_WORDS[name]) for name in ("reference", "corners", "sources", "filtered", "sign")
+_REFERENCE, _CORNERS, _SOURCES, _FILTERED, _SIGN, _COMMANDS = (
+    frozenset(_WORDS[name])
+    for name in ("reference", "corners", "sources", "filtered", "sign", "commands")
 )
 
 
@@ -231,6 +232,15 @@ def _field(name: str) -> str:
     return topic.rpartition("/")[2] if field.lower() in _GENERIC else field
 
 
+def _is_commanded(name: str) -> bool:
+    """Return whether a name of ROS is a field of a command: of a /cmd_vel, or "drive.speed"."""
+    if not name.startswith("/"):
+        return False
+    topic, _, field = name.rpartition("/")
+    parts = (topic.rpartition("/")[2], *field.split(".")[:-1])
+    return "drive" in parts or not _COMMANDS.isdisjoint(_words_of(" ".join(parts)))
+
+
 def _matches(group: str, words: frozenset[str]) -> bool:
     """Return whether all parts of "a|b;c" occur."""
     return all(words & set(part.split("|")) for part in group.split(";"))
@@ -251,6 +261,8 @@ def _name_confidence(signal: str, name: str) -> float:
     while name.startswith("/") and len(listed) > 1 and listed[-1] in _GENERIC:
         listed = listed[:-1]
     rule, words = _RULES[signal], _with_parts(listed)
+    if signal not in ("delta_f", _HAND) and _is_commanded(name):
+        return 0.0
     stems = [listed]
     while len(listed) > 1 and listed[-1] in _SOURCES:
         listed = listed[:-1]

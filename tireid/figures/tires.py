@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from codegen.arrays import Array
-from identifier.measured import printed_scale, printed_unit
+from identifier.measured import printed_unit
 from identifier.run import History
 from identifier.tire_model import AXLES as SIDES
 from identifier.tire_model import TireModel
@@ -213,7 +213,8 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     figure = new_figure(4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
-        label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values
+        unit, size = printed_unit(unit, values)
+        label, values = f"{title}\n[{unit}]", values / size
         for axle, color in enumerate((GREEN, PURPLE)):
             axes.plot(at, values[:, axle], linewidth=1.0, color=color, label=AXLES[axle].lower())
         axes.set(ylabel=label, xlim=(t[0], t[-1]))
