@@ -180,14 +180,14 @@ def went_in(model: TireModel, log_map: LogMap) -> list[Block]:
     for name, unit in _CAR.items():
         unused = name.startswith("cornering") and model.kind == "fit"
         origin_of = f"{car.origin(name)}{', not used by this method' * unused}"
-        rows.append([name, f"{getattr(car, name):.6g}", unit, origin_of])
+        rows.append([name, f"{getattr(car, name):.6g} {unit}", origin_of])
     channels: list[list[Cell]] = [
         [column_of(name), " + ".join(one.channel), one.unit, one.ratio, one.factor, one.offset]
         for name, one in log_map.signals.items()
     ]
     listed = "Declared channels. Signals without a row have standard names or notes below."
     header = ["signal", "channel", "unit", "steering ratio", "factor", "offset [SI]"]
-    tables = [Table(f"The car, {car.name}.", ["number", "value", "unit", "origin"], rows)]
+    tables = [Table(f"The car, {car.name}.", ["number", "value", "origin"], rows)]
     return [*tables, *[Table(listed, header, channels)] * bool(channels)]
 
 
