@@ -97,7 +97,8 @@ def named_days(model: TireModel, recordings: Iterable[Recording]) -> list[tuple[
 def sensors_text(model: TireModel, recordings: Iterable[Recording]) -> str:
     """Return the same, a line each."""
     return "\n".join(
-        f"sensors of {visible(name)}: {day.line}" for name, day in named_days(model, recordings)
+        f"sensors of {visible(name)}, ± with the tires fixed: {day.line}"
+        for name, day in named_days(model, recordings)
     )
 
 
