@@ -22,7 +22,7 @@ def plot(what: Recording | Run | TireModel | SpeedProfile) -> Figure:
         alone; or of `speed_profile`.
     """
     if isinstance(what, Run):
-        return slip_figure(what.tire, what.recording, what.history)
+        return slip_figure(what.tire, what.recording, what.verdict.forces)
     if isinstance(what, TireModel):
         return _tire_figure(what)
     if not isinstance(what, SpeedProfile):
