@@ -196,7 +196,8 @@ def verdict_section(verdict: Verdict, model: TireModel) -> Section:
     ]
     rows += [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
     caption = (
-        "Estimates, ± one standard deviation. Grey was not identified; struck through is not valid."
+        "Estimates, ± one standard deviation with the model error on this log. Grey was not "
+        "identified; struck through is not valid."
     )
     lines = (verdict.headline, *verdict.unobservable)
     blocks: list[Block] = [

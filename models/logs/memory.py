@@ -116,7 +116,7 @@ def _in_seconds(durations: NDArray[Any]) -> Array:
 class _ArrayTable:
     """Columns in memory."""
 
-    format, place = ARRAYS, "index"
+    format, place = ARRAYS, "position"
 
     def __init__(self, name: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         self.path, self._names, self._arrays = Path(name), tuple(arrays), list(arrays.values())
@@ -136,7 +136,7 @@ class _ArrayTable:
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns, of the rows of a run where one is named."""
-        gathered = Gathered(self.path, kinds, self._names, "index", run)
+        gathered = Gathered(self.path, kinds, self._names, self.place, run)
         wanted = gathered.kinds
         found = {column: self._read(column, kind) for column, kind in wanted.items()}
         sizes = {self._names[column]: self._arrays[column].size for column in wanted}

@@ -354,7 +354,7 @@ class Recording:
             name = signal_name(column) or column
             ends = (f"{one:.4g}" for one in (signal.min(), signal.max()))
             label = f"{name} (estimated)" if name in self.estimated else name
-            rows.append([label, MEANINGS[name], SI[QUANTITIES[name]], *ends])
+            rows.append([label, MEANINGS[name], SI[QUANTITIES[name]].replace("^2", "²"), *ends])
         notes = markup.folded(f"{len(self.notes)} notes", self.notes)
         return markup.card(markup.line(size, self.name), markup.table(rows), notes)
 

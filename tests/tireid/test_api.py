@@ -267,7 +267,7 @@ def test_times_of_the_calendar_and_durations_count_from_the_first(log, kind):
     np.testing.assert_allclose(told.t, plain.t, atol=1e-9)
     np.testing.assert_allclose(told.r, plain.r, atol=1e-9)
     stamped["t"][7] = "NaT"
-    with pytest.raises(RecordingError, match="t must be a time in every row, index 7 has none"):
+    with pytest.raises(RecordingError, match="t must be a time in every row, position 7 has none"):
         ti.read_recording(stamped)
 
 
@@ -423,6 +423,6 @@ def test_a_notebook_displays_the_answers_of_a_run(log, car, tires):
 
 
 def test_plot_draws_tires_with_their_band_and_a_run_with_its_samples(run):
-    for what, label in ((run.tire, "identified curve"), (run, "frozen weights")):
+    for what, label in ((run.tire, "identified curve"), (run, "curve, steady")):
         labels = {text.get_text() for one in ti.plot(what).legends for text in one.get_texts()}
         assert labels >= {label, "band of 90 %"}
