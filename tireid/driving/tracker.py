@@ -22,7 +22,7 @@ from mpc.problem import Problem
 from mpc.realtime.instance import Command, Status
 from mpc.realtime.tracker import Tracker as _Tracker
 from mpc.tires import prediction_tire
-from tireid.driving.setup import PERIOD, Setup, SpeedWish
+from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_drivable
 
 
 class VehicleState(NamedTuple):
@@ -101,14 +101,14 @@ class Tracker:
         model = prediction_tire(car if tire is None else tire, car)
         self._known = tire if isinstance(tire, TireModel) else None
         wish = SpeedWish.of(speeds, self._known)
-        asked = {"max_steering": max_steering, "max_steering_rate": max_steering_rate}
-        asked = {name: value for name, value in asked.items() if value is not None}
-        require_positive(ValueError, **asked)
         problem = Problem.of(car, period)
-        limits = replace(
-            problem.limits, **{name.removeprefix("max_"): value for name, value in asked.items()}
-        )
+        limits = problem.limits
+        steering = limits.steering if max_steering is None else max_steering
+        rate = limits.steering_rate if max_steering_rate is None else max_steering_rate
+        require_positive(ValueError, max_steering=steering, max_steering_rate=rate)
+        limits = replace(limits, steering=steering, steering_rate=rate)
         problem = replace(problem, limits=limits)
+        require_drivable(path, car, steering)
         self._tracker = _Tracker(model, problem, period=period, delay=delay, caution=caution)
         self.profile = Setup(path, car, 1.0, (), wish, wish.limits(self._known)).profile()
         self._path, self._car = path, car
