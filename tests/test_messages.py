@@ -174,7 +174,7 @@ REFUSED = {
         (lambda: points([0.0, 9.0, 9.0, 20.0], [0.0, 1.0, 1.0, 2.0]), "numbers 2 and 3 are both"),
         (lambda: points([0.0], [0.0]), "at least 2 different way-points, it has 1"),
         (lambda: points([0.0, 9.0, 9.0, 0.0], [0.0, 0.0, 9.0, 0.0], closed=True), "at least 4"),
-        (lambda: points([0.0, 10.0, 0.0], [0.0, 0.0, 0.1]), "tighter than 3.0 m, at s = "),
+        (lambda: points([0.0, 10.0, 0.0], [0.0, 0.0, 0.1]), "tighter than 3 m, at s = "),
         (lambda: points([0.0, 20.0, 40.0], [0.0, 5.0, 0.0], minimum_radius=500.0), "than 500"),
         (lambda: points([0.0, 20.0], [0.0, 5.0], minimum_radius=np.nan), "minimum_radius"),
         (lambda: points([0.0, 20.0], [0.0, 5.0], spacing=0.0), "way-points: spacing must be"),

@@ -9,6 +9,7 @@ import pytest
 import tireid as ti
 from models.tires import FialaTire
 from mpc.cars import SPEED_GAIN, DoubleTrackCar
+from mpc.problem import Guards, Problem
 from mpc.realtime import Status
 
 CAR = ti.sedan()
@@ -142,3 +143,49 @@ def test_other_tires_steer_otherwise_from_the_next_step_on():
 def test_an_error_names_what_is_wrong_and_what_to_give(error, call, said):
     with pytest.raises(error, match=said):
         call()
+
+
+TENTH = ti.Vehicle(
+    name="tenth", mass=1.58, yaw_inertia=0.00481, l_f=0.0805, l_r=0.093,
+    cornering_stiffness_front=40.0, cornering_stiffness_rear=40.0,
+)  # fmt: skip
+ROUND = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+LAB = ti.paths.Path.from_waypoints(1.25 * np.cos(ROUND), 0.75 * np.sin(ROUND), closed=True)
+
+
+def lab_drive(**changed):
+    """Drive a model car along an ellipse of 2.5 by 1.5 m."""
+    tire = FialaTire(C_alpha=20.0, C_kappa=30.0, friction=0.6)
+    return ti.drive(LAB, TENTH.with_chassis(), **{"tires": (tire, tire), "speeds": 1.2} | changed)
+
+
+def test_a_model_car_follows_a_path_of_a_lab_to_a_centimeter():
+    came = lab_drive()
+    assert came.scores.completed and not came.scores.failures
+    assert came.scores.rms_e_y_m < 0.01 and np.abs(came.drive.r).max() > 2.0
+
+
+def test_a_model_car_steers_in_a_loop_of_ones_own_and_refuses_a_turn_beyond_its_lock():
+    mine = ti.Tracker(LAB, TENTH, speeds=1.2, period=0.02, delay=0.04)
+    X, Y, psi = map(float, LAB.pose(1.0))
+    steering = mine.step(ti.VehicleState(X, Y, psi, 1.2, 1.5, v_y=0.0))
+    assert mine.status == Status.OK and steering > 0.02 and mine.plan.shape == (41, 2)
+    with pytest.raises(ValueError, match=r"radius of 0\.45 m; tenth turns in 0\.57 m at best"):
+        ti.Tracker(LAB, TENTH, speeds=1.2, max_steering=0.3)
+
+
+def test_a_drive_without_plans_is_not_completed(monkeypatch):
+    monkeypatch.setattr("mpc.realtime.tracker.Guards.of", lambda car: Guards(yaw_rate=0.5))
+    came = lab_drive()
+    assert "the tracker planned in" in came.drive.ending and not came.scores.completed
+
+
+def test_the_problem_of_a_car_of_full_size_is_the_default_and_of_a_model_car_a_similar_one():
+    for car in (CAR, replace(CAR, l_f=0.7, l_r=0.8)):
+        assert Problem.of(car, 0.01) == Problem() and Guards.of(car) == Guards()
+    small, guards = Problem.of(TENTH), Guards.of(TENTH)
+    ratio = TENTH.wheelbase / 2.7
+    assert small.dt == pytest.approx(0.05 * ratio**0.5)
+    assert small.cost.numbers()[0] * ratio**2 == pytest.approx(Problem().cost.numbers()[0])
+    assert guards.min_speed**2 / TENTH.wheelbase == pytest.approx(Guards().min_speed ** 2 / 2.7)
+    assert Problem.of(TENTH, 0.02).dt == 0.02

@@ -23,13 +23,14 @@ from tireid.commands import options as shared
 from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION, learning_drive
 from tireid.driving.results import NO_FILM, Drives, headline, write_drive_report
-from tireid.driving.setup import BY_TIRES, Setup, SpeedWish, simulated, tightest
+from tireid.driving.setup import BY_TIRES, Setup, SpeedWish, require_drivable, simulated
 from tireid.figures.film import FORMATS
 from tireid.learning import identify
 from tireid.progress import say, tell
 from tireid.verdicts import warn_of
 
 _NOT_COMPLETED = 1
+_SPEEDS = (3.0, 100.0)  # m/s, least and most for a full-size car
 CONFIRM = (
     "earn the speed: begin at 45 %% of what the tires allow, and go on as the car holds it and "
     "nothing says that the friction is another"
@@ -169,10 +170,11 @@ def quantity(text: str, *units: Mapping[str, float]) -> tuple[float, str]:
     return math.nan, ""
 
 
-def _parse_speed(text: str, vehicle: Vehicle) -> SpeedWish:
+def _parse_speed(text: str, size: float = 1.0) -> SpeedWish:
     """Return what --speed says.
 
     text : tires, 70% of what they allow, 0.4g or 4m/s2, 17m/s or 60km/h.
+    size : of the car, of `mpc.problem.size_of`.
     """
     if text.strip() == TIRES:
         return BY_TIRES
@@ -185,9 +187,8 @@ def _parse_speed(text: str, vehicle: Vehicle) -> SpeedWish:
     if not unit:
         raise ValueError(f"--speed {text} has no unit: write {text}%, {text}g or {text}m/s")
     if unit in SPEEDS:
-        size = size_of(vehicle) ** 0.5
-        slowest, fastest = round(3.0 * size, 2), round(100.0 * size, 1)
-        require_within(ValueError, slowest, fastest, **{"--speed in m/s": value})
+        bounds = (round(v * math.sqrt(size), 2) for v in _SPEEDS)
+        require_within(ValueError, *bounds, **{"--speed in m/s": value})
         return SpeedWish(speed=value)
     if unit in SHARES:
         require_within(ValueError, 5.0, 150.0, **{"--speed in %": 100.0 * value})
@@ -253,7 +254,9 @@ def path_of(options: argparse.Namespace, vehicle: Vehicle) -> Path:
         return BUILT_IN[name]()
     if not FilePath(name).suffix:
         raise ValueError(f"--path: there is no path {name!r}; {', '.join(BUILT_IN)}, or FILE.csv")
-    return Path.from_csv(FilePath(name), minimum_radius=tightest(vehicle))
+    path = Path.from_csv(FilePath(name), minimum_radius=vehicle.wheelbase)
+    require_drivable(path, vehicle)
+    return path
 
 
 def conditions_of(
@@ -262,7 +265,7 @@ def conditions_of(
     """Return what is to be driven; the car is by default that of stored tires.   stored : tires."""
     of_sedan = stored is None or stored.vehicle.moves_as(sedan())
     vehicle = shared.read_vehicle(options, None if of_sedan else stored, options.weights)
-    wish = _parse_speed(options.speed, vehicle)
+    wish = _parse_speed(options.speed, size_of(vehicle))
     if stored is not None:
         stored.require_car(vehicle, options.weights, "leave --vehicle out")
     path = path_of(options, vehicle)

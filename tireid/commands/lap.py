@@ -33,6 +33,7 @@ from tireid.commands.drive import (
 )
 from tireid.driving.laps import drive_laps
 from tireid.driving.runs import FRICTIONS
+from tireid.driving.setup import faster_than
 from tireid.figures.lap import lap_figure, lap_gg_figure
 from tireid.figures.style import save_figures
 from tireid.output import write_json
@@ -181,12 +182,11 @@ def _notes(profile: SpeedProfile, tire: TireModel, fastest: float) -> list[str]:
 
     fastest : speed of the log [m/s].
     """
-    notes, beyond, forward = [], profile.v > fastest, tire.drives.lengthwise
-    if beyond.any():
+    notes, forward = [], tire.drives.lengthwise
+    if faster := faster_than(profile.v, fastest):
         notes.append(
-            f"{100.0 * beyond.mean():.0f} % of the way is faster than the log, {fastest:.1f} m/s: "
-            "there its limits are used, downforce and drag unproven; drive faster, or add "
-            f"--v-max {math.floor(fastest)}m/s"
+            f"{faster}: there its limits are used, downforce and drag unproven; drive faster, or "
+            f"add --v-max {math.floor(fastest)}m/s"
         )
     if forward is None or forward[1][_BRAKING, _BRAKING] > _WIDE**2:
         notes.append(

@@ -1,5 +1,6 @@
 """The files of `tireid drive`: numbers as JSON, every signal as CSV, figures as PNG, the film."""
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
@@ -28,7 +29,7 @@ from tireid.driving.runs import (
     Conditions,
     run_drive,
 )
-from tireid.driving.setup import PERIOD, PLANT, Setup
+from tireid.driving.setup import PERIOD, PLANT, Setup, faster_than
 from tireid.figures.drive import (
     AT_THE_END,
     drive_errors_figure,
@@ -174,8 +175,20 @@ class Drives(NamedTuple):
             write_film(folder / f"drive.{film}", drawn)
         return images
 
+    @property
+    def faster(self) -> str:
+        """Where the plan is faster than the log of the tires, and what to do; else empty."""
+        speeds = None if self.learnt is None else self.learnt.drives.speeds
+        if speeds is None:
+            return ""
+        top = float(speeds[1])
+        found = faster_than(self.conditions.setup.speeds(), top)
+        slower = f"--speed {math.floor(10.0 * top) / 10.0:g}m/s"
+        return f"{found}: there the tires are extrapolated; add {slower}" if found else ""
+
     def text(self) -> str:
         lines = [headline(self.conditions), text_table([SCORES, *score_rows(self.runs)], "<>><>>")]
+        lines += [self.faster] if self.faster else []
         for run in self.runs:
             got = estimate_scores(run.drive)
             if got is not None:
@@ -283,7 +296,7 @@ def write_drive_report(
         title=f"{first.drive.path.name} on {first.label} tires",
         summary=f"{headline(drives.conditions)}.",
         numbers=_drive_headlines(runs),
-        notes=_drive_notes(runs),
+        notes=_drive_notes(drives),
         sections=[
             Section("How the car drove", _drive_blocks(folder, drives, figures, film)),
             Section("The tracker's tires", known_blocks(runs, figures)),
@@ -328,8 +341,8 @@ def _farthest(run: ClosedLoop) -> tuple[float, float]:
     return float(run.drive.s[k]), float(abs(run.drive.e_y[k]))
 
 
-def _drive_notes(runs: _Runs) -> list[Note]:
-    said = []
+def _drive_notes(drives: Drives) -> list[Note]:
+    runs, said = drives.runs, [Note(f"{drives.faster}.")] if drives.faster else []
     for run in runs:
         scores = run.scores
         if not scores.completed:

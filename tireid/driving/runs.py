@@ -37,7 +37,7 @@ from mpc.path import Path, SpeedProfile
 from mpc.problem import Problem, size_of
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.driving.setup import PERIOD, Setup, SpeedWish, simulated
+from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_drivable, simulated
 from tireid.progress import Progress
 
 _NOTED = 0.1  # change of the grip that is worth a note
@@ -281,6 +281,7 @@ def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> Prediction
 def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> ClosedLoop:
     """Drive the path once with the tracker on a tire."""
     setup = conditions.setup
+    require_drivable(setup.path, setup.vehicle)
     profile = setup.profile()
     model = given_tire(label, setup, learnt)
     lag = setup.vehicle.require_chassis().steering_lag

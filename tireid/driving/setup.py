@@ -4,6 +4,7 @@ How fast it is follows from what is known of its tires or is given, never from t
 """
 
 import logging
+import math
 import textwrap
 from collections.abc import Callable
 from dataclasses import replace
@@ -22,13 +23,13 @@ from models.vehicle import GRAVITY, Vehicle, sedan
 from mpc.cars import BRAKES, DoubleTrackCar
 from mpc.path import Path, PathError, SpeedProfile, speed_profile, steady_speed
 from mpc.path.speed import SHARE
-from mpc.problem import Guards, size_of
+from mpc.problem import Guards, Limits, size_of
 from mpc.tires import PredictionTire, oracle_tire
 from mpc.tires.ladder import cornering_force
 
 _WIDEST = 2.0  # deviation at which a full-size car is off the path [m]
 _FASTEST = 30.0  # m/s, of a full-size car
-_TIGHTEST = 1.1  # radius of a turn over the wheelbase: wheels at 42 deg, as no car goes farther
+_OVERSHOOT = 0.95  # of the radius of a turn, which a spline passes for a moment
 # Share of a given lateral acceleration to drive and brake with: 2 and 3 m/s² on a dry road.
 _DRIVES, _BRAKES = 0.22, 0.33
 PERIOD = 0.01  # control period [s]
@@ -126,18 +127,26 @@ def _scaled_tire(vehicle: Vehicle, like: TireModel, axle: int) -> Tire:
     return replace(tire, coefficients=c)
 
 
-def tightest(vehicle: Vehicle) -> float:
-    """Return the radius of the tightest turn of a car [m]."""
-    return _TIGHTEST * vehicle.wheelbase
+def faster_than(v: Array, fastest: float) -> str:
+    """Return which share of the way is faster than a log, empty where none is.
+
+    v : along the way [m/s].   fastest : of the log [m/s].
+    """
+    share = 100.0 * float(np.mean(v > fastest))
+    return f"{share:.0f} % of the way is faster than the log, {fastest:.1f} m/s" if share else ""
 
 
-def require_drivable(path: Path, vehicle: Vehicle) -> None:
-    """Refuse a path with a turn that the car cannot drive."""
-    radius, least = 1.0 / max(path.peak_curvature, 1e-9), tightest(vehicle)
-    if radius < 0.999 * least:  # a path of this least radius is known to its samples
+def require_drivable(path: Path, vehicle: Vehicle, steering: float = Limits().steering) -> None:
+    """Refuse a path with a turn that the car cannot drive.
+
+    steering : largest angle of the front road wheels [rad].
+    """
+    radius = 1.0 / max(path.peak_curvature, 1e-9)
+    least = vehicle.wheelbase / math.tan(min(steering, 1.5))
+    if radius < _OVERSHOOT * least:
         raise PathError(
-            f"{path.name}: {vehicle.name} turns in {least:.3g} m at best (1.1 wheelbases), the "
-            f"tightest turn has a radius of {radius:.3g} m: move way-points, or use another path"
+            f"{path.name}: its tightest turn has a radius of {radius:.3g} m; {vehicle.name} turns "
+            f"in {least:.3g} m at best, {steering:.3g} rad of the front wheels: widen the path"
         )
 
 
@@ -185,7 +194,6 @@ class Setup(NamedTuple):
 
         Where a_y is given it is constant on an open path; a closed one brakes for the bends.
         """
-        require_drivable(self.path, self.vehicle)
         return _profile(self.path, self.wish, self.limits, _FASTEST * size_of(self.vehicle) ** 0.5)
 
     def speeds(self) -> Array:

@@ -2,7 +2,6 @@
 
 import math
 from collections import deque
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -23,10 +22,10 @@ from mpc.problem import Problem
 from mpc.realtime.instance import Command, Status
 from mpc.realtime.tracker import Tracker as _Tracker
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.driving.setup import PERIOD, Setup, SpeedWish
+from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_drivable
 
 # Beyond which an angle is one in degrees: wheels turn by 0.7 rad, and in models within 0.1 s.
-_MOST = {"steering": (1.2, "rad"), "steering_rate": (20.0, "rad/s")}
+_WIDEST, _FASTEST = 1.2, 20.0  # rad, rad/s
 
 
 class VehicleState(NamedTuple):
@@ -59,7 +58,7 @@ def _of_car(tire: Any, car: Vehicle) -> PredictionTire:
     return prediction_tire(tire, car)
 
 
-def _require_radians(most: float, unit: str, values: Mapping[str, float]) -> None:
+def _require_radians(most: float, unit: str, **values: float) -> None:
     for name, value in values.items():
         if abs(value) > most:
             raise ValueError(f"{name} must be at most {most:g} {unit}, it is {value:g}: degrees?")
@@ -119,16 +118,17 @@ class Tracker:
         self._known = tire if isinstance(tire, TireModel) else None
         wish = SpeedWish.of(speeds, self._known, car)
         problem = Problem.of(car, period)
-        asked = {"steering": max_steering, "steering_rate": max_steering_rate}
-        for name, value in asked.items():
-            if value is not None:
-                require_positive(ValueError, **{f"max_{name}": value})
-                _require_radians(*_MOST[name], {f"max_{name}": value})
-                found: Any = {name: value}
-                problem = replace(problem, limits=replace(problem.limits, **found))
+        limits = problem.limits
+        steering = limits.steering if max_steering is None else max_steering
+        rate = limits.steering_rate if max_steering_rate is None else max_steering_rate
+        require_positive(ValueError, max_steering=steering, max_steering_rate=rate)
+        _require_radians(_WIDEST, "rad", max_steering=steering)
+        _require_radians(_FASTEST, "rad/s", max_steering_rate=rate)
+        problem = replace(problem, limits=replace(limits, steering=steering, steering_rate=rate))
+        require_drivable(path, car, steering)
         self._tracker = _Tracker(model, problem, period=period, delay=delay, caution=caution)
         self.profile = Setup(path, car, 1.0, (), wish, wish.limits(self._known)).profile()
-        self._path, self._car, self._most = path, car, problem.limits.steering
+        self._path, self._car, self._most = path, car, steering
         self._guide: Guide | None = None
         self._lateral: LateralVelocity | None = None
         self._steered = deque([0.0], maxlen=1 + round(delay / period))  # and acts the first
@@ -196,7 +196,7 @@ class Tracker:
         if self._path.closed and here.s > 0.5 * length:  # not yet at the start of the first lap
             here = self._path.project(place.X, place.Y, here.s - length)
         wheels = 0.0 if math.isnan(first.delta) else first.delta
-        _require_radians(self._most, "rad", {"delta": wheels})
+        _require_radians(self._most, "rad", delta=wheels)
         self._tracker.reset(wheels)
         self._steered.extend([wheels] * (self._steered.maxlen or 1))
         self._lateral, period = None, self._tracker.period
