@@ -181,12 +181,14 @@ def went_in(model: TireModel, log_map: LogMap) -> list[Block]:
         unused = name.startswith("cornering") and model.kind == "fit"
         origin_of = f"{car.origin(name)}{', not used by this method' * unused}"
         rows.append([name, f"{getattr(car, name):.6g} {unit}", origin_of])
-    channels: list[list[Cell]] = [
-        [column_of(name), " + ".join(one.channel), one.unit, one.ratio, one.factor, one.offset]
-        for name, one in log_map.signals.items()
-    ]
+    channels = list[list[Cell]]()
+    for name, one in log_map.signals.items():
+        given = {"ratio": one.ratio - 1.0, "factor": one.factor - 1.0, "offset": one.offset}
+        read = [f"{key} {getattr(one, key):g}" for key, change in given.items() if change]
+        how = [one.unit or "its unit", *read, *["table"] * bool(one.table)]
+        channels.append([column_of(name), " + ".join(one.channel), ", ".join(how)])
     listed = "Declared channels. Signals without a row have standard names or notes below."
-    header = ["signal", "channel", "unit", "steering ratio", "factor", "offset [SI]"]
+    header = ["signal", "channel", "read as"]
     tables = [Table(f"The car, {car.name}.", ["number", "value", "origin"], rows)]
     return [*tables, *[Table(listed, header, channels)] * bool(channels)]
 
