@@ -473,7 +473,7 @@ class TireModel(ABC):
 
         Speed must be positive. `dynamics` is stiff: the lag vanishes where a tire slides. Integrate
         it implicitly or by `step`, which holds the lag above half of itself: beyond the grip v_y is
-        off by 10 % with steps of 50 ms, by 1 % with 10 ms. Explicit Runge-Kutta diverges there
+        off by 10 % with steps of 50 ms, by 1 % with 10 ms. Explicit Runge-Kutta goes wrong there
         with steps above 2 ms.
         """
         x = ca.MX.sym("x", 4 if self.lagged else 2)
