@@ -276,7 +276,8 @@ def test_at_one_speed_bias_and_angle_are_one_error_and_told_apart_where_they_dif
     assert (believed.sd[1:3] < 0.4 * usual[1:3]).all()
     assert "this log cannot separate them" in believed.notes[0][1]
     of_two = np.array([[0.04, -0.00199], [-0.00199, 1e-4]])  # bias and angle make up for each other
-    assert sideways(np.array([0.2, 0.0]), of_two, 20.0)
+    assert sideways(np.array([0.2, 0.0]), of_two, 20.0)[0] == pytest.approx(0.2)
+    assert sideways(np.array([-0.2, 0.0]), of_two, 20.0)[0] == pytest.approx(-0.2)
     assert not sideways(np.array([0.2, 0.0]), np.diag(np.diag(of_two)), 20.0)
     still = np.zeros(5), np.zeros((5, 5)), (np.zeros(5), np.zeros(5))
     assert Day.of(*still, np.array([1.0, 30.0, 20.0]), anew=True).speed == 20.0
