@@ -370,8 +370,8 @@ def _about_refused(specialized: SpecializedStep) -> dict[str, str]:
             "implausible_row": row.format(", or get there within a sample", lasting),
             "refused_forces": lasting,
             "after_gap": "After a moment (0.25 s of a car) the step rests, and takes the next\n"
-            "sample that a car can be in as true, however far from the last: status 0. A sensor that\n"
-            "alternates between far values passes every second sample.",
+            "sample that a car can be in as true, however far from the last: status 0. A sensor\n"
+            "that alternates between far values passes every second sample.",
         }
     return {
         "implausible_row": row.format("", "zero") * (specialized.parts.where_false is not None),
