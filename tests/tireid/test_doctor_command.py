@@ -9,7 +9,7 @@ from identifier.doctor import Diagnosis, Finding
 from identifier.verdict import Verdict
 from models.recordings import LogMap, Repair, read_recording, write_recording
 from tests.tireid.conftest import json_of, learn_words, page_in, typed
-from tireid.diagnoses import _size_text, with_doctor, write_repair
+from tireid.diagnoses import _size_text, unsure_text, with_doctor, write_repair
 
 RATIO = 14.6
 
@@ -156,3 +156,12 @@ def test_a_verdict_never_passes_over_what_the_doctor_is_sure_of():
     assert said(late, unit, repair=late.repair) == fine
     assert not said(replace(unit, code="factor", channel="v_x")).valid, "it scales all forces"
     assert said(replace(unit, code="factor", channel="a_y")).valid
+
+
+def test_a_repair_that_is_not_sure_can_be_written_by_hand(tmp_path):
+    repair, path = Repair(factor={"delta_f": 1.298}), tmp_path / "log.toml"
+    finding = Finding(code="factor", channel="delta_f", confidence=0.99, repair=repair)
+    said = unsure_text(Diagnosis(name="x", findings=(finding,), unobservable=()), path)
+    assert "rival" in said
+    path.write_text("[repair]\n" + said.rpartition(": ")[2], encoding="utf-8")
+    assert LogMap.from_toml(path).repair == repair

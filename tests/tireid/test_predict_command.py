@@ -66,9 +66,9 @@ def test_it_leaves_a_report_with_figures(model, logs, blind, tmp_path, capsys):
         out = tmp_path / name
         summary, _ = predicted(out, model, asked)
         page = page_in(out)
-        for figure in ("slip", "forces", "motion"):
+        for figure in ("slip", "forces"):
             assert (out / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
-        assert page.count("<img") == 3
+        assert page.count("<img") == 2
         front, rear = (f"{100.0 * x:.1f}" for x in summary["verdict"]["measures"]["force_missed"])
         assert f"<dd>{front} / {rear} %</dd>" in page
         assert f"model error over the force in the motion: {front} / {rear} %" in (

@@ -14,10 +14,19 @@ from models.files import write_atomically
 from models.logs.clock import holes, without_codes, without_empty
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
-from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, WHEELS, Signal, given_by
-from models.logs.units import SI, is_given
+from models.logs.signals import (
+    INSTEAD,
+    MEANINGS,
+    NEEDED,
+    QUANTITIES,
+    WHEELS,
+    Signal,
+    given_by,
+    quantity_of,
+)
+from models.logs.units import SI, is_given, to_si
 from models.recordings import LogMap, choice, split_log_argument
-from models.recordings.assembly import require_often, wheel_scales, wheel_units
+from models.recordings.assembly import require_often, units_of, wheel_scales
 from models.recordings.choice import column_of
 from models.recordings.map import CUT
 from models.recordings.wheels import scale_text, wheel_factor, with_scales
@@ -59,6 +68,8 @@ def run(options: argparse.Namespace) -> int:
     headings, turned, world = choice.of_the_car(log, log.headings(), chosen)
     proposal = propose(log, headings, chosen)
     by_map = choice.as_listed(log, log_map.signals, [one.name for one in listed])
+    for name, unit in units_of(log.headings(), by_map).items():
+        to_si(unit, quantity_of(name, unit), f"{log.path}: {column_of(name)}")
     sure = {**choice.standard_signals(log, [one.name for one in headings]), **turned, **by_map}
     signals = choice.likely_signals(sure, proposal)
     signals = choice.with_wheels(signals, proposal)
@@ -121,8 +132,9 @@ def _wheels(
         wheels, scaled = with_scales(log_map.wheels, signals, scales)
         return scale_text(scales), replace(log_map, wheels=wheels, signals=scaled), True
     try:
-        for name, unit in wheel_units(log.headings(), signals).items():
-            wheel_factor(column_of(name), name, unit, log_map.wheels)
+        for name, unit in units_of(log.headings(), signals).items():
+            if name in WHEELS:
+                wheel_factor(column_of(name), name, unit, log_map.wheels)
     except RecordingError as error:
         return str(error), plain, False
     return "vx is computed from the wheels", plain, True
