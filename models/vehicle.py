@@ -28,6 +28,9 @@ from models.schema import Table, read_toml, require_name, toml_table
 # plant never starts from a value that is not physical.
 
 
+_DATA = Path(__file__).resolve().parent / "data"  # cars and tires that are built in
+
+
 class VehicleError(TireidError, ValueError):
     """A vehicle parameter breaks a rule; the message names the key, the rule and the value."""
 
@@ -144,6 +147,8 @@ def _from_folder(value: Any, folder: Path) -> Any:
     """Return a path as it is named in a file of a folder; another value itself."""
     if not isinstance(value, Path):
         return value
+    if value.parent == _DATA and not (folder / value.name).exists():
+        return value.name
     try:
         return Path(os.path.relpath(value, folder)).as_posix()
     except ValueError:  # another drive
@@ -489,7 +494,8 @@ class Vehicle:
 
         Parameters
         ----------
-        path : the TOML file; a relative `tire` in [chassis] starts from its folder.
+        path : the TOML file; a relative `tire` in [chassis] starts from its folder. One that is not
+            there and has the name of a built-in tire, `sedan.tir`, is that one.
         """
         file = Path(path)
         if not file.exists():
@@ -509,7 +515,10 @@ class Vehicle:
         try:
             car = cls(**values)
             if "tire" in parts:
-                parts["tire"] = (file.parent / parts["tire"]).resolve()
+                named = (file.parent / parts["tire"]).resolve()
+                built_in = _DATA / parts["tire"]
+                bare = built_in.parent == _DATA and built_in.is_file()
+                parts["tire"] = built_in if bare and not named.exists() else named
             return car if inner is None else replace(car, chassis=typical_chassis(car, parts))
         except (ValueError, RuntimeError) as error:  # RuntimeError: a link that leads to itself
             raise VehicleError(f"{file}: {error}") from None
@@ -521,7 +530,8 @@ class Vehicle:
 
         Parameters
         ----------
-        path : the file to write; a tire file is named relative to its folder.
+        path : the file to write; a tire file is named relative to its folder, a built-in one by
+            its name, so that the file may move.
         overwrite : replace a file that is already there.
 
         Raises
@@ -552,7 +562,7 @@ class Vehicle:
 
 def sedan() -> Vehicle:
     """Return the documented mid-size sedan; its file says where each value comes from."""
-    return Vehicle.from_toml(Path(__file__).parent / "data" / "sedan.toml")
+    return Vehicle.from_toml(_DATA / "sedan.toml")
 
 
 def vehicle_template() -> str:
@@ -560,4 +570,4 @@ def vehicle_template() -> str:
 
     It can be read as it is; its numbers are those of `sedan`.
     """
-    return (Path(__file__).parent / "data" / "template.toml").read_text(encoding="utf-8")
+    return (_DATA / "template.toml").read_text(encoding="utf-8")
