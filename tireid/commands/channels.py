@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -104,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
         for name in {channel for one in signals.values() for channel in one.channel} & set(seen):
             require_often(str(log.path), without_empty(seen[name]).t, log.clock)
     if rolls or missing:
-        tell(_missing_text(options.log, missing, proposal, signals))
+        tell(_missing_text(options, missing, proposal, signals))
     if said:
         tell(said)
     if options.write is not None:
@@ -179,6 +180,8 @@ def _channels_text(
         name = visible(one.name if len(one.name) <= _LONGEST_NAME else f"{one.name[:44]}...")
         rate = "?" if math.isnan(one.rate) else f"{one.rate:.4g}"
         meant = _meaning(one, signals, proposal, known)
+        if low == high != "?" and meant.startswith("perhaps"):
+            meant = f"constant {low}"
         rows.append([name, visible(one.unit), rate, str(samples), low, high, meant])
     return text_table(rows, "<<>>>><")
 
@@ -222,7 +225,9 @@ def _holes_text(seen: Mapping[str, Channel], signals: _Signals) -> str:
     return "\n".join(said)
 
 
-def _missing_text(log: str, missing: Sequence[str], proposal: Proposal, signals: _Signals) -> str:
+def _missing_text(
+    options: argparse.Namespace, missing: Sequence[str], proposal: Proposal, signals: _Signals
+) -> str:
     if not missing:
         there = given_by(signals)
         needed = [name for name in NEEDED if name in there] + ["a_y"] * ("v_y" not in there)
@@ -240,7 +245,14 @@ def _missing_text(log: str, missing: Sequence[str], proposal: Proposal, signals:
         )
         proposed = [choice.column_word(one, proposal) for one in likely]
         words += proposed or [f'"{column_of(name)}=CHANNEL"']
-    return "\n".join([*lines, f"declare it: tireid channels {log} --columns {' '.join(words)}"])
+    typed: str = options.words
+    for pair in options.columns:
+        if any(word.startswith(f'"{pair.partition("=")[0]}=') for word in words):
+            typed = typed.replace(f" {shlex.quote(pair)}", "", 1)
+    new = " ".join([" --columns", *words])
+    typed += " --force" * (options.write is not None and not options.force)  # it is written now
+    typed = typed.replace(" --columns", new, 1) if " --columns" in typed else typed + new
+    return "\n".join([*lines, f"declare it: {typed}"])
 
 
 def _unsure_toml(missing: Sequence[str], proposal: Proposal) -> str:

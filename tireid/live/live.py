@@ -363,7 +363,8 @@ class Live:
         elif self._identifier.stale:
             reason = "samples hold no numbers of a car"
         if friction is not None and friction < LOST:
-            alarm = f"friction {friction:.2f} of the reference, since {self._friction_since:.1f} s"
+            since = self._t - self._friction_since
+            alarm = f"friction {friction:.2f} of the reference, for {since:.1f} s"
         stored = bool(reason) and self._stored is not None
         bias_sd = math.sqrt(model.covariance[1, -1, -1])
         v_y_sd = math.hypot(bias_sd, NOISE) if self.measures_v_y else self._v_y_sd
