@@ -98,7 +98,8 @@ def _in_python(text: str) -> str:
         pairs = re.findall(r'"([^"=]+)=([^"]+)"', options[0])
         return "columns={" + ", ".join(f'"{a}": "{b}"' for a, b in pairs) + "}"
 
-    return re.sub(r'--columns( "[^"=]+=[^"]+")+', written, text).replace("--columns", "columns")
+    text = re.sub(r'--columns( "[^"=]+=[^"]+")+', written, text).replace("--columns", "columns")
+    return re.sub("--cut-holes, |tireid doctor LOG --vehicle FILE, or ", "", text)
 
 
 def read_repaired(
