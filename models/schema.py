@@ -29,7 +29,6 @@ from models.limits import VARIABLE
 from models.limits import InputLimits as InputLimits
 from models.limits import LimitError as LimitError
 from models.limits import limits as limits
-from models.limits import limits_text as limits_text
 
 CHUNK = 1 << 20  # bytes that are unpacked at a time
 _SWELLS, _SWOLLEN_FROM = 200, 1 << 28  # times that a log packs, judged beyond so many bytes

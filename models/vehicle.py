@@ -246,10 +246,11 @@ class Vehicle:
     Parameters
     ----------
     mass : total mass [kg].
-    yaw_inertia : moment of inertia about the vertical axis [kg m^2].
+    yaw_inertia : moment of inertia about the vertical axis [kg m^2]; estimated where left out.
     l_f, l_r : distance from the center of gravity to the front and rear axle [m].
     cornering_stiffness_front, cornering_stiffness_rear : slope of the lateral force of the axle
-        (both tires) over its slip angle at zero, at its static load [N/rad].
+        (both tires) over its slip angle at zero, at its static load [N/rad]; estimated where left
+        out.
     downforce_area_front, downforce_area_rear : coefficient of downforce times area of the axle
         [m^2]: it adds ½ ρ A v_x^2 to the static load; negative where the body lifts.
     cg_height : height of the center of gravity above the road [m]; None is that of the chassis, or
@@ -266,11 +267,11 @@ class Vehicle:
 
     name: str = "car"
     mass: float
-    yaw_inertia: float
+    yaw_inertia: float = None  # type: ignore[assignment]  # a number from `__post_init__` on
     l_f: float
     l_r: float
-    cornering_stiffness_front: float
-    cornering_stiffness_rear: float
+    cornering_stiffness_front: float = None  # type: ignore[assignment]
+    cornering_stiffness_rear: float = None  # type: ignore[assignment]
     downforce_area_front: float = 0.0
     downforce_area_rear: float = 0.0
     cg_height: float | None = None
@@ -283,6 +284,11 @@ class Vehicle:
 
     def __post_init__(self) -> None:
         require_name(VehicleError, "name", self.name)
+        if missing := [name for name in _RULES if getattr(self, name) is None]:
+            typical = estimate(self.mass, self.l_f, self.l_r)
+            for name in missing:
+                object.__setattr__(self, name, typical[name])
+            object.__setattr__(self, "estimated", tuple(dict.fromkeys([*self.estimated, *missing])))
         for name in self.estimated:
             if name not in _RULES:
                 raise VehicleError(
@@ -411,7 +417,7 @@ class Vehicle:
 
     @property
     def froude_time(self) -> float:
-        """Time that scales with the size of a car, sqrt(L/g) [s]: 0.5 for a sedan."""
+        """Time that scales with the size of a car, sqrt(L/g) [s], 0.5 for a sedan."""
         return math.sqrt(self.wheelbase / GRAVITY)
 
     @property
@@ -494,13 +500,7 @@ class Vehicle:
         inner = data.pop("chassis", None)
         table, outside = Table(data, f"{file}: ", VehicleError), ("chassis", "estimated")
         table.only_fields(cls, skip=outside)  # before what is missing
-        size = [table.number(key) for key in ("mass", "l_f", "l_r")]
-        missing = tuple(key for key in _RULES if key not in data)
-        try:
-            data |= {key: value for key, value in estimate(*size).items() if key in missing}
-        except VehicleError as error:
-            raise VehicleError(f"{file}: {error}") from None
-        values = table.record(cls, skip=outside) | {"estimated": missing}
+        values = table.record(cls, skip=outside)
         parts: dict[str, Any] = {}
         if inner is not None:
             body = Table(inner, f"{file}: ", VehicleError, "chassis.")

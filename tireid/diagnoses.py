@@ -104,6 +104,18 @@ def diagnosis_text(diagnosis: Diagnosis, *, unobservable: bool = True) -> str:
     return "\n".join([f"doctor: {count} finding{'s' * (count > 1)}", table, *said])
 
 
+def unsure_text(diagnosis: Diagnosis, path: Path) -> str:
+    """Return why nothing was repaired, and how to do it by hand in a log.toml."""
+    repairs = [repair_text(one.repair) for one in diagnosis.findings if one.repair]
+    said = f"no sure repair: with {path} the log stays as it is"
+    if not repairs:
+        return said
+    return (
+        f"{said}. Each repair has a rival that fits nearly as well, or rests on one that has. By "
+        f"hand: write what you measured under [repair] in {path}: {'; '.join(repairs)}"
+    )
+
+
 def _tone_of(diagnosis: Diagnosis) -> Tone:
     """Return what a diagnosis says of a log: good, in doubt, or bad where a finding matters."""
     if not diagnosis.healthy:

@@ -424,7 +424,7 @@ def origin(
         ["tireid", __version__],
         ["Python, machine", f"{platform.python_version()}, {platform.system()} on "
          f"{platform.machine()}"],
-        ["car", f"{vehicle.name}, hash {digest(vehicle_numbers(vehicle))}"],
+        ["car", f"{vehicle.name}, hash {digest(vehicle_numbers(vehicle.without_chassis()))}"],
         *(
             [
                 "recording",

@@ -14,7 +14,7 @@ from scipy.optimize import least_squares
 
 from codegen.arrays import Array
 from codegen.escape import visible
-from identifier.measured import printed_unit, printed_value, with_doubt
+from identifier.measured import as_printed, with_doubt
 from identifier.tire_model import AXLES, RELAXATION, Axle, TireModel
 
 _WIDEST = 0.6  # rad, slip up to which curves are compared
@@ -111,9 +111,9 @@ def tire_properties(model: TireModel, axle: Axle, verdict: str = "") -> str:
     error = 0.0 if model.model_error is None else float(model.model_error[i])
     lines = [f"Verdict: {visible(verdict)}."] * bool(verdict)
     for one in numbers:
-        e = one.with_model_error(error)
+        (e,) = as_printed([one.with_model_error(error)])
         state = "" if e.identified else ": not identified (default value)"
-        said = f"{e.title} {printed_value(*e[2:5])} {printed_unit(e.unit)}{state}"
+        said = f"{e.title} {with_doubt(e.value, e.sd)} {e.unit}{state}"
         lines.append(said.replace("±", "+-"))
     judged = "".join(f"$ {line}\n" for line in lines)
     force, band = model.force(slips), "the model cannot tell how sure it is"

@@ -63,7 +63,7 @@ class _Rules:
     beyond : share of the samples beyond the known slip, from which it is noted [-].
     side_slip : standard deviation of an estimated one, median [rad].
     rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
-    v_y : standard deviation of one that was brought on time, over what the rear axle slips, from
+    v_y : standard deviation of one whose delay was removed, over what the rear axle slips, from
         which it is noted and from which refused [-].
     """
 
@@ -208,7 +208,7 @@ def _v_y_stuck(evaluated: _Evaluated) -> Iterator[Objection]:
 
 
 def _v_y_unsure(evaluated: _Evaluated) -> Iterator[Objection]:
-    """Refuse a v_y of which too little is left after it was brought on time."""
+    """Refuse a v_y of which too little is left after its delay was removed."""
     recording, starts = evaluated.recording, evaluated.found.windows.starts
     if not recording.v_y_sd > 0.0:
         return

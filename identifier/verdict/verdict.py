@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from codegen import markup
 from codegen.arrays import Array
-from identifier.measured import NOT_IDENTIFIABLE, printed_value
+from identifier.measured import NOT_IDENTIFIABLE, with_doubt
 from identifier.tire_model import Axle
 from identifier.verdict.friction import RoadFriction
 
@@ -72,8 +72,8 @@ class Number(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Value and standard deviation in three digits, in the unit that is printed."""
-        return printed_value(self.value, self.sd, self.unit)
+        """Value and standard deviation in three digits."""
+        return with_doubt(self.value, self.sd)
 
     @property
     def state(self) -> str:

@@ -47,7 +47,10 @@ _LARGEST_SLIP = 0.7  # [rad], 40 degrees in the median window: nobody drives a w
 
 _PLACED = 0.03  # [m] to which the place of a v_y is known: more slip than that tells a sign
 
-_DOCTOR = "tireid doctor LOG --vehicle FILE looks for other faults, and repairs them"
+_DOCTOR = (
+    "tireid doctor LOG --vehicle FILE, or diagnose(log, car) of a log read with check=False, "
+    "looks for other faults, and repairs them"
+)
 
 
 def check_physics(recording: Recording) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from codegen.escape import displayed
 from models.logs.log import Heading, LogFile, RecordingError, some
+from models.logs.memory import ARRAYS
 from models.logs.names import HINT, STILL, Proposal, called, propose
 from models.logs.signals import (
     BETA,
@@ -264,7 +265,7 @@ def aside(found: Mapping[str, Signal], proposal: Proposal) -> tuple[str, list[st
         names, said = ["a_y"], "ay is left aside, as it is not sure: {};"
     else:
         names = [name for name in stand_ins("v_y", proposal) if name != "a_y"]
-        said = "no lateral velocity is read: vy is to be estimated"
+        said = "no lateral velocity is read: a method estimates vy"
         if not names:
             return said, []
         said += "; if {} is one,"
@@ -293,7 +294,7 @@ def _missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: l
     said = f"{log.path}: column {columns} is missing; "
     if parts:
         said += f"did you mean {', '.join(parts)}? declare it by --columns {' '.join(words)}; "
-    else:
+    elif log.format != ARRAYS:
         said += f"tireid channels {log.path} lists what is there; "
     return said + _listing(names)
 
@@ -316,9 +317,11 @@ def column_word(name: str, proposal: Proposal) -> str:
     guess = proposal.guesses.get(name)
     if guess is None:
         return ""
-    unit = guess.unit or SI[QUANTITIES[name]]
-    one = Signal(channel=guess.channel, unit=unit, factor=guess.factor, sign=guess.sign)
-    return declaration(name, one, " /RATIO" * guess.hand)
+    si = SI[QUANTITIES[name]]
+    one = Signal(channel=guess.channel, unit=guess.unit or si, factor=guess.factor, sign=guess.sign)
+    words = declaration(name, one, " /RATIO" * guess.hand)
+    known = guess.unit or signal_name(guess.channel[0])
+    return words if known else words.replace(f" [{si}]", " [UNIT]")
 
 
 def declaration(name: str, one: Signal, ratio: str = "") -> str:

@@ -54,7 +54,8 @@ def read_recording(
     Parameters
     ----------
     source : path of a log of any format; or a data frame, or a mapping of arrays of one length, by
-        column. Times of the calendar and durations count from the first.
+        column. Times of the calendar and durations count from the first; where no column is the
+        time, the index of a data frame is, if it rises.
     run : name of the run; may be left out when there is only one.
     dt : sample time T_s of the result [s].
     name : of the recording; empty takes that of the file, "recording" for arrays.
@@ -75,21 +76,29 @@ def read_recording(
     RecordingError
         One line: file and run, column, rule, value, remedy.
     """
-    given = with_columns(map_of(log_map), columns)
     if isinstance(source, str | PathLike):
+        given = with_columns(map_of(log_map), columns)
         name, log = name or _stem(Path(source)), given.opened(source)
-    else:
-        name = name or "recording"
-        log = open_arrays(
-            name,
-            source,
-            given.clock,
-            given.clock_unit,
-            mend=given.order == MEND,
-            rate=given.rate or 0.0,
-        )
-        given = replace(given, clock="")
-    return _judged(log, name, given, run=run, dt=dt, check=check)
+        return _judged(log, name, given, run=run, dt=dt, check=check)
+    name = name or "recording"
+    try:
+        given = with_columns(map_of(log_map), columns)
+        clock, mend, rate = (given.clock, given.clock_unit), given.order == MEND, given.rate or 0.0
+        log = open_arrays(name, source, *clock, mend=mend, rate=rate)
+        read = _judged(log, name, replace(given, clock=""), run=run, dt=dt, check=check)
+    except RecordingError as error:
+        raise RecordingError(_in_python(str(error))) from None
+    return replace(read, notes=tuple(map(_in_python, read.notes)))
+
+
+def _in_python(text: str) -> str:
+    """Return a text with the options of commands as arguments of `read_recording`."""
+
+    def written(options: re.Match[str]) -> str:
+        pairs = re.findall(r'"([^"=]+)=([^"]+)"', options[0])
+        return "columns={" + ", ".join(f'"{a}": "{b}"' for a, b in pairs) + "}"
+
+    return re.sub(r'--columns( "[^"=]+=[^"]+")+', written, text).replace("--columns", "columns")
 
 
 def read_repaired(

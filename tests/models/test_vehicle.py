@@ -139,6 +139,8 @@ def test_what_a_file_leaves_out_is_estimated_and_said(tmp_path):
     assert "rear = 8.393e+04 N/rad (14 static axle loads per rad)" in car.estimates
     assert "stiffness_front" not in car.estimates
     assert car_of(tmp_path, SIX).estimates == ""
+    made = Vehicle(name=car.name, mass=1500.0, l_f=1.1, l_r=1.6, cornering_stiffness_front=1.2e5)
+    assert made == car and made.estimates == car.estimates
 
 
 @pytest.mark.parametrize(("l_f", "l_r", "share"), [(0.0805, 0.093, 0.5), (1.2, 1.5, 1.0)])

@@ -49,6 +49,6 @@ def test_a_report_lists_the_car_and_its_channels(run):
     given = LogMap(signals={"delta_f": steering})
     numbers, channels = went_in(replace(run.tire, vehicle=car), given)
     said = {name: row for name, *row in numbers.rows}
-    assert said["l_f"] == [f"{car.l_f:.6g}", "m", "declared"]
+    assert said["l_f"] == [f"{car.l_f:.6g} m", "declared"]
     assert said["cornering_stiffness_rear"][-1] == "estimated, not used by this method"
-    assert channels.rows == [["delta_f", "Wheel", "deg", 15.0, 1.0, 0.0]]
+    assert channels.rows == [["delta_f", "Wheel", "deg, ratio 15"]]

@@ -14,6 +14,7 @@ from tireid.diagnoses import (
     _size_text,
     diagnosis_notes,
     diagnosis_text,
+    unsure_text,
     with_doctor,
     write_repair,
 )
@@ -176,3 +177,12 @@ def test_what_the_verdict_notes_of_v_y_is_not_noted_again():
     assert len(diagnosis_notes(diagnosis, verdict)) == 1
     assert diagnosis_notes(diagnosis, replace(verdict, findings=(noted,))) == []
     assert "v_y reads wrong by  -0.130 ± 0.020 m/s" in diagnosis_text(diagnosis)
+
+
+def test_a_repair_that_is_not_sure_can_be_written_by_hand(tmp_path):
+    repair, path = Repair(factor={"delta_f": 1.298}), tmp_path / "log.toml"
+    finding = Finding(code="factor", channel="delta_f", confidence=0.99, repair=repair)
+    said = unsure_text(Diagnosis(name="x", findings=(finding,), unobservable=()), path)
+    assert "rival" in said
+    path.write_text("[repair]\n" + said.rpartition(": ")[2], encoding="utf-8")
+    assert LogMap.from_toml(path).repair == repair

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from identifier.measured import with_doubt
+from identifier.measured import stiffness_words
 from tireid.commands.options import (
     add_log_map,
     add_options,
@@ -22,7 +22,7 @@ from tireid.commands.options import (
     stored_model,
 )
 from tireid.live.live import OLD, Live
-from tireid.live.outputs import Outputs, Store
+from tireid.live.outputs import Outputs, Store, scale_of_steering
 from tireid.live.sources import Source, open_source
 from tireid.live.state import Counts, State
 from tireid.progress import say, tell
@@ -66,12 +66,14 @@ def run(options: argparse.Namespace) -> None:
     if record is not None and (record.suffix.lower() != ".mcap" or record.exists()):
         raise ValueError(f"--record {record}: name a new file, one that ends in .mcap")
     tire = stored_model(options.weights)
-    vehicle = read_vehicle(options, tire, options.weights)
+    vehicle, log_map = read_vehicle(options, tire, options.weights), given_map(options)
     with ExitStack() as signals, ExitStack() as stack:  # a second one cuts no end short
-        store = stack.enter_context(closing(Store(options.store))) if options.store else None
+        store = Store(options.store, scale_of_steering(log_map)) if options.store else None
+        if store is not None:
+            stack.enter_context(closing(store))
         live = Live(vehicle, tire, resume=None if store is None else store.stored())
         source = open_source(
-            options.source, given_map(options), live.counts, vehicle=vehicle, speed=options.speed
+            options.source, log_map, live.counts, vehicle=vehicle, speed=options.speed
         )
         live.prepare(v_y=source.v_y is not False)  # before packets come, which would have to wait
         gc.collect()
@@ -124,8 +126,7 @@ def _line(state: State) -> str:
     """Return what a driver reads of a state, in one line."""
     known = "valid" if state.valid else f"not valid: {state.reason} ({state.origin} tires)"
     parts = [f"t = {state.t:.1f} s, {known}"]
-    both = map(with_doubt, 1e-3 * state.stiffness, 1e-3 * state.stiffness_sd)
-    parts.append(f"stiffness {' / '.join(both)} kN/rad")
+    parts.append(f"stiffness {stiffness_words(state.stiffness, state.stiffness_sd)}")
     if state.friction is not None:
         parts.append(f"friction {state.friction:.2f}")
     alarm = f"ALARM: {state.alarm}" if state.alarm else ""

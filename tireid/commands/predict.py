@@ -254,9 +254,9 @@ def write_predict_report(
     if band := band_sentence(model):
         found.append(band)
     report = Report(
-        title=f"Tires of {source.name} on {recording.name}",
+        title=f"Tires of {model.vehicle.name}, predicted on {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, "
-        "predicted by a stored model.",
+        f"predicted by {source.name}.",
         numbers=[
             verdict_headline(verdict),
             *of_answer(verdict, [*model_error_headline(verdict), *known_headline(model)]),

@@ -24,6 +24,7 @@ from PIL import Image
 
 from codegen.arrays import Array
 from codegen.writing import write_file
+from identifier.measured import printed_unit
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse
 from identifier.run import History
@@ -325,8 +326,7 @@ def force_unit_of(force: Array) -> ForceUnit:
 
     force : any shape [N]; what is not finite does not count.
     """
-    large = np.abs(force[np.isfinite(force)]).max(initial=0.0) >= 1000.0
-    return ForceUnit("kN", 1000.0) if large else ForceUnit("N", 1.0)
+    return ForceUnit(*printed_unit("N", force))
 
 
 def paper_design(history: History) -> PaperIdentifier:

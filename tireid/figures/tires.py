@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from codegen.arrays import Array
-from identifier.measured import printed_scale, printed_unit
+from identifier.measured import printed_unit
 from identifier.run import History
 from identifier.tire_model import AXLES as SIDES
 from identifier.tire_model import TireModel
@@ -90,13 +90,13 @@ def slip_figure(
     modelled, reference = modelled / unit.newtons, reference / unit.newtons
     limits, known = force_range(reference, modelled), truth or windows is not None
 
-    look = {**_CLOUD, **{name: (TRUTH if truth else MOTION)[name] for name in ("color", "label")}}
+    look: Look = {**(TRUTH if truth else MOTION), **_CLOUD, "markersize": 3.0, "alpha": 0.35}
     learnt: Look = {**MODEL, **_CLOUD}
     figure, panels = axle_panels([3.2, 1.3] if known else [3.2], sharex="col")
     for axle, (axes, lowest) in enumerate(zip(panels[0], panels[-1], strict=True)):
         x, y, force = alpha[:, axle], modelled[:, axle], reference[:, axle]
         if known:
-            axes.plot(x, drawable(force, limits), **look | {"markersize": 3.0, "alpha": 0.35})
+            axes.plot(x, drawable(force, limits), **look)
             lowest.axhline(0.0, color=look["color"], linewidth=0.6)
             lowest.plot(x, np.clip(y - force, *limits), **learnt)
         axes.plot(x, drawable(y, limits), **learnt)
@@ -213,7 +213,8 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     figure = new_figure(4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
-        label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values
+        unit, size = printed_unit(unit, values)
+        label, values = f"{title}\n[{unit}]", values / size
         for axle, color in enumerate((GREEN, PURPLE)):
             axes.plot(at, values[:, axle], linewidth=1.0, color=color, label=AXLES[axle].lower())
         axes.set(ylabel=label, xlim=(t[0], t[-1]))

@@ -79,11 +79,7 @@ class Live:
     ) -> None:
         require_kind(Vehicle, "as of Vehicle.from_toml or sedan", vehicle=vehicle)
         for one in filter(None, (tire, resume)):
-            if not vehicle.moves_as(one.vehicle):
-                raise ValueError(
-                    f"the tires are of {one.vehicle.name!r} with other numbers than "
-                    f"{vehicle.name!r} has: give that car, or another store or weights"
-                )
+            one.require_car(vehicle, remedy="give that car, or another store or weights")
         self.vehicle, self._counts, self._tire, self._resume = vehicle, Counts(), tire, resume
         self._identifier: OnlineIdentifier | None = None
         self._method: Any = None

@@ -30,9 +30,8 @@ def slip_caption(
     if band is None or known is None:
         return f"{said} of {recording.name}, and the curve of the model."
     drawn = forces_over_slip(model, recording, windows)
-    what = "true forces" if recording.axle_force is not None else "forces from the motion"
-    what = what if recording.axle_force is not None or windows else "modelled forces"
-    slip = drawn.slip
+    what, slip = "forces from the motion" if windows else "modelled forces", drawn.slip
+    what = what if recording.axle_force is None else "true forces"
     at = np.linspace(slip.min(), slip.max(), _CURVE)
     low, high = band.at(at)
     outside = np.stack(

@@ -180,19 +180,21 @@ def went_in(model: TireModel, log_map: LogMap) -> list[Block]:
     for name, unit in _CAR.items():
         unused = name.startswith("cornering") and model.kind == "fit"
         origin_of = f"{car.origin(name)}{', not used by this method' * unused}"
-        rows.append([name, f"{getattr(car, name):.6g}", unit, origin_of])
-    channels: list[list[Cell]] = [
-        [column_of(name), " + ".join(one.channel), one.unit, one.ratio, one.factor, one.offset]
-        for name, one in log_map.signals.items()
-    ]
+        rows.append([name, f"{getattr(car, name):.6g} {unit}", origin_of])
+    channels = list[list[Cell]]()
+    for name, one in log_map.signals.items():
+        given = {"ratio": one.ratio - 1.0, "factor": one.factor - 1.0, "offset": one.offset}
+        read = [f"{key} {getattr(one, key):g}" for key, change in given.items() if change]
+        how = [one.unit or "its unit", *read, *["table"] * bool(one.table)]
+        channels.append([column_of(name), " + ".join(one.channel), ", ".join(how)])
     listed = "Declared channels. Signals without a row have standard names or notes below."
-    header = ["signal", "channel", "unit", "steering ratio", "factor", "offset [SI]"]
-    tables = [Table(f"The car, {car.name}.", ["number", "value", "unit", "origin"], rows)]
+    header = ["signal", "channel", "read as"]
+    tables = [Table(f"The car, {car.name}.", ["number", "value", "origin"], rows)]
     return [*tables, *[Table(listed, header, channels)] * bool(channels)]
 
 
 def extrapolated(model: TireModel, recording: Recording) -> list[Note]:
-    """Return how much of a drive slips farther than the model knows, as a note."""
+    """Return how much of a drive exceeds the identified slip range, as a note."""
     beyond = beyond_known(model, recording)
     if model.known_slip is None or beyond is None or max(beyond) <= _EXTRAPOLATED:
         return []
