@@ -37,7 +37,8 @@ GIVEN = ("car.toml", "log.csv", "other.csv", "tire.json", "out/mine")
 AT_ONCE = 2  # pages; more than two cores are rare where documents are made
 LONGEST = 600  # s of a block: what takes longer hangs
 READ = ("text", "json", "sql", "matlab")  # languages of what is only read; Sphinx has {those}
-INSTALLS = re.compile(r"^pip install .*$", re.M)  # `make docs` has done it
+# `make docs` has done these.
+INSTALLS = re.compile(r"^(pip install |python3 -m venv |\. \.venv/).*$", re.M)
 NUMBER = re.compile(r"-?\d+(\.\d+)?")
 # A comment, or a block with its language.
 PART = re.compile(

@@ -1,19 +1,38 @@
 """The optimal control problem of the tracker: horizon, cost, limits. Numbers, but for the horizon.
 
+Defaults are of a full-size car. `of` a model car returns those of the similar problem: lengths are
+multiplied by its size, speeds and times by the root of that, so that accelerations are the same.
+
 Minimize Σ_k ½ y_k' Q y_k + ½ R u_k² + ½ y_N' Q_N y_N + ½ Σ Z s² over u_0 … u_{N-1}, with x_{k+1}
 from one Runge-Kutta step of dt and x_0 given, so that
   |u_k| <= steering_rate,  |δ_k| <= steering                 hard, k = 1 … N
   |e_y,k| <= e_y + s,  |α_k| <= slip + s (front, rear)       soft, k = 1 … N
 """
 
-from dataclasses import asdict, dataclass, field
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Self
 
 import casadi as ca
 import numpy as np
 
 from codegen.arrays import Array
 from models.rules import require_not_negative, require_positive
+from models.vehicle import Vehicle
+
+_SMALL = 1.5  # m, wheelbase: below are model cars, above karts of 1:2 and road cars
+
+
+def size_of(vehicle: Vehicle) -> float:
+    """Return the lengths of a model car over those of a sedan, 1 for full-size cars [-]."""
+    return vehicle.scale**2 if vehicle.wheelbase < _SMALL else 1.0
+
+
+def _similar(numbers: Any, vehicle: Vehicle, powers: Mapping[str, float]) -> Any:
+    """Return numbers for the size of a car, multiplied by that to some powers."""
+    size = size_of(vehicle)
+    return replace(numbers, **{key: getattr(numbers, key) * size**n for key, n in powers.items()})
+
 
 # What the tracker minimizes: Σ ½ q y² over the stages, Gauss-Newton, and ½ R u² of its input.
 #
@@ -65,6 +84,13 @@ class Cost:
     def __post_init__(self) -> None:
         require_not_negative(ValueError, **asdict(self))
         require_positive(ValueError, steering_rate=self.steering_rate)
+
+    @classmethod
+    def of(cls, vehicle: Vehicle) -> Self:
+        """Return the weights for a car of its size."""
+        powers = {"e_y": -2.0, "v_y": -1.0, "yaw_rate": 1.0, "steering_rate": 1.0}
+        found: Self = _similar(cls(), vehicle, powers)
+        return found
 
     def numbers(self) -> Array:
         """Return q (7,) of ½ Σ q y² at a stage, y in SI."""
@@ -128,6 +154,13 @@ class Limits:
         if len(self.slip) != 2 or not all(0.0 < value < np.inf for value in self.slip):
             raise ValueError(f"slip must be two positive numbers, it is {self.slip}")
 
+    @classmethod
+    def of(cls, vehicle: Vehicle) -> Self:
+        """Return the bounds for a car of its size."""
+        powers = {"steering_rate": -0.5, "e_y": 1.0, "soft_e_y": -2.0}
+        found: Self = _similar(cls(), vehicle, powers)
+        return found
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Problem:
@@ -142,6 +175,13 @@ class Problem:
         if not self.horizon >= 2:
             raise ValueError(f"horizon must be at least 2, it is {self.horizon}")
         require_positive(ValueError, dt=self.dt)
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, period: float = 0.0) -> Self:
+        """Return the problem for a car of its size.   period : least dt, as far as 0.05 s [s]."""
+        most = cls()
+        dt = min(most.dt, max(most.dt * size_of(vehicle) ** 0.5, period))
+        return replace(most, dt=dt, cost=Cost.of(vehicle), limits=Limits.of(vehicle))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -178,3 +218,11 @@ class Guards:
         values = asdict(self)
         require_not_negative(ValueError, hold_time=values.pop("hold_time"))
         require_positive(ValueError, **values)
+
+    @classmethod
+    def of(cls, vehicle: Vehicle) -> Self:
+        """Return the guards for a car of its size."""
+        powers = {"e_y": 1.0, "max_curvature": -1.0, "fall_back_e_y": 1.0, "yaw_rate": -0.5}
+        powers |= dict.fromkeys(("v_y", "min_speed", "max_speed", "hold_time"), 0.5)
+        found: Self = _similar(cls(), vehicle, powers)
+        return found

@@ -25,6 +25,7 @@ from models.files import resolved, write_atomically
 from models.logs.door import open_log
 from models.logs.log import LogFile, RecordingError
 from models.logs.signals import (
+    COLUMNS,
     INSTEAD,
     NEEDED,
     QUANTITIES,
@@ -275,7 +276,7 @@ def given_signals(pairs: Sequence[str]) -> dict[str, Signal]:
         if not (name and equals and rest):
             raise RecordingError(f'--columns wants "NAME=COLUMN [UNIT]", not {displayed(pair)}')
         if ours is None:
-            known = ", ".join(QUANTITIES)
+            known = ", ".join(["t", *(COLUMNS.get(one, one) for one in QUANTITIES)])
             raise RecordingError(f"{displayed(name)} is no column of ours: {known}")
         if ours in found:
             raise RecordingError(f"--columns gives {name} twice")

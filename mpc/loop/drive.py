@@ -19,10 +19,13 @@ from mpc.loop.record import COMPLETED, Drive, Recorder
 from mpc.loop.sensing import CarSensors, Measured, Measures
 from mpc.path.path import Path, Projection
 from mpc.path.speed import SpeedProfile
+from mpc.problem import size_of
+from mpc.realtime.instance import Status
 from mpc.realtime.tracker import Tracker
 
 _SPUN = math.radians(45.0)  # side slip of the center of gravity [rad]
-_SLOWEST = 1.0  # m/s
+_SLOWEST = 1.0  # m/s, of a full-size car
+_PLANNED = 0.9  # share of the steps with a new plan, below which the tracker did not drive
 
 
 class LearningTires(Protocol):
@@ -88,7 +91,8 @@ def drive(
     here = path.project(state.X, state.Y, 0.0)
     start = Place(state.X, state.Y, state.psi, state.v_x)
     guide = Guide(path, tracker, car.speed_gain, start, here)
-    ending = ""
+    slowest = _SLOWEST * size_of(car.vehicle) ** 0.5
+    planned, ending = 0, ""
     while not ending:
         sensed = measured = sensors.measure(state, rng)
         given = None if lateral is None else lateral.tell(sensed)
@@ -104,6 +108,7 @@ def drive(
             record.note(state.t, earned.observe(measured, s, place.v_x))
             profile = earned.profile
         command = guide.steer(measured, profile)
+        planned += command.status < Status.QP_FAILED
         v_ref = profile.reference(here.s, car.speed_gain)
         if record.plan_is_due:
             record.plan(command, guide.ahead(profile, tracker.plan_times).s)
@@ -117,20 +122,20 @@ def drive(
         here = path.project(state.X, state.Y, here.s)
         if progress is not None:
             progress(min(here.s / goal, 1.0))
-        ending = _ending(state, here, goal, widest, time_limit) or place.complaint(blind)
+        ending = _ending(state, here, goal, widest, slowest) or place.complaint(blind)
+        if not ending and state.t >= time_limit:
+            ending = f"not there after {time_limit:g} s"
+    if ending == COMPLETED and planned < _PLANNED * record.steps:
+        ending = f"the tracker planned in {planned} of {record.steps} steps only"
     return record.drive(name or path.name, path, car, ending)
 
 
-def _ending(
-    state: CarState, here: Projection, goal: float, widest: float, time_limit: float
-) -> str:
+def _ending(state: CarState, here: Projection, goal: float, widest: float, slowest: float) -> str:
     """Return why the drive is over, or nothing while it goes on."""
     if abs(here.e_y) > widest:
-        return f"left the path by more than {widest:g} m"
+        return f"left the path by more than {widest:.2g} m"
     if abs(math.atan2(state.v_y, state.v_x)) > _SPUN:
         return "spun"
-    if state.v_x < _SLOWEST:
-        return f"slower than {_SLOWEST:g} m/s"
-    if here.s >= goal:
-        return COMPLETED
-    return f"not there after {time_limit:g} s" if state.t >= time_limit else ""
+    if state.v_x < slowest:
+        return f"slower than {slowest:.2g} m/s"
+    return COMPLETED if here.s >= goal else ""

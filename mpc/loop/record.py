@@ -60,7 +60,8 @@ class Drive:
     status : of the tracker, by its number, (n,).
     solve_time : of the tracker [s], (n,).
     notes : what the learner said and when [s].
-    completed : whether the car reached the end on the path and without spinning.
+    completed : whether the car reached the end on the path, without spinning and by new plans in
+        90 % of the steps.
     """
 
     name: str
@@ -143,9 +144,14 @@ class Recorder:
             self._notes.append((t, text))
 
     @property
+    def steps(self) -> int:
+        """How many periods were kept."""
+        return len(self._cars)
+
+    @property
     def plan_is_due(self) -> bool:
         """Whether the plan of this period is to be kept."""
-        return self._plan_every > 0 and len(self._cars) % self._plan_every == 0
+        return self._plan_every > 0 and self.steps % self._plan_every == 0
 
     def plan(self, command: Command, s: Array) -> None:
         """Keep the plan of this period.

@@ -90,25 +90,28 @@ class CarSensors:
         return Measured(state.t, *values)
 
 
-def inertial_unit() -> CarSensors:
+def inertial_unit(size: float = 1.0) -> CarSensors:
     """Return sensors as test cars carry them: satellite position and inertial unit, coupled.
 
     Noise as data sheets of coupled receivers with correction data state it: 2 cm, 0.002 rad,
     0.03 m/s and 0.003 rad/s.
+    size : of the car, of `mpc.problem.size_of`: of a model car positions are measured as in a lab,
+        1 mm and 0.01 m/s at 1:10.
     """
+    place, speed = Sensor(noise=0.02 * size), Sensor(noise=0.03 * size**0.5)
     return CarSensors(
-        X=Sensor(noise=0.02),
-        Y=Sensor(noise=0.02),
+        X=place,
+        Y=place,
         psi=Sensor(noise=0.002),
-        v_x=Sensor(noise=0.03),
-        v_y=Sensor(noise=0.03),
+        v_x=speed,
+        v_y=speed,
         r=Sensor(noise=0.003),
         delta=Sensor(noise=0.0005),
         a_y=Sensor(noise=0.1),
     )
 
 
-def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
+def imu_and_localization(rng: np.random.Generator | None, size: float = 1.0) -> CarSensors:
     """Return the sensors of a car without v_y: inertial unit, wheel speed, steering, localization.
 
     As noisy as those of `inertial_unit`: position 2 cm, heading 0.002 rad, wheel speed 0.03 m/s,
@@ -116,11 +119,11 @@ def imu_and_localization(rng: np.random.Generator | None) -> CarSensors:
     and acceleration are biased, and the accelerometer is fixed to the body and rolls with it.
 
     rng : draws the biases, of 0.001 rad/s and 0.05 m/s² standard deviation; None takes sensors
-    without noise and bias.
+    without noise and bias.   size : as of `inertial_unit`.
     """
     if rng is None:
         return CarSensors(v_y=None, body_fixed=True)
-    same, (bias_r, bias_a_y) = inertial_unit(), rng.normal(0.0, [_BIAS_R, _BIAS_A_Y])
+    same, (bias_r, bias_a_y) = inertial_unit(size), rng.normal(0.0, [_BIAS_R, _BIAS_A_Y])
     return replace(
         same,
         v_y=None,

@@ -141,6 +141,10 @@ class Path:
         line = Line(self.s, self.X, self.Y, self.psi, self.kappa)
         check_line(line, self.name, self.closed)
 
+    def __repr__(self) -> str:
+        kind = "closed" if self.closed else "open"
+        return f"<Path {self.name!r}: {self.length:.4g} m, {kind}>"
+
     @classmethod
     def from_line(
         cls, line: Line, *, name: str, closed: bool = False, cones: Array = NO_CONES
@@ -163,8 +167,8 @@ class Path:
         *,
         closed: bool = False,
         name: str = "way-points",
-        spacing: float = 0.25,
-        minimum_radius: float = 3.0,
+        spacing: float | None = None,
+        minimum_radius: float | None = None,
     ) -> Self:
         """Draw a spline with continuous curvature through way-points.
 
@@ -173,8 +177,8 @@ class Path:
         X : of the way-points in driving order [m], (k,).
         Y : of the way-points [m], (k,).
         closed : whether the last way-point leads back to the first; that may be repeated.
-        spacing : longest step of the samples [m].
-        minimum_radius : tightest turn allowed [m].
+        spacing : longest step of the samples [m]; None: 0.25, less in turns of less than 1 m.
+        minimum_radius : tightest turn allowed [m]; None: 3 m, or two median gaps if that is less.
 
         Raises
         ------
@@ -206,7 +210,7 @@ class Path:
             are those of a race line of TUM.
         closed : as for way-points; None: closed where the last point is no farther from the first
             than 1.5 median gaps between neighbors.
-        minimum_radius : tightest turn allowed [m]; None: 3 m, or two median gaps if that is less.
+        minimum_radius : as for way-points.
 
         Raises
         ------
@@ -214,14 +218,12 @@ class Path:
             Naming the file and the column, line or rule that is broken.
         """
         waypoints = read_waypoints(FilePath(file))
-        radius = waypoints.tightest() if minimum_radius is None else minimum_radius
         path = cls.from_waypoints(
             waypoints.X,
             waypoints.Y,
             closed=waypoints.seems_closed() if closed is None else closed,
             name=str(file),
-            spacing=min(0.25, 0.25 * radius),
-            minimum_radius=radius,
+            minimum_radius=minimum_radius,
         )
         return replace(path, name=FilePath(file).stem)
 

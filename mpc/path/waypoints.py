@@ -19,8 +19,12 @@ from models.logs.units import LENGTH, to_si
 from models.schema import require_few
 from mpc.path.line import Line, PathError, uniform_grid
 
+_SPACING = 0.25  # of samples [m], of the radius in turns of less than 1 m
+_RADIUS = 3.0  # of a car's tightest turn [m]; less for a model car on its track, by
+_GAPS = 2.0  # median gaps of way-points: a right angle between them is tighter
 _FITS = 4  # of a line, each over the arc length of the one before
 _FARTHEST = 1e8  # of a way-point from the origin [m]: every map of the earth fits
+_SHORTEST = 0.1  # of a path [m]: 11 km in degrees
 _SAME = 1e-6  # of the median gap: way-points as near as this are one
 # Names of the columns of a file that has none, by their number: with a speed, with widths to the
 # right and left as F1TENTH writes them, and the race line of TUM.
@@ -50,11 +54,6 @@ class _Waypoints(NamedTuple):
         last = np.hypot(self.X[-1] - self.X[0], self.Y[-1] - self.Y[0])
         return bool(last <= 1.5 * np.median(gaps))
 
-    def tightest(self) -> float:
-        """Return which turn is one of a car and no kink [m]: 3 m, less where points are dense."""
-        gaps = np.hypot(np.diff(self.X), np.diff(self.Y))
-        return min(3.0, 2.0 * float(np.median(gaps))) if gaps.size else 3.0
-
 
 def line_through(
     X: ArrayLike,
@@ -62,21 +61,27 @@ def line_through(
     *,
     closed: bool,
     name: str,
-    spacing: float,
-    minimum_radius: float,
+    spacing: float | None,
+    minimum_radius: float | None,
 ) -> Line:
     """Draw the line; the arguments and errors are those of `Path.from_waypoints`.
     X : of the way-points [m], (k,).   Y : of the way-points [m], (k,).
-    spacing : longest step of the samples [m].
-    minimum_radius : tightest turn allowed [m].
+    spacing : longest step of the samples [m], None: by the tightest turn.
+    minimum_radius : tightest turn allowed [m], None: by the gaps.
     """
-    if not minimum_radius > 0.0:
+    if minimum_radius is not None and not minimum_radius > 0.0:
         raise PathError(f"{name}: minimum_radius must be positive, it is {minimum_radius}")
     points = _checked(X, Y, closed, name)
-    t = np.append(0.0, np.cumsum(_norm(np.diff(points, axis=0))))
+    gaps = _norm(np.diff(points, axis=0))
+    if minimum_radius is None:  # a turn of a car and no kink
+        minimum_radius = min(_RADIUS, _GAPS * float(np.median(gaps)))
+    t = np.append(0.0, np.cumsum(gaps))
     for _ in range(_FITS):  # a C2 spline over its own arc length
         spline = CubicSpline(t, points, bc_type="periodic" if closed else "natural")
         t = np.append(0.0, np.cumsum(_lengths(spline.derivative(), t[:-1], t[1:])))
+    if spacing is None:  # the curvature is largest at a knot
+        bend = _norm(spline(spline.x, 2)).max()
+        spacing = _SPACING * min(1.0, max(1.0 / max(bend, 1.0), minimum_radius))
     line = sample(spline, spline.x, spacing, name)
     # A spike between two samples shows in the heading alone.
     step = line.s[-1] / (line.s.size - 1)
@@ -84,9 +89,9 @@ def line_through(
     tightest = int(bend.argmax())
     if bend[tightest] * minimum_radius > 1.0:
         raise PathError(
-            f"{name}: no turn may be tighter than {minimum_radius} m, at s = "
+            f"{name}: no turn may be tighter than {minimum_radius:.3g} m, at s = "
             f"{line.s[tightest]:.4g} m, X = {line.X[tightest]:.4g}, Y = {line.Y[tightest]:.4g} "
-            f"the radius is {1.0 / bend[tightest]:.3g} m; move the way-points"
+            f"the radius is {1.0 / bend[tightest]:.3g} m; move way-points, or give minimum_radius"
         )
     return line
 
@@ -168,6 +173,8 @@ def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
     if closed:
         points = np.vstack((points, points[:1]))
     gaps = _norm(np.diff(points, axis=0))
+    if gaps.sum() < _SHORTEST:
+        raise PathError(f"{name}: the path is {gaps.sum():.2g} m long: are X and Y degrees?")
     same = np.flatnonzero(gaps <= _SAME * np.median(gaps))
     if same.size:
         raise PathError(

@@ -13,6 +13,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from models.vehicle import Vehicle
+from mpc.problem import size_of
 
 _N_STATES = 5  # e_y, e_psi, v_y, r and the angle of the wheels
 _STEERING = 0.2  # rad that cost as much as `e_y`, where the car hardly moves
@@ -21,7 +22,7 @@ _DOUBLINGS = 40  # at most; ten are usual
 _ENOUGH = 1e-13  # change of the cost, in parts
 
 N_GAINS = _N_STATES + 2  # of x, and what the steady turn asks for
-SPEEDS = np.round(np.geomspace(2.0, 100.0, 8), 3)  # m/s; the C takes what lies between by line
+SPEEDS = np.round(np.geomspace(2.0, 100.0, 8), 3)  # m/s of a full-size car; between them by line
 N_SPEEDS = SPEEDS.size
 
 
@@ -46,8 +47,8 @@ def fall_back(
     period : between two steps [s].   delay : from a measurement until its command acts [s].
     e_y : deviation [m] that is worth as much as `acceleration`.   acceleration : lateral [m/s²].
     """
-    rows = []
-    for v_x in SPEEDS:
+    rows, speeds = [], SPEEDS * size_of(vehicle) ** 0.5
+    for v_x in speeds:
         A, B = motion(vehicle, float(v_x), delay + 0.5 * period)
         A_d, B_d = _sampled(A, B, period)
         turn, drift = steady_turn(vehicle, float(v_x))
@@ -56,9 +57,7 @@ def fall_back(
         Q = np.diag([1.0 / e_y**2, 0.0, 0.0, 0.0, 0.0])
         R = np.array([[1.0 / _STEERING**2 + (per_steering / acceleration) ** 2]])
         rows.append([*feedback(A_d, B_d, Q, R).ravel(), turn, drift])
-    table = _FallBack(
-        SPEEDS.copy(), np.array([[float(f"{x:.{_DIGITS}g}") for x in row] for row in rows])
-    )
+    table = _FallBack(speeds, np.array([[float(f"{x:.{_DIGITS}g}") for x in row] for row in rows]))
     for numbers in table:
         numbers.flags.writeable = False
     return table

@@ -22,10 +22,10 @@ class Tracker:
 
     The command of a step acts `delay` after its measurement, and is held for a period. What is
     steered is a ramp to the solver, so that it plans from half a period before.
-    problem : what to minimize; None takes the default.
+    problem : what to minimize; None takes the default for a car of its size.
     period : between two steps [s], at most the stage's length.
     delay : from a measurement until its command acts on the wheels [s], lags included.
-    guards : what is possible, and the fall-back; None takes the default.
+    guards : what is possible, and the fall-back; None takes the default for a car of its size.
     tolerance : of the solver, in parts: mean product of gap and multiplier against the largest
         multiplier, where gaps count limits as 1; None takes 1e-8, in float 1e-5.
     linearizations : a step; 1 in real time, some 10 to convergence.
@@ -52,7 +52,7 @@ class Tracker:
         caution: float = 0.0,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        problem = problem or Problem()
+        problem = problem or Problem.of(tire.vehicle, period)
         longest = (N_COMMANDS - 1) * period
         if not 0.0 < period <= problem.dt:
             raise ValueError(f"period must be positive and at most {problem.dt}, it is {period}")
@@ -75,7 +75,7 @@ class Tracker:
         self.instance = Instance(tire.structure, problem.horizon, single=single)
         self._preview: Instance | None = None  # what would be planned with another tire
         params = self.instance.params
-        guards = guards or Guards()
+        guards = guards or Guards.of(tire.vehicle)
         set_params(params, problem, guards)
         table = fall_back(
             tire.vehicle, period=period, delay=delay, e_y=guards.fall_back_e_y,

@@ -14,22 +14,23 @@ from identifier.tire_model import TireModel, stored_verdict
 from models.faults import KINDS, SIZED, FaultError, SensorFault
 from models.rules import require_within
 from models.schema import require_few
-from models.vehicle import BICYCLE, GRAVITY, Vehicle, sedan
+from models.vehicle import GRAVITY, Vehicle, sedan
 from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from mpc.path.speed import SHARE
+from mpc.problem import size_of
 from tireid.commands import options as shared
 from tireid.driving import runs as driving
 from tireid.driving.learn import DURATION, learning_drive
 from tireid.driving.results import NO_FILM, Drives, headline, write_drive_report
-from tireid.driving.setup import BY_TIRES, Setup, SpeedWish, simulated
+from tireid.driving.setup import BY_TIRES, Setup, SpeedWish, require_drivable, simulated
 from tireid.figures.film import FORMATS
 from tireid.learning import identify
 from tireid.progress import say, tell
 from tireid.verdicts import warn_of
 
 _NOT_COMPLETED = 1
-_TIGHTEST = 1.1  # radius of a turn over the wheelbase: wheels at 42 deg, as no car goes farther
+_SPEEDS = (3.0, 100.0)  # m/s, least and most for a full-size car
 CONFIRM = (
     "earn the speed: begin at 45 %% of what the tires allow, and go on as the car holds it and "
     "nothing says that the friction is another"
@@ -126,10 +127,10 @@ def run(options: argparse.Namespace) -> int:
     labels = list(dict.fromkeys(every if ALL in options.tires else options.tires))
     shared.require_one(options, "weights", "method", "paper", "design")
     stored = shared.model_of_day(options)
-    conditions = conditions_of(options, stored)
-    setup = conditions.setup
     driving.require_compiler()
     with shared.folder_of(options) as folder:
+        conditions = conditions_of(options, stored)
+        setup = conditions.setup
         if driving.ORACLE in labels:
             setup.oracle()  # what cannot be is said before the car drives
         source, learnt = frozen_tires(options, labels, conditions, stored)
@@ -169,10 +170,11 @@ def quantity(text: str, *units: Mapping[str, float]) -> tuple[float, str]:
     return math.nan, ""
 
 
-def _parse_speed(text: str) -> SpeedWish:
+def _parse_speed(text: str, size: float = 1.0) -> SpeedWish:
     """Return what --speed says.
 
     text : tires, 70% of what they allow, 0.4g or 4m/s2, 17m/s or 60km/h.
+    size : of the car, of `mpc.problem.size_of`.
     """
     if text.strip() == TIRES:
         return BY_TIRES
@@ -185,7 +187,8 @@ def _parse_speed(text: str) -> SpeedWish:
     if not unit:
         raise ValueError(f"--speed {text} has no unit: write {text}%, {text}g or {text}m/s")
     if unit in SPEEDS:
-        require_within(ValueError, 3.0, 100.0, **{"--speed in m/s": value})
+        bounds = (round(v * math.sqrt(size), 2) for v in _SPEEDS)
+        require_within(ValueError, *bounds, **{"--speed in m/s": value})
         return SpeedWish(speed=value)
     if unit in SHARES:
         require_within(ValueError, 5.0, 150.0, **{"--speed in %": 100.0 * value})
@@ -251,20 +254,23 @@ def path_of(options: argparse.Namespace, vehicle: Vehicle) -> Path:
         return BUILT_IN[name]()
     if not FilePath(name).suffix:
         raise ValueError(f"--path: there is no path {name!r}; {', '.join(BUILT_IN)}, or FILE.csv")
-    return Path.from_csv(FilePath(name), minimum_radius=_TIGHTEST * vehicle.wheelbase)
+    path = Path.from_csv(FilePath(name), minimum_radius=vehicle.wheelbase)
+    require_drivable(path, vehicle)
+    return path
 
 
 def conditions_of(
     options: argparse.Namespace, stored: TireModel | None = None
 ) -> driving.Conditions:
     """Return what is to be driven; the car is by default that of stored tires.   stored : tires."""
-    of_sedan = stored is None or stored.vehicle.bicycle == sedan().bicycle
+    of_sedan = stored is None or stored.vehicle.moves_as(sedan())
     vehicle = shared.read_vehicle(options, None if of_sedan else stored, options.weights)
-    wish = _parse_speed(options.speed)
+    wish = _parse_speed(options.speed, size_of(vehicle))
     if stored is not None:
-        require_its_car(options, stored.vehicle, vehicle)
+        stored.require_car(vehicle, options.weights, "leave --vehicle out")
+    path = path_of(options, vehicle)
     vehicle, tires = simulated(vehicle, stored)
-    setup = Setup(path_of(options, vehicle), vehicle, options.mu, (), wish, tires=tires)
+    setup = Setup(path, vehicle, options.mu, (), wish, tires=tires)
     drops = tuple(sorted(_parse_drop(text) for text in options.mu_drop))
     for s, _ in drops:
         if not setup.path.closed and s >= (length := setup.path.length):
@@ -314,12 +320,3 @@ def frozen_tires(
         f"frozen ones identified by {law} on {recording.duration:.0f} s of random steering on an "
         f"open field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"
     ), run.tire if banded else run.freeze()
-
-
-def require_its_car(options: argparse.Namespace, learnt: Vehicle, driven: Vehicle) -> None:
-    """Refuse tires that were learnt on another car than is driven, whatever either is called."""
-    if learnt.bicycle == driven.bicycle:
-        return
-    key = next(key for key in BICYCLE if getattr(learnt, key) != getattr(driven, key))
-    apart = f"{key} {getattr(learnt, key):.6g}, driven {getattr(driven, key):.6g}"
-    raise ValueError(f"{options.weights} is of another car ({apart}): leave --vehicle out")

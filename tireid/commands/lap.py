@@ -30,10 +30,10 @@ from tireid.commands.drive import (
     add_path,
     path_of,
     quantity,
-    require_its_car,
 )
 from tireid.driving.laps import drive_laps
 from tireid.driving.runs import FRICTIONS
+from tireid.driving.setup import faster_than
 from tireid.figures.lap import lap_figure, lap_gg_figure
 from tireid.figures.style import save_figures
 from tireid.output import write_json
@@ -81,7 +81,7 @@ def declare(new: Any) -> None:
     shared.add_options(parser, float, numbers)
     shared.add_options(parser, bool, {"--confirm": f"with --laps: {CONFIRM}"})
     parser.set_defaults(confirm=None)
-    shared.add_vehicle(parser, default="that of WEIGHTS; --laps needs its chassis")
+    shared.add_vehicle(parser, default="that of WEIGHTS")
     shared.add_seed(parser, "noise, with --laps")
     shared.add_output(parser, "lap")
 
@@ -105,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
         )
     tire = load_model(source)
     vehicle = shared.read_vehicle(options, tire, source)
-    require_its_car(options, tire.vehicle, vehicle)
+    tire.require_car(vehicle, source, "leave --vehicle out")
     path = path_of(options, vehicle)
     try:
         limits = speed_limits(tire, confidence=options.confidence).scaled(ratio)
@@ -119,7 +119,7 @@ def run(options: argparse.Namespace) -> int:
     elif n < 1.0 or n % 1.0:
         raise ValueError(f"--laps must be a whole number, 1 or more, it is {n:g}")
     elif not path.closed:
-        raise ValueError(f"--laps N drives a closed path N times: leave it out for {path.name}")
+        raise ValueError(f"--laps N drives a closed path N times, {path.name!r} is open")
     with shared.folder_of(options) as folder:
         rows, completed = list[dict[str, float]](), True
         if n is None:
@@ -140,7 +140,7 @@ def run(options: argparse.Namespace) -> int:
                 }  # fmt: skip
                 rows.append(row)
                 tell(
-                    "lap {}: planned {:.2f} s, driven {:.2f} s, {:.2f} of the limits, a_y up to "
+                    "lap {}: planned {:.2f} s, driven {:.2f} s, {:.2f} of the limits, limit of a_y "
                     "{:.2f} m/s²; {:.2f} m off the path".format(*row.values())
                     + ("" if valid else "; it taught nothing")
                 )
@@ -182,12 +182,11 @@ def _notes(profile: SpeedProfile, tire: TireModel, fastest: float) -> list[str]:
 
     fastest : speed of the log [m/s].
     """
-    notes, beyond, forward = [], profile.v > fastest, tire.drives.lengthwise
-    if beyond.any():
+    notes, forward = [], tire.drives.lengthwise
+    if faster := faster_than(profile.v, fastest):
         notes.append(
-            f"{100.0 * beyond.mean():.0f} % of the way is faster than the log, {fastest:.1f} m/s: "
-            "there its limits are used, downforce and drag unproven; drive faster, or add "
-            f"--v-max {math.floor(fastest)}m/s"
+            f"{faster}: there its limits are used, downforce and drag unproven; drive faster, or "
+            f"add --v-max {math.floor(fastest)}m/s"
         )
     if forward is None or forward[1][_BRAKING, _BRAKING] > _WIDE**2:
         notes.append(

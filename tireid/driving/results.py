@@ -1,5 +1,6 @@
 """The files of `tireid drive`: numbers as JSON, every signal as CSV, figures as PNG, the film."""
 
+import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
@@ -28,7 +29,7 @@ from tireid.driving.runs import (
     Conditions,
     run_drive,
 )
-from tireid.driving.setup import PERIOD, PLANT, WIDEST, Setup
+from tireid.driving.setup import PERIOD, PLANT, Setup, faster_than
 from tireid.figures.drive import (
     AT_THE_END,
     drive_errors_figure,
@@ -158,7 +159,7 @@ class Drives(NamedTuple):
         limits = first.problem.limits
         figures = {
             "path": drive_path_figure(drives),
-            "errors": drive_errors_figure(drives, off_path=WIDEST, **on_the_way),
+            "errors": drive_errors_figure(drives, off_path=setup.widest, **on_the_way),
             "steering": drive_steering_figure(
                 drives, angle_limit=limits.steering, rate_limit=limits.steering_rate, **on_the_way
             ),
@@ -174,8 +175,20 @@ class Drives(NamedTuple):
             write_film(folder / f"drive.{film}", drawn)
         return images
 
+    @property
+    def faster(self) -> str:
+        """Where the plan is faster than the log of the tires, and what to do; else empty."""
+        speeds = None if self.learnt is None else self.learnt.drives.speeds
+        if speeds is None:
+            return ""
+        top = float(speeds[1])
+        found = faster_than(self.conditions.setup.speeds(), top)
+        slower = f"--speed {math.floor(10.0 * top) / 10.0:g}m/s"
+        return f"{found}: there the tires are extrapolated; add {slower}" if found else ""
+
     def text(self) -> str:
         lines = [headline(self.conditions), text_table([SCORES, *score_rows(self.runs)], "<>><>>")]
+        lines += [self.faster] if self.faster else []
         for run in self.runs:
             got = estimate_scores(run.drive)
             if got is not None:
@@ -283,7 +296,7 @@ def write_drive_report(
         title=f"{first.drive.path.name} on {first.label} tires",
         summary=f"{headline(drives.conditions)}.",
         numbers=_drive_headlines(runs),
-        notes=_drive_notes(runs),
+        notes=_drive_notes(drives),
         sections=[
             Section("How the car drove", _drive_blocks(folder, drives, figures, film)),
             Section("The tracker's tires", known_blocks(runs, figures)),
@@ -305,7 +318,7 @@ def _drive_headlines(runs: _Runs) -> list[Headline]:
     """Return how far the first car was off its path, and whether a step ends in time."""
     first, score = runs[0], runs[0].scores
     s, peak = _farthest(first)
-    end = "" if score.completed else f", who {first.drive.ending}"
+    end = "" if score.completed else f": {first.drive.ending}"
     slow, period = score.solve_ms["p99"], 1e3 * PERIOD
     return [
         Headline(
@@ -328,8 +341,8 @@ def _farthest(run: ClosedLoop) -> tuple[float, float]:
     return float(run.drive.s[k]), float(abs(run.drive.e_y[k]))
 
 
-def _drive_notes(runs: _Runs) -> list[Note]:
-    said = []
+def _drive_notes(drives: Drives) -> list[Note]:
+    runs, said = drives.runs, [Note(f"{drives.faster}.")] if drives.faster else []
     for run in runs:
         scores = run.scores
         if not scores.completed:

@@ -16,7 +16,7 @@ from identifier.methods import continuing
 from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
-from models.rules import require_within
+from models.rules import require_kind, require_within
 from models.tires import Tire
 from models.vehicle import Vehicle
 from mpc.handover.learner import Learner
@@ -34,10 +34,10 @@ from mpc.loop.sensing import (
     inertial_unit,
 )
 from mpc.path import Path, SpeedProfile
-from mpc.problem import Problem
+from mpc.problem import Problem, size_of
 from mpc.realtime import Tracker
 from mpc.tires import PredictionTire, prediction_tire
-from tireid.driving.setup import PERIOD, WIDEST, Setup, SpeedWish, simulated
+from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_drivable, simulated
 from tireid.progress import Progress
 
 _NOTED = 0.1  # change of the grip that is worth a note
@@ -206,10 +206,11 @@ class Conditions:
     @property
     def sensors(self) -> CarSensors:
         """The sensors of the car, in order; those of one seed are the same unit."""
+        size = size_of(self.setup.vehicle)
         if self.kind == IMU:
             rng = np.random.default_rng([self.seed, 3]) if self.noise else None
-            return imu_and_localization(rng)
-        return inertial_unit() if self.noise else CarSensors()
+            return imu_and_localization(rng, size)
+        return inertial_unit(size) if self.noise else CarSensors()
 
     def lateral(self, learnt: TireModel | None = None) -> LateralVelocity | None:
         """Return what estimates v_y on a drive, None where a sensor measures it."""
@@ -279,14 +280,14 @@ def given_tire(label: str, setup: Setup, learnt: TireModel | None) -> Prediction
 
 def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> ClosedLoop:
     """Drive the path once with the tracker on a tire."""
-    setup, problem = conditions.setup, Problem()
+    setup = conditions.setup
+    require_drivable(setup.path, setup.vehicle)
     profile = setup.profile()
     model = given_tire(label, setup, learnt)
     lag = setup.vehicle.require_chassis().steering_lag
     try:
         tracker = Tracker(
             model,
-            problem,
             period=PERIOD,
             delay=conditions.delay * PERIOD + lag,
             caution=conditions.caution,
@@ -318,7 +319,7 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         lateral=conditions.lateral(learnt),
         laps=conditions.laps,
         time_limit=max(_GIVEN_UP[0], _GIVEN_UP[1] * conditions.laps * profile.lap_time),
-        widest=WIDEST,
+        widest=setup.widest,
         plan_every=_PLAN_EVERY,
         name=f"{setup.path.name}, {label}",
         progress=Progress(f"driving on {label} tires"),
@@ -327,7 +328,7 @@ def run_drive(label: str, conditions: Conditions, learnt: TireModel | None) -> C
         label=label,
         model=model,
         final=tracker.tire,
-        problem=problem,
+        problem=tracker.problem,
         drive=driven,
         scores=scores(driven),
         learner=learner,
@@ -386,12 +387,16 @@ def drive(
     VehicleError
         Where the vehicle has no chassis and no identified tires are given.
     ValueError
-        Where a number is not that of a drive, there is no tire to go on learning from or to plan
-        speeds of, speeds are of another path, or no C compiler is there for the tracker.
+        Where a number is not that of a drive, the tire is of another car, there is none to go on
+        learning from or to plan speeds of, speeds are of another path, or no C compiler is there
+        for the tracker.
     """
-    if learning and tire is None:
+    if tire is not None:
+        require_kind(TireModel, "as run.tire", tire=tire)
+        tire.require_car(vehicle)
+    elif learning:
         raise ValueError("learning goes on from a tire: none is given")
-    wish = SpeedWish.of(speeds, tire)
+    wish = SpeedWish.of(speeds, tire, vehicle)
     vehicle, true_tires = (vehicle, tires) if tires else simulated(vehicle, tire)
     conditions = Conditions(
         setup=Setup(path, vehicle, friction, (), wish, tires=true_tires),

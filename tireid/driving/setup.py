@@ -4,6 +4,7 @@ How fast it is follows from what is known of its tires or is given, never from t
 """
 
 import logging
+import math
 import textwrap
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,17 +17,19 @@ from codegen.arrays import Array
 from identifier.speed_limits import SpeedLimits, speed_limits
 from identifier.tire_model import TireModel
 from models.friction import Friction, FrictionChange
-from models.rules import require_positive
+from models.rules import require_within
 from models.tires import MagicFormula, Tire
 from models.vehicle import GRAVITY, Vehicle, sedan
 from mpc.cars import BRAKES, DoubleTrackCar
-from mpc.path import Path, SpeedProfile, speed_profile, steady_speed
+from mpc.path import Path, PathError, SpeedProfile, speed_profile, steady_speed
 from mpc.path.speed import SHARE
+from mpc.problem import Guards, Limits, size_of
 from mpc.tires import PredictionTire, oracle_tire
 from mpc.tires.ladder import cornering_force
 
-WIDEST = 2.0  # deviation at which a car is off the path [m]
-FASTEST = 30.0  # m/s
+_WIDEST = 2.0  # deviation at which a full-size car is off the path [m]
+_FASTEST = 30.0  # m/s, of a full-size car
+_OVERSHOOT = 0.95  # of the radius of a turn, which a spline passes for a moment
 # Share of a given lateral acceleration to drive and brake with: 2 and 3 m/s² on a dry road.
 _DRIVES, _BRAKES = 0.22, 0.33
 PERIOD = 0.01  # control period [s]
@@ -56,12 +59,16 @@ class SpeedWish(NamedTuple):
     profile: SpeedProfile | None = None
 
     @classmethod
-    def of(cls, speeds: SpeedProfile | float | None, tire: TireModel | None) -> "SpeedWish":
+    def of(
+        cls, speeds: SpeedProfile | float | None, tire: TireModel | None, vehicle: Vehicle
+    ) -> "SpeedWish":
         """Return the wish for a profile, for a speed [m/s], or for what a tire allows."""
         if isinstance(speeds, SpeedProfile):
             return cls(profile=speeds)
         if speeds is not None:
-            require_positive(ValueError, **{"speeds in m/s": speeds})
+            name = "speeds in m/s, or a profile of speed_profile,"
+            plans = Guards.of(vehicle)
+            require_within(ValueError, plans.min_speed, plans.max_speed, **{name: speeds})
             return cls(speed=speeds)
         if tire is None:
             raise ValueError("no tire is given that tells the speed: give speeds, such as 15.0 m/s")
@@ -120,6 +127,29 @@ def _scaled_tire(vehicle: Vehicle, like: TireModel, axle: int) -> Tire:
     return replace(tire, coefficients=c)
 
 
+def faster_than(v: Array, fastest: float) -> str:
+    """Return which share of the way is faster than a log, empty where none is.
+
+    v : along the way [m/s].   fastest : of the log [m/s].
+    """
+    share = 100.0 * float(np.mean(v > fastest))
+    return f"{share:.0f} % of the way is faster than the log, {fastest:.1f} m/s" if share else ""
+
+
+def require_drivable(path: Path, vehicle: Vehicle, steering: float = Limits().steering) -> None:
+    """Refuse a path with a turn that the car cannot drive.
+
+    steering : largest angle of the front road wheels [rad].
+    """
+    radius = 1.0 / max(path.peak_curvature, 1e-9)
+    least = vehicle.wheelbase / math.tan(min(steering, 1.5))
+    if radius < _OVERSHOOT * least:
+        raise PathError(
+            f"{path.name}: its tightest turn has a radius of {radius:.3g} m; {vehicle.name} turns "
+            f"in {least:.3g} m at best, {steering:.3g} rad of the front wheels: widen the path"
+        )
+
+
 class Setup(NamedTuple):
     """A car at the start of a path.
 
@@ -154,12 +184,17 @@ class Setup(NamedTuple):
         given = self.mu if mu is None else mu
         return _oracle(self.vehicle, car.tire, given, rear=self.tires and self.tires[1])
 
+    @property
+    def widest(self) -> float:
+        """Deviation at which the car is off the path [m]."""
+        return _WIDEST * size_of(self.vehicle)
+
     def profile(self) -> SpeedProfile:
         """Return the wanted speed along the path.
 
         Where a_y is given it is constant on an open path; a closed one brakes for the bends.
         """
-        return _profile(self.path, self.wish, self.limits)
+        return _profile(self.path, self.wish, self.limits, _FASTEST * size_of(self.vehicle) ** 0.5)
 
     def speeds(self) -> Array:
         """Return the wanted speed at the samples of the path, (n,) [m/s]."""
@@ -189,7 +224,9 @@ class Setup(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def _profile(path: Path, wish: SpeedWish, limits: SpeedLimits | None) -> SpeedProfile:
+def _profile(
+    path: Path, wish: SpeedWish, limits: SpeedLimits | None, fastest: float
+) -> SpeedProfile:
     if wish.profile is not None:
         theirs = wish.profile.path
         if not all(np.array_equal(*pair) for pair in ((theirs.X, path.X), (theirs.Y, path.Y))):
@@ -201,8 +238,8 @@ def _profile(path: Path, wish: SpeedWish, limits: SpeedLimits | None) -> SpeedPr
         if not path.closed:
             return SpeedProfile(path, steady_speed(path, a_y_max=wish.a_y))
         given = SpeedLimits.ellipse(wish.a_y, _DRIVES * wish.a_y, _BRAKES * wish.a_y)
-        return speed_profile(path, given, share=1.0, v_max=FASTEST)
+        return speed_profile(path, given, share=1.0, v_max=fastest)
     if limits is None:
         raise ValueError("no tires were identified that tell how fast: say a speed")
     assert wish.share is not None
-    return speed_profile(path, limits, share=wish.share, v_max=FASTEST, brakes=BRAKES)
+    return speed_profile(path, limits, share=wish.share, v_max=fastest, brakes=BRAKES)

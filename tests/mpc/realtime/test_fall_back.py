@@ -125,7 +125,7 @@ def bends(v_x):
 def test_without_a_plan_the_built_in_car_keeps_its_path(v_x):
     tracker = Blind()
     came = drive(bends(v_x), DoubleTrackCar(CAR), tracker, speed=v_x, rng=np.random.default_rng(0))
-    assert came.completed, came.ending
-    assert len(tracker.seen) > 400
+    assert not came.completed and "planned in 0 of" in came.ending  # but is at the end:
+    assert came.s[-1] > came.path.length - 1.0 and len(tracker.seen) > 400
     assert max(abs(m.e_y) for m in tracker.seen) < 0.5
     assert max(abs(m.kappa[0]) * m.v_x[0] ** 2 for m in tracker.seen) > 0.7  # there are bends
