@@ -15,6 +15,8 @@ from codegen.escape import html
 
 GREEN, RED, AMBER = "#2e8b57", "#d93a32", "#b86e00"
 AXLE_COLORS = ("#3b8ec2", "#d55e00")  # front, rear
+REFUSED = ";opacity:.6"  # look of an answer that is not valid
+STRUCK = f"{REFUSED};text-decoration:line-through"  # of the axle that refuses it
 _WIDTH, _HEIGHT, _ROOM = 420, 200, 16  # of a chart, and for its words [px]
 _CELL = "text-align:left;padding:1px 12px 1px 0;background:none"
 
@@ -34,10 +36,13 @@ def folded(heading: str, lines: Iterable[str]) -> str:
     return inside and f"<details><summary>{html(heading)}</summary>{inside}</details>"
 
 
-def table(rows: Iterable[Sequence[str]]) -> str:
-    """Return a table; its first row is the header."""
+def table(rows: Iterable[Sequence[str]], looks: Sequence[str] = ()) -> str:
+    """Return a table; its first row is the header.   looks : CSS of the other cells of a column."""
     marks = [
-        "".join(f'<{cell} style="{_CELL}">{html(one)}</{cell}>' for one in row)
+        "".join(
+            f'<{cell} style="{_CELL}{look if cell == "td" else ""}">{html(one)}</{cell}>'
+            for one, look in zip(row, looks or repeat(""), strict=False)
+        )
         for cell, row in zip(chain(["th"], repeat("td")), rows, strict=False)
     ]
     return (

@@ -120,9 +120,10 @@ def precision(prefix: str, *, single: bool) -> str:
     """
     macro = f"{prefix.upper()}_SINGLE"
     return (
-        "/* 1: float, 0: double. The library and all who use it must agree. */\n"
+        "/* 1: float, 0: double. Where the library and who uses it disagree they do not link. */\n"
         f"#ifndef {macro}\n#define {macro} {int(single)}\n#endif\n"
-        f"#if {macro}\ntypedef float {prefix}_real;\n#else\ntypedef double {prefix}_real;\n#endif\n"
+        f"#if {macro}\ntypedef float {prefix}_real;\n#define {prefix}_init {prefix}_init_f32\n"
+        f"#else\ntypedef double {prefix}_real;\n#endif\n"
     )
 
 

@@ -10,6 +10,7 @@ of a page changes what is done with the next block:
     <!-- background -->             it runs until the page ends
     <!-- file: car.toml -->         it goes to the end of this file
     <!-- c: ... -->                 declarations that its C needs
+    <!-- printed -->                its lines are of what the block before has printed
 """
 
 import contextlib
@@ -36,10 +37,12 @@ GIVEN = ("car.toml", "log.csv", "other.csv", "tire.json", "out/mine")
 AT_ONCE = 2  # pages; more than two cores are rare where documents are made
 LONGEST = 600  # s of a block: what takes longer hangs
 READ = ("text", "json", "sql", "matlab")  # languages of what is only read; Sphinx has {those}
-INSTALLS = re.compile(r"^pip install .*$", re.M)  # `make docs` has done it
+# `make docs` has done these.
+INSTALLS = re.compile(r"^(pip install |python3 -m venv |\. \.venv/).*$", re.M)
+NUMBER = re.compile(r"-?\d+(\.\d+)?")
 # A comment, or a block with its language.
 PART = re.compile(
-    r"<!-- (?P<word>run|not run|needs|background|file|c):?(?P<rest>.*?)-->"
+    r"<!-- (?P<word>run|not run|needs|background|file|c|printed):?(?P<rest>.*?)-->"
     r"|^(?P<indent> *)```(?P<language>\S*)\n(?P<code>.*?)^(?P=indent)```$",
     re.M | re.S,
 )
@@ -68,10 +71,12 @@ def parts(text: str) -> Iterator[tuple[str, str, str]]:
             yield found["language"], "\n" * line + code, f"{line}"
 
 
-def python(code: str, page: str, names: dict[str, Any]) -> None:
-    """Run Python in the namespace of the page."""
+def python(code: str, page: str, names: dict[str, Any]) -> str:
+    """Run Python in the namespace of the page; return what it prints."""
     try:
-        exec(compile(code, page, "exec"), names)
+        with contextlib.redirect_stdout(io.StringIO()) as out:
+            exec(compile(code, page, "exec"), names)
+        return out.getvalue()
     except Exception as error:
         lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == page]
         line = error.lineno if isinstance(error, SyntaxError) else lines[-1]
@@ -90,8 +95,8 @@ def start(code: str, page: str) -> "subprocess.Popen[str]":
     )
 
 
-def wait(shell: "subprocess.Popen[str]", page: str) -> None:
-    """Wait for shell lines."""
+def wait(shell: "subprocess.Popen[str]", page: str) -> str:
+    """Wait for shell lines; return what they print."""
     try:
         out, _ = shell.communicate(timeout=LONGEST)
     except subprocess.TimeoutExpired:
@@ -99,6 +104,25 @@ def wait(shell: "subprocess.Popen[str]", page: str) -> None:
         raise SnippetError(f"{page}: {shell.args[-1].strip()}: longer than {LONGEST} s") from None
     if shell.returncode:
         raise SnippetError("\n".join(out.splitlines()[-8:]))
+    return out
+
+
+def alike(shown: str, printed: str) -> bool:
+    """Whether two lines are the same but for one in the last digit of a number, and blanks."""
+    words = [line.split() for line in (shown, printed)]
+    return len(words[0]) == len(words[1]) and all(
+        abs(float(a) - float(b)) < 1.5 * 10.0 ** -len(a.partition(".")[2])
+        if NUMBER.fullmatch(a) and NUMBER.fullmatch(b)
+        else a == b
+        for a, b in zip(*words, strict=True)
+    )
+
+
+def compare(shown: str, out: str, page: str) -> None:
+    """Refuse a line of a page that was not printed."""
+    for number, line in enumerate(shown.splitlines(), 1):
+        if line.strip() and not any(alike(line, other) for other in out.splitlines()):
+            raise SnippetError(f"{page}:{number}: is not printed: {line.strip()}")
 
 
 def interrupt(shells: "list[subprocess.Popen[str]]", page: str) -> None:
@@ -132,11 +156,11 @@ def parse_toml(code: str, page: str, line: str) -> None:
 
 
 def run_page(path: Path, folder: Path) -> Ran:
-    """Run a page in a folder; its output is for nobody."""
+    """Run a page in a folder."""
     page = path.relative_to(ROOT).as_posix() if path.is_relative_to(ROOT) else path.name
     names: dict[str, Any] = {"__name__": "__main__"}
-    blocks, left_out, background, said = 0, [], [], {}
-    with contextlib.chdir(folder), contextlib.redirect_stdout(io.StringIO()):
+    blocks, left_out, background, said, out = 0, [], [], {}, ""
+    with contextlib.chdir(folder):
         try:
             for kind, content, line in parts(path.read_text(encoding="utf-8")):
                 if kind == "run":
@@ -154,19 +178,24 @@ def run_page(path: Path, folder: Path) -> Ran:
                     with Path(said["file"]).open("a", encoding="utf-8") as file:
                         file.write(content.lstrip("\n"))
                 elif kind == "python":
-                    python(content, page, names)
+                    out = python(content, page, names)
                 elif kind == "sh":
                     shell = start(INSTALLS.sub(":", content), page)
-                    background.append(shell) if "background" in said else wait(shell, page)
+                    if "background" in said:
+                        background.append(shell)
+                    else:
+                        out = wait(shell, page)
                 elif kind == "c":
                     compile_c(content, said.get("c", ""), page)
                 elif kind == "toml":
                     parse_toml(content, page, line)
+                elif "printed" in said:
+                    compare(content, out, page)
                 elif not reads:
                     raise SnippetError(
                         f"{page}:{line}: nothing runs a block of {kind or 'no language'}"
                     )
-                blocks += "not run" not in said and not reads
+                blocks += "not run" not in said and ("printed" in said or not reads)
                 said = {}
         finally:
             interrupt(background, page)

@@ -28,7 +28,7 @@ _SIDEWAYS = 0.0045  # [rad] of b/v + β that is noted, and
 _SURELY = 5.0  # its standard deviations: 0 of 46 simulated logs, 32 of 32 planted errors
 _APART = 0.33  # sd of b/sd_b - β/sd_β, up to which both are apart: 0.7 of what is believed
 
-ONE_SPEED = ": a bias, or its sensor is turned; one speed cannot tell"
+UNSEPARATED = ": a bias, or its sensor is turned; this log cannot separate them"
 _ROWS = (  # title, unit that is printed, per SI, of NUMBERS
     ("zero of the steering", "°", math.degrees(1.0)),
     ("bias of v_y", " m/s", 1.0),
@@ -159,29 +159,30 @@ class Day:
     def _sideways(self) -> str:
         where = [NUMBERS.index("v_y_bias"), NUMBERS.index("v_y_angle")]
         b, beta = where
-        text = sideways(self.value[where], self.covariance[np.ix_(where, where)], self.speed)
-        if not (text and self.anew):
+        found = sideways(self.value[where], self.covariance[np.ix_(where, where)], self.speed)
+        if found is None or not self.anew:
             return ""
         both = np.array([1.0, -1.0]) / np.maximum(self.usual[where], 1e-12)
         if both @ self.covariance[np.ix_(where, where)] @ both < _APART**2:
             known = ", ".join(f"{_ROWS[k][0]} {self.words[_ROWS[k][0]]}" for k in (b, beta))
-            return f"{text}: {known}; the forces allow for it"
-        return f"{text}{ONE_SPEED}"
+            return f"{found[2]}: {known}; the forces allow for it"
+        return f"{found[2]}{UNSEPARATED}"
 
 
-def sideways(errors: Array, covariance: Array, speed: float) -> str:
-    """Return by how much v_y reads wrong at a speed, in words; empty where that is little.
+def sideways(errors: Array, covariance: Array, speed: float) -> tuple[float, float, str] | None:
+    """Return how much too much v_y reads at a speed, its deviation [m/s], both in words; or None.
 
     At one speed bias and mounting angle are one error, and each hides behind half of its prior.
     errors, covariance : bias [m/s] and mounting angle [rad] of v_y, (2,), (2, 2).
-    speed : [m/s].
+    speed : median of the log [m/s].
     """
     h = np.array([1.0 / speed, 1.0])
     s, sd = float(h @ errors), math.sqrt(max(float(h @ covariance @ h), 0.0))
     if not abs(s) > max(_SIDEWAYS, _SURELY * sd):
-        return ""
+        return None
     said, much = with_doubt(abs(s) * speed, sd * speed), "much" if s > 0.0 else "little"
-    return f"v_y reads {said} m/s too {much} at {speed:.3g} m/s"
+    text = f"v_y reads {said} m/s too {much} at the median speed of {speed:.3g} m/s"
+    return s * speed, sd * speed, text
 
 
 def corrected(recording: Recording, value: Array) -> Recording:

@@ -42,6 +42,8 @@ def vehicle_numbers(vehicle: Vehicle) -> dict[str, Any]:
 
 def vehicle_from(data: Mapping[str, Any]) -> Vehicle:
     table = Table(data, "", FrozenModelError, "vehicle.")
+    for key in BICYCLE:
+        table.value(key)  # `Vehicle` would estimate it
     return Vehicle(**table.record(Vehicle, skip=("chassis",)))
 
 

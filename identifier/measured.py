@@ -1,12 +1,18 @@
 """A value and its standard deviation as people read them: three digits, ± and one unit.
 
-Files keep SI; what is printed is kN/rad where they have N/rad.
+Files keep SI; what is printed is kN and kN/rad where a value reaches 1000 of it.
 """
 
 import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from codegen.arrays import Array
 
 DIGITS = 3  # of a value, or of its standard deviation where that is larger
-_PRINTED = {"N/rad": (1e-3, "kN/rad")}  # factor and unit of what is printed
+_KILO = 1000.0  # N, N/rad: from here on of a car, below of a model of one
 NOT_IDENTIFIABLE = "not identifiable from this drive"
 
 
@@ -33,17 +39,29 @@ def _places(size: float, digits: int) -> int:
     return digits - 1 - math.floor(math.log10(float(f"{size:.{digits - 1}e}")))
 
 
-def printed_value(value: float, sd: float | None, unit: str) -> str:
-    """Return a value with its standard deviation in the unit that is printed.
-    unit : of both; "N/rad" is printed as kN/rad.
+def printed_unit(unit: str, values: Array | Sequence[float]) -> tuple[str, float]:
+    """Return the unit in which values of SI are printed beside one another, and its size.
+
+    values : any shape; what is not finite does not count.
     """
-    scale = printed_scale(unit)
-    return with_doubt(scale * value, None if sd is None else scale * sd)
+    size = np.abs(values)
+    large = size[np.isfinite(size)].max(initial=0.0) >= _KILO and unit in ("N", "N/rad")
+    return (f"k{unit}", _KILO) if large else (unit, 1.0)
 
 
-def printed_scale(unit: str) -> float:
-    return _PRINTED.get(unit, (1.0, unit))[0]
+def as_printed(numbers: Iterable[Any]) -> list[Any]:
+    """Return numbers of axles (value, sd, unit) in the units that are printed, one for both."""
+    numbers = list(numbers)
+    found = []
+    for one in numbers:
+        unit, size = printed_unit(one.unit, [o.value for o in numbers if o.unit == one.unit])
+        sd = None if one.sd is None else one.sd / size
+        found.append(one._replace(value=one.value / size, sd=sd, unit=unit))
+    return found
 
 
-def printed_unit(unit: str) -> str:
-    return _PRINTED.get(unit, (1.0, unit))[1]
+def stiffness_words(both: Array, sd: Array | None = None) -> str:
+    """Return the stiffness of front and rear [N/rad], as in "127 ± 5 / 110 ± 4 kN/rad"."""
+    unit, size = printed_unit("N/rad", both)
+    doubt = [None] * len(both) if sd is None else sd / size
+    return f"{' / '.join(map(with_doubt, both / size, doubt))} {unit}"

@@ -116,7 +116,10 @@ def require_method(name: str) -> None:
         return
     if name in RIVALS:
         raise ValueError(f"method {name} is not installed: {INSTALL}")
-    raise ValueError(f"method must be one of {', '.join(methods())}, not {name!r}")
+    raise ValueError(
+        f"method must be one of {', '.join(methods())}, not {name!r}; {DEFAULT} is the default, "
+        f"{REFERENCE} the paper's"
+    )
 
 
 def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01, *, v_y: bool = True) -> Method:
@@ -136,7 +139,14 @@ def continuing(model: TireModel, vehicle: Vehicle, dt: float = 0.01, *, v_y: boo
 
 
 def methods() -> tuple[str, ...]:
-    """Return the names of all methods, the default first, those of other distributions last."""
+    """Return the names of all methods, the default first, those of other distributions last.
+
+    fit : curves and car from the whole log; v_y is estimated where there is none.
+    axle : the same sample by sample, as in a car; it needs v_y.   inertial : it without v_y.
+    integral, instantaneous, instantaneous_scaled, pi_lead : network and laws of the paper (Hong and
+    Choi), the first as it proposes.
+    linear : the declared stiffnesses.   lagged_ekf : an extended Kalman filter of the force.
+    """
     return (*METHODS, *(name for name in installed(GROUP) if name not in METHODS))
 
 

@@ -11,6 +11,7 @@ from identifier.measured import with_doubt
 from identifier.reproducibility import AxleRmse, axle_rms, counted_samples
 from identifier.tire_model import TireModel
 from identifier.verdict import RoadFriction, Verdict, friction_of, judge_prediction
+from identifier.verdict.verdict import LARGEST_MODEL_ERROR
 from models.recordings import Recording
 
 
@@ -70,16 +71,25 @@ class Prediction:
         return self.verdict.friction or friction_of(self.model, self.recording)
 
     def motion_text(self) -> str:
-        """Return what the forces explain of the motion, in a line; empty where unknown."""
-        if self.motion is None:
+        """Return what the forces explain of the motion, in a line; empty where unknown.
+
+        Yaw is left out where its moment is a smaller share of that of an axle than a valid model
+        may miss.
+        """
+        motion = self.motion
+        if motion is None:
             return ""
-        parts = zip(("lateral", "yaw"), self.motion.explained, strict=True)
+        m, I_z, l_f, l_r = self.model.vehicle.bicycle[:4]
+        moment = m * l_f * l_r / (l_f + l_r) * motion.lateral_rms
+        small = 0.0 < I_z * motion.yaw_rms < LARGEST_MODEL_ERROR * moment
+        parts = zip(("lateral", "yaw")[: 2 - small], motion.explained, strict=False)
         shares = [
             f"{f'{100.0 * share:.1f} %' if share > 0.0 else 'nothing'} of the {name}"
             for name, share in parts
             if share is not None
         ]
-        return f"explained are {' and '.join(shares)} acceleration" if shares else ""
+        said = f"explained are {' and '.join(shares)} acceleration" if shares else ""
+        return said + "; the yaw acceleration is too small to check the model" * small
 
 
 def predict(model: TireModel, recording: Recording, *, since: float | None = None) -> Prediction:

@@ -30,6 +30,18 @@ class Port(NamedTuple):
     rule: str = ""
 
 
+class Range(NamedTuple):
+    """What learnt numbers of a port keep: low <= Σ shares_i x_i <= high.
+    first : of them, in the port by rows.   shares : one for each number in turn.
+    """
+
+    port: str
+    first: int
+    low: float
+    high: float
+    shares: tuple[float, ...] = (1.0,)
+
+
 AXLE_FORCE = Port(
     "axle_force", "N", "lateral axle forces, front and rear, left positive, frame of the body"
 )
@@ -64,6 +76,7 @@ class Setup(NamedTuple):
     Between segments of a drive the step is shown `rest` samples, after which it begins anew with
     what it has learnt (`identifier.refused`): a step that judges samples itself as many as end a
     run of it, `ends_run`, every other one.
+    ranges : where numbers that are taken over must lie, beside the rules of their ports.
     """
 
     scan: Scan
@@ -72,6 +85,7 @@ class Setup(NamedTuple):
     observe: Callable[[Array], Mapping[str, Array]] | None = None
     only_with_a_y: tuple[str, ...] = ()
     ends_run: int | None = None
+    ranges: tuple[Range, ...] = ()
 
     @property
     def rest(self) -> int:

@@ -8,7 +8,7 @@ import importlib
 import json
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Self, overload
@@ -24,13 +24,19 @@ from identifier.band import AXLES as AXLES
 from identifier.band import Axle as Axle
 from identifier.band import Band, of_axle
 from identifier.frozen import FORMAT, FrozenModelError, require_alive
-from identifier.measured import NOT_IDENTIFIABLE, printed_unit, printed_value
+from identifier.measured import (
+    NOT_IDENTIFIABLE,
+    as_printed,
+    printed_unit,
+    stiffness_words,
+    with_doubt,
+)
 from identifier.setup import Setup
 from models.files import write_atomically
 from models.recordings import Recording
 from models.recordings.portion import Portion
 from models.schema import Table, read_json
-from models.vehicle import DOWNFORCE_SPEED, Vehicle
+from models.vehicle import AREAS, BICYCLE, DOWNFORCE_SPEED, Vehicle
 
 if TYPE_CHECKING:  # what some models answer with
     from identifier.day import Day
@@ -66,7 +72,7 @@ class Fact(NamedTuple):
     @property
     def words(self) -> list[str]:
         """The values in three digits, 127000 as such and not as 1.27e+05."""
-        return [printed_value(float(value), None, self.unit) for value in self.values]
+        return [with_doubt(float(value)) for value in self.values]
 
 
 class Estimate(NamedTuple):
@@ -86,7 +92,7 @@ class Estimate(NamedTuple):
     @property
     def words(self) -> str:
         """Value and standard deviation in three digits, and whether the drive left it open."""
-        value = printed_value(self.value, self.sd, self.unit)
+        value = with_doubt(self.value, self.sd)
         return value if self.identified else f"{value} ({NOT_IDENTIFIABLE})"
 
     def with_model_error(self, share: float) -> "Estimate":
@@ -265,6 +271,19 @@ class TireModel(ABC):
             f"forces of a {type(self).__name__} do not scale with load: {vehicle.name}"
         )
 
+    def require_car(
+        self,
+        driven: Vehicle,
+        name: str = "tire",
+        remedy: str = "give that car, or tire.mounted_on(car)",
+    ) -> None:
+        """Refuse another car than the tires were learnt on, whatever either is called."""
+        for key in (*BICYCLE, *AREAS):
+            mine, theirs = getattr(self.vehicle, key), getattr(driven, key)
+            if mine != theirs:
+                apart = f"{key} {mine:.6g}, driven {theirs:.6g}"
+                raise ValueError(f"{name} is of another car ({apart}): {remedy}")
+
     def at_friction(self, ratio: float) -> "TireModel":
         """Return the tires on a road of another friction, φ(α) → μ φ(α/μ): the stiffness stays.
 
@@ -298,6 +317,10 @@ class TireModel(ABC):
         recording : its signals are the input; its forces are not looked at.
         """
         return self.setup(recording.dt).output(recording, "axle_force")
+
+    def lagged_slip(self, recording: Recording) -> Array:
+        """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
+        return recording.alpha(self.vehicle.l_f, self.vehicle.l_r)
 
     @overload
     def force(self, alpha: float, axle: Axle, *, v_x: float | None = None) -> float: ...
@@ -404,9 +427,9 @@ class TireModel(ABC):
             fact = Fact("model error on the identification drive", 100.0 * error, "%")
             rows.append([f"{fact.title} [{fact.unit}]", *fact.words])
         by_title: dict[str, dict[str, str]] = {}
-        for one in self.estimates():
+        for one in as_printed(self.estimates()):
             share = 0.0 if error is None else float(error[AXLES.index(one.axle)])
-            title = f"{one.title} [{printed_unit(one.unit)}]"
+            title = f"{one.title} [{one.unit}]"
             by_title.setdefault(title, {})[one.axle] = one.with_model_error(share).words
         rows += [[title, *(cells.get(axle, "") for axle in AXLES)]
                  for title, cells in by_title.items()]  # fmt: skip
@@ -417,32 +440,41 @@ class TireModel(ABC):
         band = [] if self.band is None else [f"band: {self.band.origin}"]
         return [*band, self.vehicle.estimates] if self.vehicle.estimates else band
 
-    def _repr_html_(self) -> str:
+    def drawn_slip(self) -> tuple[Array, NDArray[np.bool_]]:
+        """Return slip angles for a drawing [rad] (k,), and whether each axle knows them (k, 2)."""
         known = np.full(2, np.inf) if self.known_slip is None else self.known_slip
         reach = _REACH * float(known.max())
         slip = np.linspace(-1.0, 1.0, _POINTS) * (reach if 0.0 < reach < np.inf else _UNKNOWN_REACH)
+        return slip, np.abs(slip)[:, None] <= known
+
+    def _repr_html_(self, looks: Sequence[str] = ("", "")) -> str:
+        slip, known = self.drawn_slip()
         force, ends = self.force(slip), () if self.band is None else self.band.at(slip)
+        unit, size = printed_unit("N", force)
         curves = [
             markup.Curve(
                 axle,
                 color,
-                force[:, k] / 1e3,
-                np.abs(slip) <= known[k],
-                [end[:, k] / 1e3 for end in ends],
+                force[:, k] / size,
+                known[:, k],
+                [end[:, k] / size for end in ends],
             )
             for k, (axle, color) in enumerate(zip(AXLES, markup.AXLE_COLORS, strict=True))
         ]
         return markup.card(
             markup.line(f"of {self.vehicle.name}", type(self).__name__),
-            markup.table(self._rows()),
-            markup.chart(np.degrees(slip), curves, "slip angle [deg]", "lateral force [kN]"),
+            markup.table(self._rows(), ("", *looks)),
+            markup.chart(np.degrees(slip), curves, "slip angle [deg]", f"lateral force [{unit}]"),
             *map(markup.line, self._remarks()),
         )
 
     def casadi_function(self) -> _TireFunctions:
         """Return force curve, equations of motion and prediction step, the weights in them.
 
-        Speed must be positive. Where the slip lags, a step holds the lag above half of itself.
+        Speed must be positive. `dynamics` is stiff: the lag vanishes where a tire slides. Integrate
+        it implicitly or by `step`, which holds the lag above half of itself: beyond the grip v_y is
+        off by 10 % with steps of 50 ms, by 1 % with 10 ms. Explicit Runge-Kutta goes wrong there
+        with steps above 2 ms.
         """
         x = ca.MX.sym("x", 4 if self.lagged else 2)
         delta, v_x, dt = ca.MX.sym("delta"), ca.MX.sym("v_x"), ca.MX.sym("dt")
@@ -499,14 +531,13 @@ class TireModel(ABC):
         return load_model(path)
 
     def __repr__(self) -> str:
-        front, rear = Fact(STIFFNESS, self.stiffness, "N/rad").words
         known = (
             ""
             if self.known_slip is None
             else ", known to {:.1f} / {:.1f} deg".format(*np.degrees(self.known_slip))
         )
         name = f"{type(self).__name__} of {self.vehicle.name!r}"
-        return f"<{name}: stiffness {front} / {rear} kN/rad{known}>"
+        return f"<{name}: stiffness {stiffness_words(self.stiffness)}{known}>"
 
 
 class StaticModel(TireModel):

@@ -2,7 +2,7 @@
 
 import math
 import os
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 
 from codegen.errors import TireidError
 
@@ -57,12 +57,3 @@ def limits() -> InputLimits:
                 f"{VARIABLE} must hold NAME=NUMBER of {', '.join(known)}, not {displayed(word)}"
             )
     return InputLimits(**given)
-
-
-def limits_text() -> str:
-    """Return the limits that hold, and how to raise them, for the help of commands."""
-    values = " ".join(f"{name}={value:g}" for name, value in asdict(limits()).items())
-    return (
-        f"Contents of files and sizes in commands are limited: {values}. The environment "
-        f'{VARIABLE}="samples=1e9 megabytes=4e4" raises limits, or lowers them.'
-    )

@@ -11,6 +11,7 @@ limit : field of `InputLimits` that says how many megabytes it may hold.
 import gzip
 import json
 import math
+import re
 import stat
 import tomllib
 import types
@@ -28,11 +29,11 @@ from models.limits import VARIABLE
 from models.limits import InputLimits as InputLimits
 from models.limits import LimitError as LimitError
 from models.limits import limits as limits
-from models.limits import limits_text as limits_text
 
 CHUNK = 1 << 20  # bytes that are unpacked at a time
 _SWELLS, _SWOLLEN_FROM = 200, 1 << 28  # times that a log packs, judged beyond so many bytes
 LONGEST_NAME = 200  # characters
+_DECIMAL_COMMA = re.compile(r"^\s*\w+\s*=\s*[+-]?\d+,\d", re.MULTILINE)
 
 
 def require_few(refusal: type[ValueError], where: str, count: float, limit: str, what: str) -> None:
@@ -165,7 +166,8 @@ def read_toml(path: Path, refusal: type[ValueError]) -> dict[str, Any]:
     except RecursionError:
         raise refusal(f"{path}: cannot be read as TOML: tables or lists too deep") from None
     except ValueError as error:
-        raise refusal(f"{path}: cannot be read as TOML: {_said(error)}") from None
+        comma = "; a decimal point, not a comma?" * bool(_DECIMAL_COMMA.search(text))
+        raise refusal(f"{path}: cannot be read as TOML: {_said(error)}{comma}") from None
     _require_small(path, data, refusal)
     return data
 

@@ -28,6 +28,9 @@ from models.schema import Table, read_toml, require_name, toml_table
 # plant never starts from a value that is not physical.
 
 
+_DATA = Path(__file__).resolve().parent / "data"  # cars and tires that are built in
+
+
 class VehicleError(TireidError, ValueError):
     """A vehicle parameter breaks a rule; the message names the key, the rule and the value."""
 
@@ -144,6 +147,8 @@ def _from_folder(value: Any, folder: Path) -> Any:
     """Return a path as it is named in a file of a folder; another value itself."""
     if not isinstance(value, Path):
         return value
+    if value.parent == _DATA and not (folder / value.name).exists():
+        return value.name
     try:
         return Path(os.path.relpath(value, folder)).as_posix()
     except ValueError:  # another drive
@@ -246,10 +251,11 @@ class Vehicle:
     Parameters
     ----------
     mass : total mass [kg].
-    yaw_inertia : moment of inertia about the vertical axis [kg m^2].
+    yaw_inertia : moment of inertia about the vertical axis [kg m^2]; estimated where left out.
     l_f, l_r : distance from the center of gravity to the front and rear axle [m].
     cornering_stiffness_front, cornering_stiffness_rear : slope of the lateral force of the axle
-        (both tires) over its slip angle at zero, at its static load [N/rad].
+        (both tires) over its slip angle at zero, at its static load [N/rad]; estimated where left
+        out.
     downforce_area_front, downforce_area_rear : coefficient of downforce times area of the axle
         [m^2]: it adds ½ ρ A v_x^2 to the static load; negative where the body lifts.
     cg_height : height of the center of gravity above the road [m]; None is that of the chassis, or
@@ -266,11 +272,11 @@ class Vehicle:
 
     name: str = "car"
     mass: float
-    yaw_inertia: float
+    yaw_inertia: float = None  # type: ignore[assignment]  # a number from `__post_init__` on
     l_f: float
     l_r: float
-    cornering_stiffness_front: float
-    cornering_stiffness_rear: float
+    cornering_stiffness_front: float = None  # type: ignore[assignment]
+    cornering_stiffness_rear: float = None  # type: ignore[assignment]
     downforce_area_front: float = 0.0
     downforce_area_rear: float = 0.0
     cg_height: float | None = None
@@ -283,6 +289,11 @@ class Vehicle:
 
     def __post_init__(self) -> None:
         require_name(VehicleError, "name", self.name)
+        if missing := [name for name in _RULES if getattr(self, name) is None]:
+            typical = estimate(self.mass, self.l_f, self.l_r)
+            for name in missing:
+                object.__setattr__(self, name, typical[name])
+            object.__setattr__(self, "estimated", tuple(dict.fromkeys([*self.estimated, *missing])))
         for name in self.estimated:
             if name not in _RULES:
                 raise VehicleError(
@@ -411,7 +422,7 @@ class Vehicle:
 
     @property
     def froude_time(self) -> float:
-        """Time that scales with the size of a car, sqrt(L/g) [s]: 0.5 for a sedan."""
+        """Time that scales with the size of a car, sqrt(L/g) [s], 0.5 for a sedan."""
         return math.sqrt(self.wheelbase / GRAVITY)
 
     @property
@@ -483,7 +494,8 @@ class Vehicle:
 
         Parameters
         ----------
-        path : the TOML file; a relative `tire` in [chassis] starts from its folder.
+        path : the TOML file; a relative `tire` in [chassis] starts from its folder. One that is not
+            there and has the name of a built-in tire, `sedan.tir`, is that one.
         """
         file = Path(path)
         if not file.exists():
@@ -494,13 +506,7 @@ class Vehicle:
         inner = data.pop("chassis", None)
         table, outside = Table(data, f"{file}: ", VehicleError), ("chassis", "estimated")
         table.only_fields(cls, skip=outside)  # before what is missing
-        size = [table.number(key) for key in ("mass", "l_f", "l_r")]
-        missing = tuple(key for key in _RULES if key not in data)
-        try:
-            data |= {key: value for key, value in estimate(*size).items() if key in missing}
-        except VehicleError as error:
-            raise VehicleError(f"{file}: {error}") from None
-        values = table.record(cls, skip=outside) | {"estimated": missing}
+        values = table.record(cls, skip=outside)
         parts: dict[str, Any] = {}
         if inner is not None:
             body = Table(inner, f"{file}: ", VehicleError, "chassis.")
@@ -509,7 +515,10 @@ class Vehicle:
         try:
             car = cls(**values)
             if "tire" in parts:
-                parts["tire"] = (file.parent / parts["tire"]).resolve()
+                named = (file.parent / parts["tire"]).resolve()
+                built_in = _DATA / parts["tire"]
+                bare = built_in.parent == _DATA and built_in.is_file()
+                parts["tire"] = built_in if bare and not named.exists() else named
             return car if inner is None else replace(car, chassis=typical_chassis(car, parts))
         except (ValueError, RuntimeError) as error:  # RuntimeError: a link that leads to itself
             raise VehicleError(f"{file}: {error}") from None
@@ -521,7 +530,8 @@ class Vehicle:
 
         Parameters
         ----------
-        path : the file to write; a tire file is named relative to its folder.
+        path : the file to write; a tire file is named relative to its folder, a built-in one by
+            its name, so that the file may move.
         overwrite : replace a file that is already there.
 
         Raises
@@ -552,7 +562,7 @@ class Vehicle:
 
 def sedan() -> Vehicle:
     """Return the documented mid-size sedan; its file says where each value comes from."""
-    return Vehicle.from_toml(Path(__file__).parent / "data" / "sedan.toml")
+    return Vehicle.from_toml(_DATA / "sedan.toml")
 
 
 def vehicle_template() -> str:
@@ -560,4 +570,4 @@ def vehicle_template() -> str:
 
     It can be read as it is; its numbers are those of `sedan`.
     """
-    return (Path(__file__).parent / "data" / "template.toml").read_text(encoding="utf-8")
+    return (_DATA / "template.toml").read_text(encoding="utf-8")

@@ -2,9 +2,11 @@
 
 import ast
 import inspect
+import json
 import re
 from importlib import import_module
 from pathlib import Path
+from statistics import median
 from types import ModuleType
 
 import tireid as ti
@@ -279,6 +281,48 @@ def test_links_of_documents_lead_to_files():
         assert not dead_links(path, path.read_text(encoding="utf-8")), path
     planted = "[a](docs/nowhere.md), [b](docs/index.md), [c](#tireid), [d](docs/limits.md#nothing)"
     assert dead_links(ROOT / "README.md", planted) == ["docs/nowhere.md", "docs/limits.md#nothing"]
+
+
+PLAIN = 20, 45  # words of a sentence: below in the median, and at most
+ASIDE = r"""<!--\ table.*?<!--\ end\ -->|<!--.*?-->   # tables that are written, comments
+    |^(\ *)```.*?^\1```$|^(?:\#|\ *\||\(.*\)=).*?$   # code, headings, tables, targets of links"""
+
+
+def sentences(text):
+    """The words of each sentence of a page; code is one word, and an item of a list a sentence."""
+    prose = re.sub(ASIDE, "", text, flags=re.M | re.S | re.X)
+    prose = re.sub(r"`[^`]*`", "code", prose)
+    prose = re.sub(r"!?\[([^]]*)\]\([^)]*\)", r"\1", prose)
+    ends = r"(?<=[.!?])\s+|\n\s*\n|\n\s*(?:[-*]|\d+\.)\s"
+    found = (re.findall(r"\S*\w\S*", one) for one in re.split(ends, f"\n{prose}"))
+    return [words for words in found if words]
+
+
+def text_of(path):
+    text = path.read_text(encoding="utf-8")
+    if path.suffix != ".ipynb":
+        return text
+    cells = (one for one in json.loads(text)["cells"] if one["cell_type"] == "markdown")
+    return "\n\n".join("".join(one["source"]) for one in cells)
+
+
+def long_sentences(text):
+    """Sentences that are too long, or the median where that is."""
+    counts = [(len(words), " ".join(words)) for words in sentences(text)]
+    half = median([n for n, _ in counts] or [0])
+    return [one for one in counts if one[0] > PLAIN[1]] + [half] * (half >= PLAIN[0])
+
+
+def test_sentences_of_every_page_are_short():
+    pages = [*DOCUMENTS, ROOT / "SECURITY.md", *(ROOT / "docs").rglob("*.ipynb")]
+    wrong = {path.name: long_sentences(text_of(path)) for path in pages}
+    assert not {name: found for name, found in wrong.items() if found}
+    assert sentences("# A heading\n\nOne `two words` [three](x.md). Four.\n- Five\n| six |\n") == [
+        ["One", "code", "three."],
+        ["Four."],
+        ["Five"],
+    ]
+    assert long_sentences(f"{'word ' * 46}.\nShort.")[0][0] == 46
 
 
 def test_every_page_is_in_the_table_of_contents():

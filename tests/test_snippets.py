@@ -61,6 +61,13 @@ c = 5;
    from pathlib import Path
    d = a + int(Path("some.toml").read_text()[-2])
    ```
+```sh
+echo "force  119 ± 6 N, valid"
+```
+<!-- printed -->
+```text
+force    120 ± 6 N, valid
+```
 <!-- background -->
 ```sh
 echo $$ > process; sleep 100
@@ -70,7 +77,7 @@ echo $$ > process; sleep 100
 
 def test_blocks_run_in_order_in_one_namespace_and_folder(tmp_path):
     ran = run_page(page(tmp_path, SHOWN), tmp_path)
-    assert ran.blocks == 6 and ran.names["d"] == 5
+    assert ran.blocks == 8 and ran.names["d"] == 5
     assert (tmp_path / "written").read_text() == "2\n3\n"
     assert [line.split("page.md:")[1] for line in ran.left_out] == [
         "11: needs a car",
@@ -87,6 +94,7 @@ def test_blocks_run_in_order_in_one_namespace_and_folder(tmp_path):
         ("<!-- background -->\n```sh\necho bad; exit 4\n```\n<!-- run: sleep 0.3 -->\n", "bad"),
         ("<!-- c: int d; -->\n\n```c\nd = 1;\ne = 2;\n```\n", "page.md:5:"),
         ("```toml\na = = 1\n```\n", "page.md:1: Invalid value (at line 2"),
+        ("```sh\necho 0.52\n```\n<!-- printed -->\n```text\n0.54\n```\n", "page.md:6: is not"),
         ("```fortran\nEND\n```\n", "page.md:1: nothing runs a block of fortran"),
     ],
 )

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from tireid.driving.tracker import VehicleState as VehicleState
     from tireid.emitting import emit as emit
     from tireid.exporting import export as export
-    from tireid.figures.lap import plot as _plot
+    from tireid.figures.plot import plot as _plot
     from tireid.learning import identify as identify
     from tireid.learning import replay as replay
     from tireid.live.live import Live as Live
@@ -87,5 +87,5 @@ _NAMES = {  # by the module that they lie in
 }
 _HOMES = {name: f"{module}:{name}" for module, names in _NAMES.items() for name in names.split()}
 _HOMES |= {"errors": "tireid.errors", "paths": "mpc.path"}
-_HOMES |= {"plot": "tireid.figures.lap:plot", "__version__": "tireid.version:VERSION"}
+_HOMES |= {"plot": "tireid.figures.plot:plot", "__version__": "tireid.version:VERSION"}
 __getattr__, __dir__ = face(__name__, _HOMES)

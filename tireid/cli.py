@@ -13,7 +13,7 @@ from types import FrameType
 from typing import NoReturn
 
 import tireid
-from models.limits import LimitError, limits_text
+from models.limits import VARIABLE, limits
 from tireid.commands import (
     BAD_INPUT,
     COMMANDS,
@@ -40,12 +40,13 @@ class _Parser(argparse.ArgumentParser):
 
 def build_parser(words: Sequence[str]) -> _Parser:
     """Return the parser of a command line: all commands, and the options of the one it names."""
+    limits()  # refuses an environment that holds none
     parser = _Parser(
         prog="tireid",
         description="Turns a driving log into the car's tire curves, with error bars and a "
         "verdict. Begin with tireid demo, or with tireid sample and tireid identify. A command is "
         "explained by tireid COMMAND --help, words by docs/first_steps.md and docs/glossary.md.",
-        epilog=limits_text(),
+        epilog=f'Sizes are limited; an error names the limit, {VARIABLE}="samples=1e9" raises it.',
     )
     parser.add_argument("--version", action="store_true", help="show the version and exit")
     parser.add_argument("--debug", action="store_true", help="show the traceback of an error")
@@ -76,7 +77,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     words = sys.argv[1:] if arguments is None else list(arguments)
     try:
         parser = build_parser(words)
-    except (LimitError, ValueError) as error:  # of the environment; of another's command
+    except ValueError as error:  # of the environment; of another's command
         complain(f"tireid: error: {one_line(error)}")
         return BAD_INPUT
     options = parser.parse_args(words)

@@ -48,6 +48,7 @@ NAMES = {  # of findings by their code, where the code is not the word
     "steering_ratio": "angle of the steering wheel, ratio",
     "straight": "hardly any corner",
     "unit": "wrong unit",
+    "v_y_reads": "reads wrong by",
     "velocity_sensor_angle": "velocity sensor turned",
     "velocity_sensor_x": "velocity sensor ahead of the c.g.",
     "yaw_inertia": "yaw inertia, times the right one",
@@ -103,6 +104,18 @@ def diagnosis_text(diagnosis: Diagnosis, *, unobservable: bool = True) -> str:
     return "\n".join([f"doctor: {count} finding{'s' * (count > 1)}", table, *said])
 
 
+def unsure_text(diagnosis: Diagnosis, path: Path) -> str:
+    """Return why nothing was repaired, and how to do it by hand in a log.toml."""
+    repairs = [repair_text(one.repair) for one in diagnosis.findings if one.repair]
+    said = f"no sure repair: with {path} the log stays as it is"
+    if not repairs:
+        return said
+    return (
+        f"{said}. Each repair has a rival that fits nearly as well, or rests on one that has. By "
+        f"hand: write what you measured under [repair] in {path}: {'; '.join(repairs)}"
+    )
+
+
 def _tone_of(diagnosis: Diagnosis) -> Tone:
     """Return what a diagnosis says of a log: good, in doubt, or bad where a finding matters."""
     if not diagnosis.healthy:
@@ -115,11 +128,9 @@ def diagnosis_notes(diagnosis: Diagnosis, verdict: Verdict | None = None) -> lis
     if verdict is None:
         found = diagnosis.findings
         return [Note(printed(one.text), "bad" if one.matters else "") for one in found]
-    said, texts = (
-        {one.text for one in verdict.findings},
-        (f"doctor: {one.text}" for one in diagnosis.findings),
-    )
-    return [Note(printed(text)) for text in texts if text not in said]
+    said = {word for one in verdict.findings for word in (one.code, one.text)}
+    texts = {f"doctor: {one.text}": one.code for one in diagnosis.findings}
+    return [Note(printed(text)) for text, code in texts.items() if not said & {text, code}]
 
 
 def diagnosis_section(diagnosis: Diagnosis, heading: str = "Doctor") -> Section:

@@ -13,12 +13,13 @@ from identifier.export.ggv import ggv_text
 from identifier.export.slipx import slipx_files
 from identifier.export.steady import Understeer, steady_text, understeer_gradient
 from identifier.export.tir import tire_properties
-from identifier.tire_model import AXLES, TireModel
+from identifier.tire_model import AXLES, TireModel, load_model, stored_verdict
 from models.files import resolved, write_atomically
 from tireid.output import OutputError, output_folder, require_free
 from tireid.run import Run
 
 WANTED = "--tir FILE, --slipx DIR, --ggv FILE, --steady FILE, --understeer"
+_WORDS = {True: "valid", False: "NOT valid", None: "not judged"}
 _Where = str | PathLike[str] | None
 
 
@@ -30,7 +31,7 @@ class Emitted(NamedTuple):
 
 
 def emit(
-    source: Run | TireModel,
+    source: Run | TireModel | str | PathLike[str],
     *,
     tir: _Where = None,
     slipx: _Where = None,
@@ -43,7 +44,7 @@ def emit(
 
     Parameters
     ----------
-    source : a run, of which the tire at its end, or a tire model.
+    source : a run, of which the tire at its end, a tire model, or its file.
     tir : tire property files (PAC2002), of pure lateral slip, of one tire each: `car.tir` gives
         `car_front.tir` and `car_rear.tir`.
     slipx : folder of a car for slipx 0.2.0.
@@ -63,7 +64,14 @@ def emit(
         raise ValueError(
             "nothing is asked for: give one or more of tir, slipx, ggv, steady, understeer"
         )
-    model = source.tire if isinstance(source, Run) else source
+    if isinstance(source, Run):
+        model = source.tire
+        verdict = f"{source.verdict.word}, identified from {source.recording.name}"
+    elif isinstance(source, TireModel):
+        model, verdict = source, ""
+    else:
+        model, word = load_model(source), _WORDS[stored_verdict(source)]
+        verdict = f"{word} on its identification drive, model {source}"
     if tir is not None and not Path(tir).name:
         raise OutputError(f"tir must name a file, it is {str(tir)!r}")
     table = None if isinstance(understeer, bool) else Path(understeer)
@@ -83,7 +91,7 @@ def emit(
             for name, text in slipx_files(model, rng, date.today()).items():
                 (folder / name).parent.mkdir(exist_ok=True)
                 write_file(folder / name, text)
-        texts = [] if tir is None else [tire_properties(model, axle) for axle in AXLES]
+        texts = [] if tir is None else [tire_properties(model, axle, verdict) for axle in AXLES]
         texts += [] if ggv is None else [ggv_text(model)]
         texts += [] if steady is None else [steady_text(model)]
         found = understeer_gradient(model, rng) if understeer is not False else None

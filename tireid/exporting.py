@@ -28,6 +28,7 @@ from tireid.run import Run
 
 _IDENTIFIER = "identifier"  # folder of the package where a tracker lies beside it
 _COSTS, _TRACKING, _UNITS, _NETWORK = "costs on Arm processors", "the tracker", "FMUs", "ONNX"
+_BESIDE = (".fmu", ".onnx")  # of the package
 UNCALIBRATED = (
     "the band assumes the declared sensor errors: begin with the model of a drive to calibrate it"
 )
@@ -56,7 +57,10 @@ class Exported:
         needs = [port.name for port in step.inputs if port.name != "v_y" or not step.tells_v_y]
         reads = f"{type(step.method).__name__} reads {', '.join(needs)}"
         reads += "; v_y is an output" if step.tells_v_y else ""
+        reads += f"; one step each {1e3 * step.dt:g} ms"
+        files = [path.name for path in sorted(self.folder.glob("*.*")) if path.suffix in _BESIDE]
         warnings = [UNCALIBRATED] if step.tells_band and step.band is None else []
+        wrote = ", ".join([wrote, *files])
         return "\n".join([*lines, *self.notes, reads, *warnings, wrote])
 
     def __repr__(self) -> str:

@@ -53,7 +53,7 @@ _ESTIMATED = {  # columns of forces.csv by the outputs of methods that estimate 
     "side_slip_observable": "side_slip_observable",
 }
 _WEIGHTS = ("W", "V", "own")  # carried matrices that are the learnt model, by whatever method
-_NO_TRUTH, _ONLINE = "(no truth)", "(against online, no truth)"
+_ONLINE = "(against online, no truth)"
 _WRITING = 0.6  # share of the time of curves and figures that a long recording's curves take
 _CURVE_POINTS = 201
 _FARTHER = 1.25  # than the slip that was driven, or is known
@@ -120,23 +120,24 @@ class Results(NamedTuple):
         return list(self.frozen.values())[-1]
 
     def table(self) -> str:
-        """Return a table of the errors per axle, and as a share of the force where there is truth.
+        """Return a table of the errors per axle [N], and as a share of the true force; else "".
 
         Under the recording that was learnt stands the paper's measure: its past, t < T_freeze,
         against what was identified online.
         """
         runs = {run.recording.name: run for run in (*self.runs, *self.parts)}
-        rows = [["frozen at", "replayed on", "front", "rear"]]
+        header, rows = ["frozen at", "replayed on", "front", "rear"], list[list[str]]()
         for key, replays in self.frozen.items():
             for name, result in replays.items():
                 size, sides = force_rms(runs[name]), result.reproduction
                 error = result.against_truth or result.against_online
-                note = "" if size else _NO_TRUTH if error is None else _ONLINE
-                rows.append([f"{key} s", visible(name), *error_cells(error, size), note])
+                note = "" if size else _ONLINE
+                if error is not None:
+                    rows.append([f"{key} s", visible(name), *error_cells(error, size), note])
                 if sides and sides.past_against_online:
                     past = error_cells(sides.past_against_online, size)
                     rows.append(["", "  its past, against online", *past, ""])
-        return text_table(rows, "><>>")
+        return text_table([header, *rows], "><>>") if rows else ""
 
     def summary(self) -> dict[str, Any]:
         """Return what summary.json holds: errors by recording and freeze, and all that went in.
@@ -240,8 +241,10 @@ class Results(NamedTuple):
         replayed = {float(key): replays[name] for key, replays in self.frozen.items()}
         figures = {
             "inputs": inputs_figure(recording),
-            "slip": slip_figure(model, recording, learnt if learnt.online else None),
-            "forces": force_figure(learnt, replayed),
+            "slip": slip_figure(model, recording, self.verdict.forces),
+            "forces": force_figure(learnt, replayed)
+            if learnt.online
+            else prediction_figure(self.replays[name], self.verdict.forces),
         }
         slip = side_slip(learnt, learnt.method.min_speed, recording.logged_v_y)
         if _OBSERVED in learnt.outputs:
@@ -252,8 +255,9 @@ class Results(NamedTuple):
         if learnt.tracks_over(next(learnt.blocks())):
             figures["learnt"] = learnt_axles_figure(learnt, list(replayed))
         for run in self.runs[1:]:
+            name = run.recording.name
             figures[f"replay_{file_name(run.recording)}"] = prediction_figure(
-                self.replays[run.recording.name], run if run.online else None
+                self.replays[name], self.evaluated[name].forces
             )
         return figures
 

@@ -49,11 +49,17 @@ def identify(
     ----------
     recording : what was driven; its axle forces are not looked at.
     vehicle : the car that drove.
-    method : the identifier, or its name as of `methods`; None takes `FitMethod.for_vehicle` at the
-        recording's interval, which estimates v_y where the recording has none.
+    method : the identifier, or its name as of `methods`, which describes each ("integral" is the
+        paper's); None takes `FitMethod.for_vehicle` at the recording's interval, which estimates
+        v_y where the recording has none.
     start : model to go on learning from; None begins afresh.
     check : whether what this vehicle cannot have driven is refused, and the doctor asked.
     progress : called now and then with the share that is done, 0 to 1.
+
+    Returns
+    -------
+    Run
+        With verdict, tires and the forces over time.
 
     Raises
     ------
@@ -67,6 +73,14 @@ def identify(
         Where recording and method differ in their sampling interval, or nothing has that name.
     TypeError
         Where an argument is of another kind.
+
+    Examples
+    --------
+    >>> import tireid as ti
+    >>> run = ti.identify(ti.sample_recording(), ti.sedan())
+    >>> run.verdict.word
+    'valid'
+    >>> force = run.tire.force(0.05, "front")  # [N]
     """
     require_kind(Recording, _RECORDING, recording=recording)
     require_kind(Vehicle, _VEHICLE, vehicle=vehicle)
@@ -115,7 +129,7 @@ def replay(recording: Recording, tire: TireModel, *, since: float | None = None)
 def with_v_y(recording: Recording, tire: TireModel) -> Recording:
     """Return a drive with its v_y, or with that which the tires or a filter estimate.
 
-    For tires of a fit a v_y that is rare or noisy is brought on time, as the fit reads it.
+    For tires of a fit the delay of a v_y that is rare or noisy is removed, as the fit reads it.
 
     Parameters
     ----------

@@ -15,6 +15,7 @@ import tomllib
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import date
 from itertools import count
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -419,10 +420,11 @@ def origin(
     given = list(recordings)
     rows = [
         ["command", command],
+        ["date", date.today().isoformat()],
         ["tireid", __version__],
         ["Python, machine", f"{platform.python_version()}, {platform.system()} on "
          f"{platform.machine()}"],
-        ["car", f"{vehicle.name}, hash {digest(vehicle_numbers(vehicle))}"],
+        ["car", f"{vehicle.name}, hash {digest(vehicle_numbers(vehicle.without_chassis()))}"],
         *(
             [
                 "recording",

@@ -12,7 +12,7 @@ from codegen.errors import TireidError
 from identifier.certificate import Certificate
 from identifier.method import Method
 from identifier.run import History
-from identifier.tire_model import TireModel
+from identifier.tire_model import AXLES, TireModel
 from identifier.verdict import Verdict, calibrated, judge
 from models.recordings import Recording
 from models.vehicle import Vehicle
@@ -127,7 +127,12 @@ class Run:
 
     def _repr_html_(self) -> str:
         try:
-            found = [self.verdict._repr_html_(), self.tire._repr_html_()]
+            verdict = self.verdict
+            looks = dict.fromkeys(AXLES, "" if verdict.valid else markup.REFUSED)
+            for one in verdict.numbers:
+                if one.state == "not valid":
+                    looks[one.axle] = markup.STRUCK
+            found = [verdict._repr_html_(), self.tire._repr_html_([*looks.values()])]
         except TireidError as error:  # it estimates a signal, or diverged
             found = [markup.line(str(error), "No tires:")]
         method = markup.line(f"over {self.recording.name}", type(self.method).__name__)

@@ -7,7 +7,7 @@ import numpy as np
 
 from codegen.escape import visible
 from identifier.day import Day
-from identifier.measured import NOT_IDENTIFIABLE, printed_unit, with_doubt
+from identifier.measured import NOT_IDENTIFIABLE, as_printed, with_doubt
 from identifier.tire_model import AXLES, Axle, TireModel, stored_verdict
 from identifier.verdict import Number, Verdict
 from identifier.verdict.verdict import BEYOND_KNOWN, LARGEST_MODEL_ERROR, PERCENT
@@ -34,8 +34,8 @@ _HEADER = ("", "front", "is", "rear", "is")
 def _numbers_by_title(verdict: Verdict) -> dict[str, dict[Axle, Number]]:
     """Return the numbers of a verdict by title with the unit that is printed, and by axle."""
     rows: dict[str, dict[Axle, Number]] = {}
-    for number in verdict.numbers:
-        rows.setdefault(f"{number.title} [{printed_unit(number.unit)}]", {})[number.axle] = number
+    for number in as_printed(verdict.numbers):
+        rows.setdefault(f"{number.title} [{number.unit}]", {})[number.axle] = number
     return rows
 
 
@@ -97,7 +97,8 @@ def named_days(model: TireModel, recordings: Iterable[Recording]) -> list[tuple[
 def sensors_text(model: TireModel, recordings: Iterable[Recording]) -> str:
     """Return the same, a line each."""
     return "\n".join(
-        f"sensors of {visible(name)}: {day.line}" for name, day in named_days(model, recordings)
+        f"sensors of {visible(name)}, ± with the tires fixed: {day.line}"
+        for name, day in named_days(model, recordings)
     )
 
 
@@ -195,7 +196,8 @@ def verdict_section(verdict: Verdict, model: TireModel) -> Section:
     ]
     rows += [[f"{fact.title} [{fact.unit}]", *fact.words] for fact in model.facts()]
     caption = (
-        "Estimates, ± one standard deviation. Grey was not identified; struck through is not valid."
+        "Estimates, ± one standard deviation with the model error on this log. Grey was not "
+        "identified; struck through is not valid."
     )
     lines = (verdict.headline, *verdict.unobservable)
     blocks: list[Block] = [

@@ -24,6 +24,7 @@ from identifier.axle.learning import (
     Regression,
     RoadChange,
     bounded,
+    curve_ranges,
     rising_shares,
 )
 from identifier.axle.model import AxleModel, begun
@@ -40,7 +41,7 @@ from identifier.method import (
     Track,
     resumed,
 )
-from identifier.setup import Setup
+from identifier.setup import Range, Setup
 from identifier.tire_model import AXLES, Reached, TireModel, brisk_speed
 from models.rules import require_positive
 from models.vehicle import Vehicle
@@ -197,6 +198,13 @@ class AxleIdentifier(Method):
             },
             only_with_a_y=("bank",),
             ends_run=self.plausibility.rest(self.dt),
+            ranges=(
+                *curve_ranges(self.bounds, self.ladder),
+                *(Range("own", i, 0.0, self.bounds.compliance) for i in (0, 3)),
+                *(Range("own", i, 0.0, 1.0) for i in (1, 4)),
+                Range("own", 2, -self.bounds.steering, self.bounds.steering),
+                Range("own", 5, -self.bounds.v_y, self.bounds.v_y),
+            ),
         )
 
     def _scan(self, vehicle: Vehicle, *, bands: bool = False) -> Scan:

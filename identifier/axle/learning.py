@@ -25,6 +25,7 @@ from identifier.axle.covariance import (
     updated,
     width,
 )
+from identifier.setup import Range
 from models.rules import Positive, require_positive_fields
 
 _TINY = 1e-12  # of a size that is divided by
@@ -400,6 +401,21 @@ class Bounds:
             steering=inward(self.steering),
             v_y=inward(self.v_y),
         )
+
+
+def curve_ranges(bounds: Bounds, ladder: tuple[float, ...]) -> tuple[Range, ...]:
+    """Return where the weights of both axles must lie: each, their grip and their stiffness.
+    ladder : slip scales of the n units [rad].
+    """
+    b, n = bounds, len(ladder)
+    return (
+        *(Range("W", i, -b.weight, b.weight) for i in range(2 * n)),
+        *(Range("W", i, b.least_grip, b.most_grip, (1.0,) * n) for i in (0, n)),
+        *(
+            Range("W", i, b.least_stiffness, b.most_stiffness, tuple(1.0 / one for one in ladder))
+            for i in (0, n)
+        ),
+    )
 
 
 def rising_shares(ladder: tuple[float, ...]) -> Array:

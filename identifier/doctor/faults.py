@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from codegen.arrays import Array
-from identifier.day import ENOUGH, ONE_SPEED, sideways
+from identifier.day import ENOUGH, UNSEPARATED, sideways
 from identifier.doctor.accelerometer import OF_A_Y, Accelerometer, Line, descended
 from identifier.doctor.finding import Finding
 from identifier.doctor.pieces import segments_of
@@ -458,8 +458,9 @@ class Search:
             if left > RULES.untold * one.scaled(one.wide, self.vehicle):
                 least = f"{left * one.per_unit:.2g}{one.text_unit}"
                 if one.code in ("factor", "yaw_inertia"):
-                    least = f"a factor of {1.0 + left:.2g}"
-                yield f"{one.name}: {least} is not observable on this drive"
+                    least = f"{100.0 * left:.2g} %"
+                name = "steering ratio" if one.parameter == "steering_gain" else one.name
+                yield f"{name}: an error of {least} is not observable on this drive"
 
 
 def examine(recording: Recording, vehicle: Vehicle) -> Examination:
@@ -492,17 +493,18 @@ def examine(recording: Recording, vehicle: Vehicle) -> Examination:
 
 
 def _sideways(search: Search, post: Posterior) -> Iterator[Finding]:
-    """Yield a note on a v_y that is off at one speed, where no bias and no angle was found."""
+    """Yield a note on a v_y that is off at the median speed, with no bias and no angle found."""
     names = ("v_y_bias", "v_y_angle")
     if any(name in search.wide for name in names):
         return
     where = [INDEX[name] for name in names]
     on = np.concatenate([one.signals[one.counts, 0] for one in search.problem.drives])
     P, speed = post.covariance[np.ix_(where, where)], float(np.median(on))
-    if text := sideways(post.p[where], P, speed):
+    if found := sideways(post.p[where], P, speed):
+        size, deviation, text = found
         yield Finding(
-            code="v_y_reads", channel="v_y", confidence=0.9, note=True,
-            text=f"{text}{ONE_SPEED}",
+            code="v_y_reads", channel="v_y", size=size, deviation=deviation, unit="m/s",
+            confidence=0.9, note=True, text=f"{text}{UNSEPARATED}",
         )  # fmt: skip
 
 

@@ -116,7 +116,7 @@ def _gross_findings(found: Read, vehicle: Vehicle) -> list[Finding]:
 
 
 def _repair_of(changes: tuple[Change, ...]) -> Repair:
-    """Return what takes changes out of a log; of the car nothing is changed."""
+    """Return the repair of a log. The car is unchanged."""
     repair = Repair()
     for change in changes:
         if change.code == ARM:

@@ -18,6 +18,7 @@ _INERTIA = (0.5, 1.6)  # of I_z/(m l_f l_r); cars on the road have 0.9 to 1.1
 _SMALL = 1.0  # [m] wheelbase, below which a model car may have as little
 _SMALL_INERTIA = 0.3  # of I_z/(m l_f l_r), the least of such a model car
 _OVERHANG = 0.5  # wheelbases that a car, and what is mounted to it, reach beyond its axles
+_BODY = 0.2  # wheelbases that its body, in which an accelerometer is, reaches beyond its axles
 _CENTER = (0.25, 0.75)  # l_f over the wheelbase: a load that an axle of a car can have
 
 _OPPOSITES = {  # of what a size says, where it is negative
@@ -119,7 +120,7 @@ class Suspect(NamedTuple):
             case "center_of_gravity":
                 return _CENTER[0] < (vehicle.l_f - size) / vehicle.wheelbase < _CENTER[1]
             case "velocity_sensor_x" | "acceleration_sensor_x":
-                beyond = _OVERHANG * vehicle.wheelbase
+                beyond = vehicle.wheelbase * (_BODY if self.channel == "a_y" else _OVERHANG)
                 return -vehicle.l_r - beyond < size < vehicle.l_f + beyond
             case "yaw_inertia":
                 least, most = usual_inertia(vehicle)

@@ -79,8 +79,8 @@ class FittedBand(Band):
     def origin(self) -> str:
         front, rear = 100.0 * self._error_at(_TYPICAL)
         return (
-            f"what the drives leave open, and an error of the model of {front:.0f} / {rear:.0f} % "
-            f"at {_TYPICAL:g} static loads, from its error on them and a mass known to "
+            f"parameter uncertainty plus a model error of {front:.0f} / {rear:.0f} % at "
+            f"{_TYPICAL:g} static loads, estimated from the residuals and a mass known to "
             f"{100.0 * _SURE_MASS:.0f} %"
         )
 

@@ -172,7 +172,6 @@ class FittedModel(TireModel):
         return force
 
     def lagged_slip(self, recording: Recording) -> Array:
-        """Return the slip that makes the force, in the paper's sign, (n, 2) [rad]."""
         return self._over(recording)[1]
 
     def on(self, recording: Recording) -> Day:

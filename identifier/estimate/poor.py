@@ -1,4 +1,4 @@
-"""A v_y that comes rarely or is noisy, brought on time by the motion between its samples.
+"""A v_y that comes rarely or is noisy, its delay removed by the motion between its samples.
 
 v_y' = (1 - ρ) a_y - v_x r - b + w,   b' = white,   shown: v_y(t - τ) + noise,
 ρ: what a rolling body adds to a_y, b: bank and bias. Linear least squares over the log, by banded
@@ -96,7 +96,7 @@ def on_time(recording: Recording, vehicle: Vehicle) -> Recording:
     sd = 0.0 if alone else float(np.hypot(np.sqrt(np.mean(each**2)), delay))
     note = (
         f"vy: a new value every {1e3 * sensor.interval:.0f} ms, {1e3 * sensor.late:.0f} ms late, "
-        f"noise {sensor.noise:.2g} m/s: brought on time and smoothed by {by}"
+        f"noise {sensor.noise:.2g} m/s: delay removed, and smoothed with {by}"
         + ("" if alone else f", which leaves ± {sd:.2g} m/s")
     )
     return replace(recording, v_y=found, v_y_sd=sd, notes=(*recording.notes, note))

@@ -63,7 +63,7 @@ class Reach(NamedTuple):
     parted : of drives without v_y, side slip by which soft and stiff tires that explain them alike
         part, rms [rad].
     a_y_late : of such drives, by which a_y was later than the yaw rate [s]; negative where it
-        would have to be earlier, which is not believed.
+        would have to be earlier, which is rejected.
     a_y_place : of such drives, how far ahead of the center of gravity a_y was measured [m].
     a_y_instead : the other one in place of that of both which is not 0, where no drive tells.
     """

@@ -114,8 +114,8 @@ def notes(reach: Reach, p: Array, covariance: Array) -> tuple[tuple[str, str], .
         listed.append(
             (
                 "steering_gain",
-                f"the front wheels turn {1.0 + gain:.2f} ± {sd:.2f} times as far as the log "
-                "says: check the steering ratio; the curves allow for it",
+                f"the front wheels turn {1.0 + gain:.2f} ± {sd:.2f} times as far as the log says "
+                "(± with the tires estimated): check the steering ratio; the curves allow for it",
             )
         )
     k = INDEX["steering_play"]

@@ -31,6 +31,7 @@ from identifier.export.layout import (
     covariance_order,
     initializer,
     output_members,
+    ranges,
     read_expression,
     rules,
     write_expression,
@@ -135,6 +136,7 @@ def _switches(specialized: SpecializedStep) -> dict[str, tuple[object, str]]:
         **(band if specialized.tells_band else {}),
         "SUMS": (int(_sums(specialized)), "equations return the sum of all numbers that they tell"),
         "RULES": (f"{count}U", "of weights that are taken over"),
+        "RANGES": (f"{len(specialized.ranges)}U", "likewise, that numbers must lie in"),
         **(ruled if order else {"COVARIANCE": ruled["COVARIANCE"]} if count else {}),
     }
 
@@ -197,6 +199,15 @@ def _tables(specialized: SpecializedStep, about: Values) -> str:
         f"static const {name}_output {name}_no_output = {{ {zeros} }};\n"
     )
     table = f"static const {name}_rule {name}_rules[{capital}_RULES] = {{\n{kept}}};\n"
+    lines, shares = ranges(specialized)
+    if lines:
+        listed = _wrapped(", ".join(literal(one, name) for one in shares), "    ")
+        body += (
+            f"\nstatic const {name}_real {name}_shares[{len(shares)}] = {{\n{listed}\n}};\n\n"
+            f"static const {name}_range {name}_ranges[{capital}_RANGES] = {{\n"
+            + "".join(f"    {line},\n" for line in lines)
+            + "};\n"
+        )
     return header(
         f"{name}_tables.h",
         f"Where the state starts, and what weights must keep.\n\n{generated(about)}",

@@ -112,6 +112,23 @@ def rules(members: Sequence[Member]) -> list[Rule]:
     return found
 
 
+def ranges(specialized: SpecializedStep) -> tuple[list[str], list[float]]:
+    """Return the rows of the table of ranges in C, and the shares that they point into."""
+    prefix, first, at, shares = specialized.name, 0, dict[str, int](), list[float]()
+    for member in carried_members(specialized):
+        at[member.signal.name], first = first, first + member.size * member.learnt
+    starts = dict[tuple[float, ...], int]()
+    for one in specialized.ranges:
+        if one.shares not in starts:
+            starts[one.shares] = len(shares)
+            shares += one.shares
+    return [
+        f"{{ {literal(one.low, prefix)}, {literal(one.high, prefix)}, "
+        f"{at[one.port] + one.first}U, {len(one.shares)}U, {starts[one.shares]}U }}"
+        for one in specialized.ranges
+    ], shares
+
+
 def covariance_order(members: Sequence[Member]) -> int:
     """Return the rows of the covariances among weights, 0 where there is none."""
     orders = {rule.order for rule in rules(members) if rule.kind in ("MATRIX", "TRIANGLE")}

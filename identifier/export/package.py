@@ -104,6 +104,11 @@ def summary(specialized: SpecializedStep, content: Mapping[str, Any]) -> dict[st
 
 
 def _certificate_text(method: Method, proven: Mapping[str, Any]) -> str:
+    if method.whole:
+        return (
+            "Tires of a fit have no certificate. How far their forces are off,\n"
+            "`tireid predict LOG --weights weights.json` says of a drive that they do not know."
+        )
     if method.judged_by:
         return (
             "Stability and error bounds of this method depend on its gains: "
@@ -288,6 +293,7 @@ def readme(package: Package, about_figures: str) -> str:
             "output_table": _table(specialized.outputs),
             "carry_table": "".join(carried),
             "modes": _modes(specialized),
+            **_about_learning(specialized),
             "stale_time": f"{STALE_TIME:g}",
             **_about_signals(specialized),
             **_about_refused(specialized),
@@ -303,7 +309,10 @@ def readme(package: Package, about_figures: str) -> str:
 
 def _modes(specialized: SpecializedStep) -> str:
     if not specialized.learnt:
-        return "This method estimates a signal: there are no weights to read, set or freeze."
+        rest = ": there are no weights to read, set or freeze."
+        if specialized.method.whole:
+            return f"The tires of the fit stay as they are{rest}"
+        return f"This method estimates a signal{rest}"
     name = specialized.name
     learnt = ", ".join(specialized.learnt)
     return (
@@ -312,6 +321,17 @@ def _modes(specialized: SpecializedStep) -> str:
         f"`{name}_get_weights` and\n`{name}_set_weights` store it and bring it back, "
         f"`{name}_reset` begins anew with it, `{name}_init`\nforgets it."
     )
+
+
+def _about_learning(specialized: SpecializedStep) -> dict[str, str]:
+    """Return what is said of forces whose tires are identified, and of others."""
+    if specialized.learnt:
+        return {
+            "computed": "identified sample by sample\nwith the tires,",
+            "learns": "learn, unless frozen",
+        }
+    tires = "\nby the tires of a fit," if specialized.method.whole else ""
+    return {"computed": f"computed sample by sample{tires}", "learns": "hold"}
 
 
 def _about_signals(specialized: SpecializedStep) -> dict[str, str]:
@@ -349,7 +369,9 @@ def _about_refused(specialized: SpecializedStep) -> dict[str, str]:
         return {
             "implausible_row": row.format(", or get there within a sample", lasting),
             "refused_forces": lasting,
-            "after_gap": "After a moment the step rests, and restarts with the next good sample.",
+            "after_gap": "After a moment (0.25 s of a car) the step rests, and takes the next\n"
+            "sample that a car can be in as true, however far from the last: status 0. A sensor\n"
+            "that alternates between far values passes every second sample.",
         }
     return {
         "implausible_row": row.format("", "zero") * (specialized.parts.where_false is not None),

@@ -17,7 +17,7 @@ from codegen.arrays import Array
 from codegen.tuned import Tuned, tuned
 from identifier.method import Method
 from identifier.refused import GATE, SampleLimits, judges_samples
-from identifier.setup import AXLE_FORCE, HALF_BAND, Setup
+from identifier.setup import AXLE_FORCE, HALF_BAND, Range, Setup
 from identifier.tire_model import TireModel
 from models.vehicle import Vehicle
 
@@ -46,6 +46,7 @@ ACCELERATION = Signal(
 )
 SIDE_SLIP = ("v_y", "v_y_sd", "side_slip_observable")
 SAMPLED = ("x", "u", "v_x", "a_y")
+_ROUNDING = 1e-6  # of sums in float, as a share
 
 
 class SpecializedStep(NamedTuple):
@@ -64,6 +65,7 @@ class SpecializedStep(NamedTuple):
     believed : carried port whose first five entries are the inputs that the step went on with,
         older ones where a sample was not believed; None where the method has no such port.
     band : numbers of the calibration of its band, None where there is none.
+    ranges : where what is learnt must lie to be taken over.
     """
 
     name: str
@@ -82,6 +84,7 @@ class SpecializedStep(NamedTuple):
     believed: str | None
     limits: SampleLimits
     band: Mapping[str, Any] | None
+    ranges: tuple[Range, ...]
 
     @property
     def tells_band(self) -> bool:
@@ -160,6 +163,19 @@ def specialize(
         believed=GATE if judges_samples(carry) else None,
         limits=SampleLimits.of(vehicle),
         band=start.to_dict().get("band") if with_band and start is not None else None,
+        ranges=tuple(_reaching(one, carry[one.port]) for one in setup.ranges),
+    )
+
+
+def _reaching(kept: Range, start: Array) -> Range:
+    """Return a range that reaches to where a run begins, which may lie outside.
+    start : value of the port.
+    """
+    numbers = np.ravel(start)[kept.first : kept.first + len(kept.shares)] * kept.shares
+    value, rounding = numbers.sum(), _ROUNDING * np.abs(numbers).sum()
+    return kept._replace(
+        low=kept.low if value >= kept.low else float(value - rounding),
+        high=kept.high if value <= kept.high else float(value + rounding),
     )
 
 

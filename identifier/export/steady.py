@@ -56,7 +56,7 @@ def understeer_gradient(model: TireModel, rng: np.random.Generator) -> Understee
     """Return the understeer gradient at the speeds and within the slips that were driven.
 
     Its standard deviation is half of what lies between the 16 % and 84 % points of models drawn
-    from what the drives left open. A model that cannot tell how sure it is is refused.
+    from the parameter uncertainty. A model that cannot tell how sure it is is refused.
     """
     drawn = require_band(model).samples(_DRAWN, rng)
     known, speeds, car = model.known_slip, model.drives.speeds, model.vehicle

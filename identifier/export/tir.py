@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 
 from codegen.arrays import Array
 from codegen.escape import visible
+from identifier.measured import as_printed, with_doubt
 from identifier.tire_model import AXLES, RELAXATION, Axle, TireModel
 
 _WIDEST = 0.6  # rad, slip up to which curves are compared
@@ -88,8 +89,10 @@ def _solved(errors: Callable[..., Array], begin: Sequence[float] | Array, *of: f
     return np.array(least_squares(errors, inside, bounds=(_LOW, _HIGH), x_scale=scale, args=of).x)
 
 
-def tire_properties(model: TireModel, axle: Axle) -> str:
+def tire_properties(model: TireModel, axle: Axle, verdict: str = "") -> str:
     """Return the tire property file of one tire of an axle: lateral force in pure slip.
+
+    verdict : what was judged of the model, and on which drive, in one line.
 
     D_y = PDY1 F_z (4.E22) and K_y = PKY1 F_z0 sin(2 atan(F_z/(PKY2 F_z0))) (4.E25), PKY2 being
     large, go with the load, as they do in the model. The relaxation length of PAC2002,
@@ -103,22 +106,31 @@ def tire_properties(model: TireModel, axle: Axle) -> str:
     valid = known if known > 0.0 else found.reach
     slips = valid * np.array([0.25, 0.5, 0.75, 1.0])
     radius = _RADIUS * model.vehicle.wheelbase
-    lags = (e.value for e in model.estimates() if (e.title, e.axle) == (RELAXATION, axle))
-    lag = next(lags, 0.0)
+    numbers = [e for e in model.estimates() if e.axle == axle]
+    lag = next((e.value for e in numbers if e.title == RELAXATION), 0.0)
+    error = 0.0 if model.model_error is None else float(model.model_error[i])
+    lines = [f"Verdict: {visible(verdict)}."] * bool(verdict)
+    for one in numbers:
+        (e,) = as_printed([one.with_model_error(error)])
+        state = "" if e.identified else ": not identified (default value)"
+        said = f"{e.title} {with_doubt(e.value, e.sd)} {e.unit}{state}"
+        lines.append(said.replace("±", "+-"))
+    judged = "".join(f"$ {line}\n" for line in lines)
     force, band = model.force(slips), "the model cannot tell how sure it is"
     if model.band is not None:
         half = model.band.half(slips)
         band = ", ".join(
-            f"{F:.4g} +- {h:.3g} N at {a:.3g} deg"
+            f"{with_doubt(F, h)} N at {a:.3g} deg"
             for a, F, h in zip(np.degrees(slips), 0.5 * force[:, i], 0.5 * half[:, i], strict=True)
-        )
+        ).replace("±", "+-")
     return f"""\
 $ One {axle} tire of {visible(model.vehicle.name)}, by tireid from a driving log.
+{judged}\
 $ Is: lateral force in pure slip, of an axle over its slip angle, shared by two tires. In it are the
 $ friction of the road that was driven, load transfer between left and right, toe and compliance.
 $ Is not: a measured tire. Longitudinal and combined slip, camber and aligning moment are not in it;
 $ the longitudinal coefficients repeat the lateral ones, since readers ask for them.
-$ Relaxation length: {lag:.3g} m. It is PTY1 times UNLOADED_RADIUS, which is a guess.
+$ The relaxation length is PTY1 times UNLOADED_RADIUS, which is a guess.
 $ Load: force is proportional to it, as in the model.
 $ Identified up to a slip of {math.degrees(known):.3g} deg, beyond that extrapolated; up to
 $ {math.degrees(found.reach):.3g} deg it differs from the model by at most \

@@ -14,7 +14,7 @@ from identifier.axle.covariance import packed, unpacked
 from identifier.axle.curve import EDGES, LADDER, doublings, unit_matrix
 from identifier.axle.design import AxleIdentifier, curve_boxes, curve_tracks, resumed_units
 from identifier.axle.gate import Plausibility
-from identifier.axle.learning import Bounds, inward, rising_shares
+from identifier.axle.learning import Bounds, curve_ranges, inward, rising_shares
 from identifier.axle.model import EXACT, AxleModel, begun
 from identifier.axle.prior import Prior
 from identifier.axle.slip import FASTEST, Sensors, Sway
@@ -34,7 +34,7 @@ from identifier.method import (
     Method,
     Track,
 )
-from identifier.setup import Setup
+from identifier.setup import Range, Setup
 from identifier.tire_model import TireModel
 from models.rules import require_positive, require_within
 from models.vehicle import GRAVITY, Vehicle
@@ -206,7 +206,7 @@ class InertialIdentifier(Method):
             late=self.a_y_late,
             steering_gain=self.sensors.steering_gain,
         )
-        pressed = vehicle.has_downforce
+        pressed, most = vehicle.has_downforce, {"steering": self.bounds.steering, **MOST}
         scan = _scan(doublings(self.ladder), tires=not self.held, pressed=pressed)
         return Setup(
             scan=scan,
@@ -235,6 +235,14 @@ class InertialIdentifier(Method):
                 **({"along": np.array(self.along)} if self.held else {}),
             },
             ends_run=self.plausibility.rest(self.dt),
+            ranges=(
+                *curve_ranges(self.bounds, self.ladder),
+                *(Range("own", i, 0.0, self.bounds.compliance) for i in (0, 1)),
+                *(
+                    Range("sensors", i, 0.0 if name == "roll" else -most[name], most[name])
+                    for i, name in enumerate(SENSORS)
+                ),
+            ),
         )
 
     def _body(self, vehicle: Vehicle) -> Body:

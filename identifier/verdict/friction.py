@@ -100,6 +100,20 @@ class RoadFriction(NamedTuple):
         return tuple(found)
 
     @property
+    def text(self) -> str:
+        """The roads of another friction, or why none is reported."""
+        if self.roads:
+            return "; ".join(road.text for road in self.roads)
+        most = int(self.another.argmax())
+        sure = float(self.another[most])
+        if sure < _LIKELY:
+            return "no other road reported"
+        why = "its friction is within two standard deviations of 1"
+        if sure < _SURE:
+            why = f"its probability is {sure:.2f}, {_SURE:g} is needed"
+        return f"no other road reported (at {self.t[most]:.4g} s {why})"
+
+    @property
     def unchanged(self) -> bool:
         """Whether the drive shows, somewhere, that its road has the friction that taught."""
         return bool((1.0 - self.another - self.unexplained >= _SURE).any())

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from codegen.arrays import Array
 from identifier.evidence import (
     FEWEST,
     WINDOW,
@@ -62,7 +63,7 @@ class _Rules:
     beyond : share of the samples beyond the known slip, from which it is noted [-].
     side_slip : standard deviation of an estimated one, median [rad].
     rolling : slope of a recorded a_y on the motion with an estimated v_y, which roll distorts [-].
-    v_y : standard deviation of one that was brought on time, over what the rear axle slips, from
+    v_y : standard deviation of one whose delay was removed, over what the rear axle slips, from
         which it is noted and from which refused [-].
     """
 
@@ -82,13 +83,15 @@ RULES = _Rules()
 class _Evaluated(NamedTuple):
     """A model and a drive.
 
-    portion : what of the drive is evaluated.   found : what the model explains of it.
+    portion : what of the drive is evaluated.   t : its times, in the drive's clock (k,) [s].
+    found : what the model explains of it.
     taught : whether the drive taught the model.   left_out : a segment that is not judged, from
     and to [s].
     """
 
     model: TireModel
     portion: Portion
+    t: Array
     found: Evidence
     taught: bool
     left_out: tuple[float, float] | None
@@ -96,6 +99,12 @@ class _Evaluated(NamedTuple):
     @property
     def recording(self) -> Recording:
         return self.portion.recording
+
+    @property
+    def middle(self) -> Array:
+        """Middle of each window, in the clock of the drive (m,) [s]."""
+        starts = self.found.windows.starts
+        return 0.5 * (self.t[starts] + self.t[starts + self.found.windows.n])
 
     @property
     def forceless(self) -> list[bool]:
@@ -162,10 +171,11 @@ def _evaluated(
 ) -> _Evaluated | None:
     """Return what is judged; None where too little is driven."""
     part = portion(recording, frozen)
+    t = recording.t[part.samples]
     model = model.held_on(recording, part)
     found = evidence(model, part.recording, road_push(part.recording, model))
     if taught and found is not None:
-        other = model.drives.road_differs(recording.t[part.samples])
+        other = model.drives.road_differs(t)
         found = found.where(~other[found.windows.starts])
     fewest = _FEWEST_TAUGHT if taught else FEWEST
     if found is None or len(found.windows) < fewest:
@@ -173,9 +183,9 @@ def _evaluated(
     judged, some = found.but_a_segment()
     left_out = None
     if some is not None:
-        t, starts = recording.t[part.samples], found.windows.starts
+        starts = found.windows.starts
         left_out = float(t[starts[some[0]]]), float(t[starts[some[1] - 1] + found.windows.n])
-    return _Evaluated(model, part, judged, taught, left_out)
+    return _Evaluated(model, part, t, judged, taught, left_out)
 
 
 def _findings(evaluated: _Evaluated) -> list[Objection]:
@@ -198,7 +208,7 @@ def _v_y_stuck(evaluated: _Evaluated) -> Iterator[Objection]:
 
 
 def _v_y_unsure(evaluated: _Evaluated) -> Iterator[Objection]:
-    """Refuse a v_y of which too little is left after it was brought on time."""
+    """Refuse a v_y of which too little is left after its delay was removed."""
     recording, starts = evaluated.recording, evaluated.found.windows.starts
     if not recording.v_y_sd > 0.0:
         return
@@ -231,14 +241,14 @@ def _no_force(evaluated: _Evaluated) -> Iterator[Objection]:
 
 
 def _model_error(evaluated: _Evaluated) -> Iterator[Objection]:
-    limit = RULES.model_error
-    for axle, share, none in zip(
-        AXLES, evaluated.found.model_error, evaluated.forceless, strict=True
-    ):
+    limit, found = RULES.model_error, evaluated.found
+    t = evaluated.middle[np.abs(found.measured - found.modelled).argmax(axis=0)]
+    for axle, share, at, none in zip(AXLES, found.model_error, t, evaluated.forceless, strict=True):
         if not (share <= limit or none):
             text = (
-                f"model error {PERCENT * share:.0f} % of the force in the motion (limit "
-                f"{PERCENT * limit:.0f} %); tireid doctor looks for the cause"
+                f"model error {PERCENT * share:.1f} % of the force in the motion (limit "
+                f"{PERCENT * limit:.0f} %), largest at {at:.4g} s; tireid doctor looks for the "
+                "cause"
             )
             yield Objection("force_missed", axle, text, True)
 
@@ -394,15 +404,20 @@ def _verdict(evaluated: _Evaluated, listed: list[Objection], whole: Recording) -
         )
         for one in model.estimates()
     )
-    clock, starts, n = whole.t[evaluated.portion.samples], found.windows.starts, found.windows.n
-    middle = 0.5 * (clock[starts] + clock[starts + n])
+    loads = np.array(model.vehicle.axle_loads)
+    forces = WindowForces(
+        t=evaluated.middle,
+        measured=loads * found.measured,
+        modelled=loads * found.modelled,
+        slip=found.windows.mean(model.lagged_slip(recording)),
+    )
     return Verdict(
         findings=tuple(listed),
         numbers=numbers,
         measures=measures,
         reach=_reach(model, recording),
         blind=WITHOUT_V_Y if recording.logged_v_y is None else (),
-        forces=WindowForces(middle, found.measured, found.modelled),
+        forces=forces,
     )
 
 

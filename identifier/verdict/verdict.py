@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from codegen import markup
 from codegen.arrays import Array
-from identifier.measured import NOT_IDENTIFIABLE, printed_value
+from identifier.measured import NOT_IDENTIFIABLE, with_doubt
 from identifier.tire_model import Axle
 from identifier.verdict.friction import RoadFriction
 
@@ -16,7 +16,7 @@ BEYOND_KNOWN = "beyond_known"  # code of the finding that a drive slips beyond t
 
 UNOBSERVABLE = (
     "a wrong mass, which scales all forces alike: weigh the car",
-    "l_f and l_r where all changes are slow, as for a small car: measure them",
+    "l_f and l_r where all changes are slow: weigh the axles",
 )
 
 
@@ -72,8 +72,8 @@ class Number(NamedTuple):
 
     @property
     def words(self) -> str:
-        """Value and standard deviation in three digits, in the unit that is printed."""
-        return printed_value(self.value, self.sd, self.unit)
+        """Value and standard deviation in three digits."""
+        return with_doubt(self.value, self.sd)
 
     @property
     def state(self) -> str:
@@ -84,14 +84,15 @@ class Number(NamedTuple):
 
 
 class WindowForces(NamedTuple):
-    """Forces over the windows that an answer is judged by [static axle loads].
+    """Forces over the windows that an answer is judged by [N].
     t : middle of each window (m,) [s].   measured : mean force in the motion (m, 2).
-    modelled : that of the model (m, 2).
+    modelled : that of the model (m, 2).   slip : mean of the slip that makes it (m, 2) [rad].
     """
 
     t: Array
     measured: Array
     modelled: Array
+    slip: Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

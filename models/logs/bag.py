@@ -113,6 +113,7 @@ def open_(path: Path) -> GroupedLog[_Place]:
         ),
         partial(_samples, path, definitions, zero),
         "message with numbers",
+        received=True,
     )
 
 

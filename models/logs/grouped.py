@@ -57,6 +57,7 @@ class GroupedLog(Generic[_P]):
     missing, remedy : what the file does not hold where there are none, and what to do.
     mend : whether stamps that do not rise are mended, and not refused; not a clock of several that
         starts again.
+    received : whether samples lie in the order in which they came: then their stamps sort them.
     clock_name, clock_unit : of the channel that is the time of all; empty leaves each its own.
     """
 
@@ -74,6 +75,7 @@ class GroupedLog(Generic[_P]):
     missing: str
     remedy: str = ""
     mend: bool = False
+    received: bool = False
     clock_name: str = ""
     clock_unit: str = ""
     _mended: list[str] = field(default_factory=list, compare=False, repr=False)
@@ -126,8 +128,9 @@ class GroupedLog(Generic[_P]):
         with one_line(self.path, self.what):
             for clock, t, values in self.samples(requested):
                 rows, what = np.arange(1, t.size + 1), Clock(0, f"the clock of {clock}", "s", "")
+                mend = self.mend or self.received
                 stamps = seconds(
-                    str(self.path), what, t, rows, self.place, mend=self.mend, restarts=False
+                    str(self.path), what, t, rows, self.place, mend=mend, restarts=False
                 )
                 self._mended.extend(stamps.notes)
                 rows = stamps.of(rows)

@@ -14,6 +14,8 @@ from models.logs.table import Cells, Columns, Gathered, Kind, TableLog, Words
 from models.logs.units import TIME, to_si
 
 _TIMES = ("t", "time", "timestamp")  # what the clock is called
+ARRAYS = "arrays"  # the format
+_INDEX = "index"  # of a data frame, where it has no name
 _HEAD = 400  # rows that tell what columns are
 
 
@@ -29,16 +31,24 @@ def open_arrays(
     """Return columns of one length as a log.
     data : a data frame or a mapping, by column: what `data[column]` is has one axis.
     clock : column that is the time: seconds, or times of the calendar or durations, which count
-        from the first; empty takes the one called t or time.
+        from the first; empty takes the one called t or time, else a frame's index that is a time.
     clock_unit : of it, where it is numbers; empty are seconds.
     mend : whether times that do not rise are mended, and not refused.
     rate : of the samples [Hz], in place of a time; 0 where none is given.
     """
     found = getattr(data, "columns", data)  # of a data frame; a mapping yields its keys
+    if (levels := getattr(found, "nlevels", 1)) > 1:
+        raise RecordingError(
+            f"{name}: columns have {levels} levels, one is needed: "
+            "df.columns = df.columns.droplevel(1), or of the level that holds no names"
+        )
     try:
         header = [str(column) for column in found]
         arrays = (_array(name, str(column), data[column]) for column in found)
         columns = dict(zip(header, arrays, strict=True))
+        if len(columns) < len(header):
+            twice = next(one for one in header if header.count(one) > 1)
+            raise RecordingError(f"{name}: several columns are called {twice}: rename them")
     except (TypeError, KeyError, IndexError):
         raise RecordingError(
             f"{name}: a data frame or a mapping of arrays is needed, not {type(data).__name__}"
@@ -46,19 +56,40 @@ def open_arrays(
     if rate:
         return TableLog(table=_ArrayTable(name, columns), rate=rate)
     lower = {column.lower(): column for column in reversed(header)}
-    likely = [one for one in header if without_unit(one) == clock]  # it may stand with its unit
+    # It may stand with its unit.
+    likely = [one for one in header if clock and without_unit(one) == clock]
     named = next((lower[one] for one in _TIMES if one in lower), "")
     time = clock if clock in header else next(iter(likely), clock) or named
+    notes = []
     if time not in header:
-        missing = f"{clock!r}" if clock else "t"
-        raise RecordingError(
-            f"{name}: column {missing} is missing, the time [s]; columns found: '{some(header)}'"
-        )
+        index = getattr(data, "index", None)  # that of a list is a method
+        label = str(getattr(index, "name", None) or _INDEX)
+        values = _array(name, label, index)
+        counts = values.dtype.kind == "i" and not clock
+        if clock not in ("", label) or counts or not _rises(values):
+            missing = f"{clock!r}" if clock else "t"
+            rising = [one for one, value in columns.items() if _rises(value)]
+            rising.sort(key=lambda one: columns[one].dtype.kind not in "mM")
+            remedy = f'columns={{"t": "{rising[0]}"}}?; ' if rising else ""
+            raise RecordingError(
+                f"{name}: column {missing} is missing, the time [s]; {remedy}columns found: "
+                f"'{some(header)}'"
+            )
+        time, columns[label] = label, values
+        notes = [f"time is the index of the data frame, {label!r}"]
     to_si(clock_unit, TIME, f"{name}: {clock}")
     if columns[time].dtype.kind == "m":
         columns[time] = _in_seconds(columns[time])
     table = _ArrayTable(name, columns)
-    return TableLog(table=table, clock_name=time, clock_unit=clock_unit or "s", mend=mend)
+    unit = clock_unit or "s"
+    return TableLog(table=table, clock_name=time, clock_unit=unit, mend=mend, _noted=notes)
+
+
+def _rises(values: NDArray[Any]) -> bool:
+    """Return whether values rise throughout, as a time does."""
+    return (
+        values.ndim == 1 and values.dtype.kind in "ifmM" and bool((values[1:] > values[:-1]).all())
+    )
 
 
 def _array(name: str, column: str, value: Any) -> NDArray[Any]:
@@ -85,7 +116,7 @@ def _in_seconds(durations: NDArray[Any]) -> Array:
 class _ArrayTable:
     """Columns in memory."""
 
-    format, place = "arrays", "index"
+    format, place = ARRAYS, "position"
 
     def __init__(self, name: str, arrays: Mapping[str, NDArray[Any]]) -> None:
         self.path, self._names, self._arrays = Path(name), tuple(arrays), list(arrays.values())
@@ -105,7 +136,7 @@ class _ArrayTable:
 
     def cells(self, kinds: Mapping[int, Kind], run: tuple[int, str] | None = None) -> Cells:
         """Return columns, of the rows of a run where one is named."""
-        gathered = Gathered(self.path, kinds, self._names, "index", run)
+        gathered = Gathered(self.path, kinds, self._names, self.place, run)
         wanted = gathered.kinds
         found = {column: self._read(column, kind) for column, kind in wanted.items()}
         sizes = {self._names[column]: self._arrays[column].size for column in wanted}

@@ -21,7 +21,16 @@ from codegen.arrays import Array, root_mean_square
 from models.logs.axes import Triad, along_axes, ground, triads
 from models.logs.clock import kept, without_codes
 from models.logs.log import Channel, Heading, LogFile, RecordingError
-from models.logs.signals import BETA, COLUMNS, POSE, QUANTITIES, WHEELS, Signal, quantity_of
+from models.logs.signals import (
+    BETA,
+    COLUMNS,
+    ESTIMATED,
+    POSE,
+    QUANTITIES,
+    WHEELS,
+    Signal,
+    quantity_of,
+)
 from models.logs.spelling import unit_in_name, without_units
 from models.logs.stamps import typical_rate
 from models.logs.units import (
@@ -88,8 +97,9 @@ def _spelled(text: str, apart: str = "|") -> str:
     return text
 
 
-_REFERENCE, _CORNERS, _SOURCES, _FILTERED, _SIGN = (
-    frozenset(_WORDS[name]) for name in ("reference", "corners", "sources", "filtered", "sign")
+_REFERENCE, _CORNERS, _SOURCES, _FILTERED, _SIGN, _COMMANDS = (
+    frozenset(_WORDS[name])
+    for name in ("reference", "corners", "sources", "filtered", "sign", "commands")
 )
 
 
@@ -222,6 +232,15 @@ def _field(name: str) -> str:
     return topic.rpartition("/")[2] if field.lower() in _GENERIC else field
 
 
+def _is_commanded(name: str) -> bool:
+    """Return whether a name of ROS is a field of a command: of a /cmd_vel, or "drive.speed"."""
+    if not name.startswith("/"):
+        return False
+    topic, _, field = name.rpartition("/")
+    parts = (topic.rpartition("/")[2], *field.split(".")[:-1])
+    return "drive" in parts or not _COMMANDS.isdisjoint(_words_of(" ".join(parts)))
+
+
 def _matches(group: str, words: frozenset[str]) -> bool:
     """Return whether all parts of "a|b;c" occur."""
     return all(words & set(part.split("|")) for part in group.split(";"))
@@ -235,11 +254,15 @@ def _name_confidence(signal: str, name: str) -> float:
     if name in ours:
         return _STANDARD
     listed = _words_of(name)
+    if not listed or name == ESTIMATED:
+        return 0.0
     if signal in WHEELS:
         return _NAMES_WORDS if _wheel_words(signal, listed) else 0.0
     while name.startswith("/") and len(listed) > 1 and listed[-1] in _GENERIC:
         listed = listed[:-1]
     rule, words = _RULES[signal], _with_parts(listed)
+    if signal not in ("delta_f", _HAND) and _is_commanded(name):
+        return 0.0
     stems = [listed]
     while len(listed) > 1 and listed[-1] in _SOURCES:
         listed = listed[:-1]

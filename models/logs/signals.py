@@ -25,6 +25,7 @@ _TABLE = rows_of("signals.toml")
 QUANTITIES: Mapping[str, str] = {name: one["quantity"] for name, one in _TABLE.items()}
 # What a column is called where it differs.
 COLUMNS: Mapping[str, str] = {n: one["column"] for n, one in _TABLE.items() if "column" in one}
+ESTIMATED = "vy_estimated"  # column of what a method estimated: never read as a sensor's
 MEANINGS: Mapping[str, str] = {name: one["meaning"] for name, one in _TABLE.items()}
 SPARED = ("a_x",)  # nobody needs it: where it cannot be read and nobody declared it, it is left out
 _LARGEST_RATIO = 1e3  # of hand wheel over road wheel, either way

@@ -2,7 +2,7 @@
 
 Stamps that are rounded (ten samples of 0.01 s that share the stamp 0.1 s, 400 Hz in whole
 milliseconds) are put back on the even clock that they were taken from, where one explains every
-stamp; it is said. Stamps that fall are no rounding: a clock that starts again, or a mixed order.
+stamp; it is said. Times that decrease are no rounding: a clock that starts again, or a mixed order.
 They are refused, or mended where that is asked for.
 
 In functions:

@@ -324,15 +324,15 @@ def wheel_scales(
     """
     of_wheels = {name: signals[name] for name in ("v_x", "r", *WHEELS) if name in signals}
     parts = _channels(log, str(log.path), of_wheels, log_map, run)
-    return identified_scales(parts, of_wheels, wheel_units(log.headings(), of_wheels))
+    return identified_scales(parts, of_wheels, units_of(log.headings(), of_wheels))
 
 
-def wheel_units(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:
+def units_of(headings: Sequence[Heading], signals: Mapping[str, Signal]) -> dict[str, str]:
+    """Return the unit of each signal: as it is declared, or that of its first channel."""
     units = {one.name: one.unit for one in headings}
     return {
-        name: one.unit if is_given(one.unit) else units[one.channel[0]]
+        name: one.unit if is_given(one.unit) else units.get(one.channel[0], "")
         for name, one in signals.items()
-        if name in WHEELS
     }
 
 

@@ -47,7 +47,10 @@ _LARGEST_SLIP = 0.7  # [rad], 40 degrees in the median window: nobody drives a w
 
 _PLACED = 0.03  # [m] to which the place of a v_y is known: more slip than that tells a sign
 
-_DOCTOR = "tireid doctor LOG --vehicle FILE looks for other faults, and repairs them"
+_DOCTOR = (
+    "tireid doctor LOG --vehicle FILE, or diagnose(log, car) of a log read with check=False "
+    "looks for other faults, and repairs them"
+)
 
 
 def check_physics(recording: Recording) -> None:
@@ -185,7 +188,7 @@ def _check_turns(w: Means) -> str | None:
         if against_v_y and turned_r == turned_a:
             turned_r, turned_a = dot > 0.0, dot < 0.0
         if turned_r:
-            return f"r contradicts ay: {law}; r must be positive to the left, change its sign"
+            return f"r contradicts ay: {law}; r must be positive to the left, change the sign of r"
         if turned_a:
             return f"{law}; change the sign of ay (positive to the left)"
         return f"r and ay contradict one another: {law}; ambiguous, look at one left turn"
@@ -244,7 +247,7 @@ def _check_lateral_acceleration(w: Means) -> str | None:
     if _turned(dot, dot_error, w) and slope - error > 0.0:
         return (
             f"vy contradicts ay: ay must be v̇_y + v_x r, its slope on v̇_y is "
-            f"{dot:.3g} instead of 1; vy must be positive to the left, change its sign"
+            f"{dot:.3g} instead of 1; vy must be positive to the left, change the sign of vy"
         )
     return None
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from codegen.escape import displayed
 from models.logs.log import Heading, LogFile, RecordingError, some
+from models.logs.memory import ARRAYS
 from models.logs.names import HINT, STILL, Proposal, called, propose
 from models.logs.signals import (
     BETA,
@@ -264,7 +265,7 @@ def aside(found: Mapping[str, Signal], proposal: Proposal) -> tuple[str, list[st
         names, said = ["a_y"], "ay is left aside, as it is not sure: {};"
     else:
         names = [name for name in stand_ins("v_y", proposal) if name != "a_y"]
-        said = "no lateral velocity is read: vy is to be estimated"
+        said = "no lateral velocity is read: a method estimates vy"
         if not names:
             return said, []
         said += "; if {} is one,"
@@ -293,7 +294,7 @@ def _missing_text(log: LogFile, missing: list[str], proposal: Proposal, names: l
     said = f"{log.path}: column {columns} is missing; "
     if parts:
         said += f"did you mean {', '.join(parts)}? declare it by --columns {' '.join(words)}; "
-    else:
+    elif log.format != ARRAYS:
         said += f"tireid channels {log.path} lists what is there; "
     return said + _listing(names)
 
@@ -316,8 +317,17 @@ def column_word(name: str, proposal: Proposal) -> str:
     guess = proposal.guesses.get(name)
     if guess is None:
         return ""
-    unit, ratio = guess.unit or SI[QUANTITIES[name]], " /RATIO" if guess.hand else ""
-    channels = " + ".join(without_unit(one) for one in guess.channel)
-    sign = f" sign({guess.sign})" if guess.sign else ""
-    ratio += f" *{guess.factor:g}" if guess.factor != 1.0 else ""
-    return f'"{column_of(name)}={channels}{sign} [{unit}]{ratio}"'
+    si = SI[QUANTITIES[name]]
+    one = Signal(channel=guess.channel, unit=guess.unit or si, factor=guess.factor, sign=guess.sign)
+    words = declaration(name, one, " /RATIO" * guess.hand)
+    known = guess.unit or signal_name(guess.channel[0])
+    return words if known else words.replace(f" [{si}]", " [UNIT]")
+
+
+def declaration(name: str, one: Signal, ratio: str = "") -> str:
+    """Return the word of --columns that declares a signal.   ratio : where it is not known."""
+    words = column_of(name) + "=" + " + ".join(map(without_unit, one.channel))
+    words += f" sign({one.sign})" * bool(one.sign) + f" [{one.unit}]" * bool(one.unit)
+    words += ratio or f" /{one.ratio:g}" * (one.ratio != 1.0)
+    words += f" *{one.factor:g}" * (one.factor != 1.0) + f" - {one.offset:g}" * bool(one.offset)
+    return f'"{words}"'

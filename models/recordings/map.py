@@ -25,6 +25,7 @@ from models.files import resolved, write_atomically
 from models.logs.door import open_log
 from models.logs.log import LogFile, RecordingError
 from models.logs.signals import (
+    COLUMNS,
     INSTEAD,
     NEEDED,
     QUANTITIES,
@@ -74,7 +75,7 @@ class LogMap:
     longest_gap : the log is cut where a channel has no sample for longer [s].
     holes : "refuse" a channel of which some cells have no value (NaN), or "cut" them out: then it
         has no sample there.
-    order : "refuse" stamps that fall or repeat, or "mend" them: samples are sorted by time, of
+    order : "refuse" times that decrease or repeat, or "mend" them: samples are sorted by time, of
         those that share a stamp the first stays, and where the clock goes back for a second or more
         the rest follows after a gap.
     low_pass : cut-off of a low pass on all signals [Hz]; None filters nothing. All pass the same
@@ -275,7 +276,7 @@ def given_signals(pairs: Sequence[str]) -> dict[str, Signal]:
         if not (name and equals and rest):
             raise RecordingError(f'--columns wants "NAME=COLUMN [UNIT]", not {displayed(pair)}')
         if ours is None:
-            known = ", ".join(QUANTITIES)
+            known = ", ".join(["t", *(COLUMNS.get(one, one) for one in QUANTITIES)])
             raise RecordingError(f"{displayed(name)} is no column of ours: {known}")
         if ours in found:
             raise RecordingError(f"--columns gives {name} twice")

@@ -1,5 +1,6 @@
 """From a log, a file or arrays in memory, to a Recording: read, brought to a clock, judged."""
 
+import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
@@ -9,11 +10,12 @@ from typing import Any
 
 from codegen.escape import displayed
 from models.logs.door import ENDINGS, open_log
-from models.logs.log import LogFile, RecordingError
+from models.logs.log import LogFile, RecordingError, one_run
 from models.logs.memory import open_arrays
-from models.logs.signals import Signal
+from models.logs.signals import INSTEAD, Signal, signal_name
 from models.recordings.assembly import recording_of
 from models.recordings.checks import check_against_vehicle, check_physics
+from models.recordings.choice import chosen_signals, declaration
 from models.recordings.evidence import least_squares, pair, windows
 from models.recordings.map import MEND, LogMap, given_channel, given_signals
 from models.recordings.record import Recording
@@ -22,6 +24,7 @@ from models.vehicle import Vehicle, sedan
 
 _NO_NAMES: Mapping[str, str] = {}
 _DT = 0.01  # [s], the sample time of every method
+_CHANGE = re.compile(r"change the sign of (\w+)")
 _MOST_TRIED = 50  # channels that may be the lateral acceleration
 _UNLIKE, _ALIKE = 0.3, 0.9  # correlation of a_y with v_x r, of another axis, and of it
 _GivenMap = LogMap | str | PathLike[str] | None
@@ -51,7 +54,8 @@ def read_recording(
     Parameters
     ----------
     source : path of a log of any format; or a data frame, or a mapping of arrays of one length, by
-        column. Times of the calendar and durations count from the first.
+        column. Times of the calendar and durations count from the first; where no column is the
+        time, the index of a data frame is, if it rises.
     run : name of the run; may be left out when there is only one.
     dt : sample time T_s of the result [s].
     name : of the recording; empty takes that of the file, "recording" for arrays.
@@ -72,21 +76,30 @@ def read_recording(
     RecordingError
         One line: file and run, column, rule, value, remedy.
     """
-    given = with_columns(map_of(log_map), columns)
     if isinstance(source, str | PathLike):
+        given = with_columns(map_of(log_map), columns)
         name, log = name or _stem(Path(source)), given.opened(source)
-    else:
-        name = name or "recording"
-        log = open_arrays(
-            name,
-            source,
-            given.clock,
-            given.clock_unit,
-            mend=given.order == MEND,
-            rate=given.rate or 0.0,
-        )
-        given = replace(given, clock="")
-    return _judged(log, name, given, run=run, dt=dt, check=check)
+        return _judged(log, name, given, run=run, dt=dt, check=check)
+    name = name or "recording"
+    try:
+        given = with_columns(map_of(log_map), columns)
+        clock, mend, rate = (given.clock, given.clock_unit), given.order == MEND, given.rate or 0.0
+        log = open_arrays(name, source, *clock, mend=mend, rate=rate)
+        read = _judged(log, name, replace(given, clock=""), run=run, dt=dt, check=check)
+    except RecordingError as error:
+        raise RecordingError(_in_python(str(error))) from None
+    return replace(read, notes=tuple(map(_in_python, read.notes)))
+
+
+def _in_python(text: str) -> str:
+    """Return a text with the options of commands as arguments of `read_recording`."""
+
+    def written(options: re.Match[str]) -> str:
+        pairs = re.findall(r'"([^"=]+)=([^"]+)"', options[0])
+        return "columns={" + ", ".join(f'"{a}": "{b}"' for a, b in pairs) + "}"
+
+    text = re.sub(r'--columns( "[^"=]+=[^"]+")+', written, text).replace("--columns", "columns")
+    return re.sub("--cut-holes, |tireid doctor LOG --vehicle FILE, or ", "", text)
 
 
 def read_repaired(
@@ -168,8 +181,26 @@ def _judged(
         except RecordingError as error:
             label = f"{log.path}{recording.name.removeprefix(name)}"
             said = str(error).removeprefix(recording.name) + f"; {other}" * bool(other)
+            if not given.repair:
+                said = _CHANGE.sub(lambda found: _declared(found, log, given, run), said)
             raise RecordingError(label + said) from None
     return recording
+
+
+def _declared(found: re.Match[str], log: LogFile, given: LogMap, run: str | None) -> str:
+    """Return how a sign is changed: with the word of --columns, where one can say it."""
+    run = one_run(log.path, log.runs(), run or given.run or None)
+    signals = chosen_signals(log, log.headings(), given, run).signals
+    ours = signal_name(found[1]) or ""
+    name = ours if ours in signals else INSTEAD.get(ours, "")
+    one = signals.get(name)
+    if one is None or one.table:
+        return found[0]
+    if one.ratio != 1.0:
+        turned = replace(one, ratio=-one.ratio)
+    else:
+        turned = replace(one, factor=-one.factor, offset=-one.offset)
+    return f"{found[0]} (--columns {declaration(name, turned)})"
 
 
 def _lateral(log: LogFile, recording: Recording, given: LogMap, run: str | None) -> str:

@@ -24,7 +24,7 @@ from codegen.arrays import LONG, Array, blocks, filled, large
 from models.bicycle import measured_slip
 from models.files import write_atomically
 from models.logs.log import RecordingError
-from models.logs.signals import COLUMNS, MEANINGS, QUANTITIES, signal_name
+from models.logs.signals import COLUMNS, ESTIMATED, MEANINGS, QUANTITIES, signal_name
 from models.logs.units import FORCE, SI, TABLES
 from models.rules import LARGEST_FORCE
 
@@ -77,7 +77,7 @@ class Recording:
     breaks : index of the first sample of each segment but the first, rising.
     notes : what was taken or done in reading beyond the words of the file, one sentence each.
     estimated : signals that a method estimated, not a sensor: v_y only. No method gets them.
-    v_y_sd : standard deviation of a v_y that was brought on time and smoothed [m/s], else 0.
+    v_y_sd : standard deviation of a v_y that was smoothed, its delay removed [m/s], else 0.
 
     Raises
     ------
@@ -278,6 +278,8 @@ class Recording:
     def to_dataframe(self) -> Any:
         """Return it as a data frame of pandas, by the columns of `write_recording`.
 
+        A v_y that a method estimated is in column vy_estimated, which `read_recording` ignores.
+
         Raises
         ------
         ImportError
@@ -287,7 +289,8 @@ class Recording:
             pandas = importlib.import_module("pandas")
         except ImportError:
             raise ImportError("a data frame needs pandas: pip install pandas") from None
-        return pandas.DataFrame(_columns(self))
+        names = {COLUMNS[name]: ESTIMATED for name in self.estimated}
+        return pandas.DataFrame(_columns(replace(self, estimated=()))).rename(columns=names)
 
     def taken(self, kept: slice | NDArray[np.intp]) -> "Recording":
         """Return some of the samples; where some are left out between, a segment begins.
@@ -347,10 +350,11 @@ class Recording:
         segments = f" in {len(self.segments)} segments" if self.breaks else ""
         size = f"{self.duration:.4g} s{segments}, {len(self)} samples at {1.0 / self.dt:.4g} Hz"
         rows = [["signal", "", "unit", "from", "to"]]
-        for column, signal in list(_columns(self).items())[1:]:
+        for column, signal in list(_columns(replace(self, estimated=())).items())[1:]:
             name = signal_name(column) or column
             ends = (f"{one:.4g}" for one in (signal.min(), signal.max()))
-            rows.append([name, MEANINGS[name], SI[QUANTITIES[name]], *ends])
+            label = f"{name} (estimated)" if name in self.estimated else name
+            rows.append([label, MEANINGS[name], SI[QUANTITIES[name]].replace("^2", "²"), *ends])
         notes = markup.folded(f"{len(self.notes)} notes", self.notes)
         return markup.card(markup.line(size, self.name), markup.table(rows), notes)
 

@@ -4,7 +4,7 @@
  * and so how their impulse goes on: p_i = (l m v_y +- I_z r)/L obeys dp_i/dt = F_i - m_i v_x r. What
  * the motion shows beyond that, over what may be wrong of force and band, makes a friction unlikely:
  * its cost is -2 ln of its likelihood, over that of the best. A friction may come at any time, so that
- * no cost is above a surprise. Planned is with the least friction that is not refuted.
+ * no cost is above a surprise. The plan uses the lowest friction that agrees with the data.
  *
  * Sensors may be off. Position and heading show where the car came to, so that what v_y and the yaw
  * rate tell beyond that is theirs, or that of the speed. While they contradict position and heading by
@@ -252,7 +252,7 @@ static uint32_t best_of(const tireid_mpc_state *state)
     return best;
 }
 
-/* Least friction that is not refuted: from the best one down, with a part of the next one. */
+/* Lowest friction that agrees with the data: from the best one down, with a part of the next one. */
 static real least_grip(const tireid_mpc_state *state, const tireid_mpc_params *params)
 {
     const real width = params->surprise - REFUTED;

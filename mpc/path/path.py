@@ -141,6 +141,10 @@ class Path:
         line = Line(self.s, self.X, self.Y, self.psi, self.kappa)
         check_line(line, self.name, self.closed)
 
+    def __repr__(self) -> str:
+        kind = "closed" if self.closed else "open"
+        return f"<Path {self.name!r}: {self.length:.4g} m, {kind}>"
+
     @classmethod
     def from_line(
         cls, line: Line, *, name: str, closed: bool = False, cones: Array = NO_CONES

@@ -24,6 +24,7 @@ _RADIUS = 3.0  # of a car's tightest turn [m]; less for a model car on its track
 _GAPS = 2.0  # median gaps of way-points: a right angle between them is tighter
 _FITS = 4  # of a line, each over the arc length of the one before
 _FARTHEST = 1e8  # of a way-point from the origin [m]: every map of the earth fits
+_SHORTEST = 0.1  # of a path [m]: 11 km in degrees
 _SAME = 1e-6  # of the median gap: way-points as near as this are one
 # Names of the columns of a file that has none, by their number: with a speed, with widths to the
 # right and left as F1TENTH writes them, and the race line of TUM.
@@ -172,6 +173,8 @@ def _checked(X: ArrayLike, Y: ArrayLike, closed: bool, name: str) -> Array:
     if closed:
         points = np.vstack((points, points[:1]))
     gaps = _norm(np.diff(points, axis=0))
+    if gaps.sum() < _SHORTEST:
+        raise PathError(f"{name}: the path is {gaps.sum():.2g} m long: are X and Y degrees?")
     same = np.flatnonzero(gaps <= _SAME * np.median(gaps))
     if same.size:
         raise PathError(

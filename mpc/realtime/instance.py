@@ -171,7 +171,7 @@ class Instance:
         road = (self.input["kappa"][1:], self.input["v_x"][1:])
         self.start = np.zeros(n_x, self.state["u"].dtype)
         self.solve_arguments = (*self._step[:3], pointer(self.start), *map(pointer, road))
-        self._library.mpc_init(self._step[0])
+        library["mpc_init_f32" if single else "mpc_init"](self._step[0])
 
     @property
     def numbers(self) -> tuple[NDArray[Any], ...]:

@@ -4,12 +4,13 @@
 #ifndef TIREID_CONFIG_H
 #define TIREID_CONFIG_H
 
-/* 1: float, 0: double. The library and all who use it must agree. */
+/* 1: float, 0: double. Where the library and who uses it disagree they do not link. */
 #ifndef TIREID_SINGLE
 #define TIREID_SINGLE 0
 #endif
 #if TIREID_SINGLE
 typedef float tireid_real;
+#define tireid_init tireid_init_f32
 #else
 typedef double tireid_real;
 #endif
@@ -22,6 +23,7 @@ typedef double tireid_real;
 #define TIREID_RESTS_FIRST 0 /* the first sample of all is one to rest at before it is taken */
 #define TIREID_SUMS 0 /* equations return the sum of all numbers that they tell */
 #define TIREID_RULES 4U /* of weights that are taken over */
+#define TIREID_RANGES 18U /* likewise, that numbers must lie in */
 #define TIREID_COVARIANCE 0U /* rows of a covariance among the weights */
 
 #define TIREID_SAMPLE_TIME (0.01) /* from one sample to the next [s] */

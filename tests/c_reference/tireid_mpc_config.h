@@ -4,12 +4,13 @@
 #ifndef TIREID_MPC_CONFIG_H
 #define TIREID_MPC_CONFIG_H
 
-/* 1: float, 0: double. The library and all who use it must agree. */
+/* 1: float, 0: double. Where the library and who uses it disagree they do not link. */
 #ifndef TIREID_MPC_SINGLE
 #define TIREID_MPC_SINGLE 0
 #endif
 #if TIREID_MPC_SINGLE
 typedef float tireid_mpc_real;
+#define tireid_mpc_init tireid_mpc_init_f32
 #else
 typedef double tireid_mpc_real;
 #endif

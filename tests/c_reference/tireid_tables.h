@@ -64,6 +64,32 @@ static const tireid_values tireid_start = {
 
 static const tireid_output tireid_no_output = { { TIREID_C(0.0), TIREID_C(0.0) } };
 
+static const tireid_real tireid_shares[9] = {
+    TIREID_C(1.0), TIREID_C(1.0), TIREID_C(1.0), TIREID_C(1.0), TIREID_C(1.0), TIREID_C(62.5),
+    TIREID_C(15.625), TIREID_C(7.8125), TIREID_C(3.90625)
+};
+
+static const tireid_range tireid_ranges[TIREID_RANGES] = {
+    { TIREID_C(-3.0), TIREID_C(3.0), 0U, 1U, 0U },
+    { TIREID_C(-3.0), TIREID_C(3.0), 1U, 1U, 0U },
+    { TIREID_C(-3.0), TIREID_C(3.0), 2U, 1U, 0U },
+    { TIREID_C(-3.0), TIREID_C(3.0), 3U, 1U, 0U },
+    { TIREID_C(-3.0), TIREID_C(3.0), 4U, 1U, 0U },
+    { TIREID_C(-3.0), TIREID_C(3.0), 5U, 1U, 0U },
+    { TIREID_C(-3.0), TIREID_C(3.0), 6U, 1U, 0U },
+    { TIREID_C(-3.0), TIREID_C(3.0), 7U, 1U, 0U },
+    { TIREID_C(0.1), TIREID_C(3.0), 0U, 4U, 1U },
+    { TIREID_C(0.1), TIREID_C(3.0), 4U, 4U, 1U },
+    { TIREID_C(2.0), TIREID_C(80.0), 0U, 4U, 5U },
+    { TIREID_C(2.0), TIREID_C(80.0), 4U, 4U, 5U },
+    { TIREID_C(0.0), TIREID_C(0.324), 8U, 1U, 0U },
+    { TIREID_C(0.0), TIREID_C(0.324), 11U, 1U, 0U },
+    { TIREID_C(0.0), TIREID_C(1.0), 9U, 1U, 0U },
+    { TIREID_C(0.0), TIREID_C(1.0), 12U, 1U, 0U },
+    { TIREID_C(-0.03), TIREID_C(0.03), 10U, 1U, 0U },
+    { TIREID_C(-0.771982836596773), TIREID_C(0.771982836596773), 13U, 1U, 0U },
+};
+
 static const tireid_rule tireid_rules[TIREID_RULES] = {
     { TIREID_FACTORS, 14U, 7U },
     { TIREID_FACTORS, 42U, 7U },

@@ -1,9 +1,14 @@
 """Numbers as people read them: three digits, ± of one or two, one unit of stiffness."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 import tireid as ti
-from identifier.measured import NOT_IDENTIFIABLE, printed_unit, printed_value, with_doubt
+from identifier.baselines.linear import LinearModel
+from identifier.measured import NOT_IDENTIFIABLE, as_printed, stiffness_words, with_doubt
+from models.vehicle import sedan
 
 
 @pytest.mark.parametrize(
@@ -19,10 +24,18 @@ def test_a_value_has_three_digits_and_none_that_its_doubt_hides(value, sd, words
     assert with_doubt(value, sd) == words
 
 
-def test_a_stiffness_is_printed_in_kilonewtons_of_a_car_of_any_size():
-    assert printed_value(126986.0, 4800.0, "N/rad") == "127 ± 5"
-    assert printed_value(51.23, 2.04, "N/rad") == "0.0512 ± 0.0020"
-    assert (printed_unit("N/rad"), printed_unit("m")) == ("kN/rad", "m")
+def test_a_stiffness_is_printed_in_kilonewtons_of_a_car_and_in_newtons_of_a_model_of_one():
+    C, sd = np.array([900.0, 1100.0]), np.array([18.0, 20.0])
+    assert stiffness_words(C, sd) == "0.900 ± 0.018 / 1.10 ± 0.02 kN/rad"
+    assert stiffness_words(C / 20.0) == "45.0 / 55.0 N/rad"
+    small = replace(
+        sedan(),
+        **{"mass": 1.5, "yaw_inertia": 0.005, "l_f": 0.08, "l_r": 0.09, "chassis": None},
+        **{"cornering_stiffness_front": 40.0, "cornering_stiffness_rear": 50.0},
+    )
+    model = LinearModel(vehicle=small, min_speed=0.5)
+    assert "cornering stiffness [N/rad]" in model.summary() and " 40.0 " in model.summary()
+    assert "lateral force [N]" in model._repr_html_()
 
 
 def test_a_summary_says_what_the_model_misses_once_somebody_looked(tmp_path):
@@ -32,7 +45,7 @@ def test_a_summary_says_what_the_model_misses_once_somebody_looked(tmp_path):
     front, rear = (with_doubt(100.0 * share) for share in verdict.model_error)
     (line,) = (one for one in tire.summary().splitlines() if one.startswith("model error"))
     assert line.split()[-2:] == [front, rear]
-    for number in verdict.numbers:
+    for number in as_printed(verdict.numbers):
         assert number.words in tire.summary()
     gentle = run.freeze(2.0)  # the sample has not turned by then
     assert f"({NOT_IDENTIFIABLE})" in gentle.summary()

@@ -59,7 +59,7 @@ def test_a_name_of_tireid_stays_its_own():
     [
         ("broken", r"method broken \(its_methods:fail\) cannot be made: no licence for it"),
         ("odd", r"method odd \(its_methods:odd\) is a float, no Method"),
-        ("other", "method must be one of fit, .*, mine, .*not 'other'"),
+        ("other", "method must be one of fit, .*, mine, .*not 'other'.*integral the paper's"),
     ],
 )
 def test_what_makes_no_method_is_one_line(name, said):

@@ -177,7 +177,7 @@ def test_a_word_of_the_command_line_tells_a_signal(word, name, signal):
 @pytest.mark.parametrize(
     ("words", "rule"),
     [
-        (["rate=yaw_rate"], "'rate' is no column of ours: v_x, v_y"),
+        (["rate=yaw_rate"], "'rate' is no column of ours: t, vx, vy"),
         (["r"], "wants"),
         (["r="], "wants"),
         (["r=a", "r=b"], "gives r twice"),

@@ -119,9 +119,9 @@ ON_MOTION = {
     "a_y in g": (scaled(a_y=1 / 9.81), "ay must be", "9.81"),
     "a_y to the right": (scaled(a_y=-1.0), "ay must be", "sign of ay"),
     "a_y empty": (scaled(a_y=0.0), "ay must be", "leave the column ay out"),
-    "r to the right": (scaled(r=-1.0), "r contradicts ay", "change its sign"),
+    "r to the right": (scaled(r=-1.0), "r contradicts ay", "change the sign of r"),
 }
-ON_V_Y = {"v_y to the right": (scaled(v_y=-1.0), "vy contradicts ay", "change its sign")}
+ON_V_Y = {"v_y to the right": (scaled(v_y=-1.0), "vy contradicts ay", "change the sign of vy")}
 ON_FORCE = {
     "forces to the right": (forces(-1, -1), "Fyf must push", "sign of Fyf"),
     "front force to the right": (forces(-1, 1), "Fyf must push", "sign of Fyf"),
@@ -445,7 +445,7 @@ def test_of_two_velocities_that_of_the_car_is_read_by_their_directions():
 
 @pytest.mark.parametrize(
     ("name", "factor", "offered"),
-    [("ax", 1.0, "ay=ax"), ("acc_2", -1.0 / 9.81, "ay=acc_2 [g] *-1")],
+    [("ax", 1.0, "ax"), ("acc_2", -1.0 / 9.81, "acc_2 [g] *-1")],
 )
 def test_the_channel_that_is_the_lateral_acceleration_is_offered(rng, name, factor, offered):
     made = drive()
@@ -453,4 +453,4 @@ def test_the_channel_that_is_the_lateral_acceleration_is_offered(rng, name, fact
     rest = {"t": made.t, "r": made.r, "delta_f": made.delta_f, "vx": made.v_x}
     with pytest.raises(RecordingError, match="its slope on v_x r") as refused:
         read_recording({**rest, "ay": other, name: factor * made.a_y})
-    assert f'--columns "{offered}"' in str(refused.value)
+    assert f'columns={{"ay": "{offered}"}}' in str(refused.value)

@@ -219,6 +219,17 @@ def mirrored(tmp_path_factory):
     return write_recording(drive, tmp_path_factory.mktemp("logs") / "mirrored.csv")
 
 
+@pytest.mark.parametrize(
+    ("wrong", "right"), [("[rad] /-2", "[rad] /2"), ("*-2 - 0.01", "*2 - -0.01")]
+)
+def test_a_wrong_sign_is_refused_with_the_word_that_turns_it(mirrored, wrong, right):
+    given = {"ay": "ay *-1", "delta_f": f"delta_f {wrong}"}
+    with pytest.raises(RecordingError) as refused:
+        read_recording(mirrored, columns=given)
+    assert f'(--columns "delta_f=delta_f {right}")' in str(refused.value)
+    read_recording(mirrored, columns=given | {"delta_f": f"delta_f {right}"})
+
+
 RIGHT = LogMap(repair=Repair(factor={"a_y": -1.0}, vehicle={"mass": 1400.0}))
 STILL_WRONG = LogMap(repair=Repair(offset={"r": 0.001}))
 

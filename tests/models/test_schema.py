@@ -92,6 +92,7 @@ DOCUMENTS = [
     (read_toml, "a = " + "9" * 5000, "characters of a line must be at most 4000, here are 5004"),
     (read_toml, "a = 2026-13-45", "cannot be read as TOML"),
     (read_toml, "a = = 1", "cannot be read as TOML"),
+    (read_toml, "mass = 1926,2", "a decimal point, not a comma?"),
 ]
 
 

@@ -106,6 +106,20 @@ def test_the_tire_is_found_from_the_folder_of_the_vehicle_file(tmp_path):
     assert '"../tires/t.tir"' in (tmp_path / "sub" / "car.toml").read_text()
 
 
+def test_a_car_on_the_built_in_tire_moves_to_another_folder_and_a_tire_that_lies_there_is_taken(
+    tmp_path,
+):
+    sedan().to_toml(tmp_path / "car.toml")
+    (tmp_path / "elsewhere").mkdir()
+    moved = (tmp_path / "car.toml").rename(tmp_path / "elsewhere" / "car.toml")
+    assert Vehicle.from_toml(moved) == sedan()
+    own = moved.with_name("sedan.tir")
+    own.write_bytes(CHASSIS.tire.read_bytes())
+    assert Vehicle.from_toml(moved).chassis.tire == own.resolve()
+    sedan().to_toml(moved, overwrite=True)  # names the built-in one, not that beside it
+    assert Vehicle.from_toml(moved) == sedan()
+
+
 def test_the_sedan_has_the_stiffness_of_its_tires_and_understeers():
     car = sedan()
     tire = MagicFormula.from_tir(CHASSIS.tire)
@@ -139,6 +153,8 @@ def test_what_a_file_leaves_out_is_estimated_and_said(tmp_path):
     assert "rear = 8.393e+04 N/rad (14 static axle loads per rad)" in car.estimates
     assert "stiffness_front" not in car.estimates
     assert car_of(tmp_path, SIX).estimates == ""
+    made = Vehicle(name=car.name, mass=1500.0, l_f=1.1, l_r=1.6, cornering_stiffness_front=1.2e5)
+    assert made == car and made.estimates == car.estimates
 
 
 @pytest.mark.parametrize(("l_f", "l_r", "share"), [(0.0805, 0.093, 0.5), (1.2, 1.5, 1.0)])

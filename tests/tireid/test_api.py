@@ -2,6 +2,7 @@
 
 import ast
 import builtins
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -13,8 +14,10 @@ import numpy as np
 import pytest
 
 import tireid as ti
+from codegen import markup
 from codegen.markup import AXLE_COLORS
 from identifier.methods import make_method
+from identifier.verdict import Objection
 from models.recordings import RecordingError
 from mpc.prediction import build_dynamics
 from mpc.tires import prediction_tire
@@ -194,6 +197,53 @@ def test_a_pandas_frame_is_read(log):
     assert ti.read_recording(frame).name == "recording:lap 2"
 
 
+def test_an_index_that_rises_is_the_time_of_a_frame_without_one(log):
+    pandas = pytest.importorskip("pandas", reason="needs pandas, which is no dependency")
+    frame = pandas.DataFrame(columns_of(log)).set_index("t")
+    seconds = pandas.to_timedelta(frame.index, unit="s")
+    for index in (frame.index, seconds, pandas.Timestamp("2026-11-29", tz="UTC") + seconds):
+        read = ti.read_recording(frame.set_index(index.rename("stamp")))
+        np.testing.assert_allclose(read.t - read.t[0], log.t - log.t[0], atol=1e-9)
+        np.testing.assert_allclose(read.r, log.r, atol=1e-9)
+        assert "time is the index of the data frame, 'stamp'" in read.notes
+    with pytest.raises(RecordingError, match=r'the time \[s\]; columns=\{"t": "when"\}\?'):
+        ti.read_recording(frame.reset_index(names="when"))
+    with pytest.raises(RecordingError, match="column t is missing"):  # it counts rows
+        ti.read_recording(frame.reset_index(drop=True))
+
+
+def test_an_estimated_v_y_is_displayed_and_never_read_as_measured(log, car):
+    pytest.importorskip("pandas", reason="needs pandas, which is no dependency")
+    found = ti.identify(replace(log, v_y=None), car).recording
+    frame = found.to_dataframe()
+    np.testing.assert_array_equal(frame.vy_estimated, found.v_y)
+    assert "v_y (estimated)" in found._repr_html_() and "vy" not in frame
+    assert ti.read_recording(frame).v_y is None
+    assert "vy" in log.to_dataframe()
+
+
+def test_headers_of_two_levels_and_names_without_a_letter_are_no_crash(log):
+    pandas = pytest.importorskip("pandas", reason="needs pandas, which is no dependency")
+    frame = pandas.DataFrame(columns_of(log))
+    levels = frame.set_axis(pandas.MultiIndex.from_product([frame.columns, ["SI"]]), axis=1)
+    with pytest.raises(RecordingError, match=r"2 levels.*df.columns.droplevel\(1\)"):
+        ti.read_recording(levels)
+    with pytest.raises(RecordingError, match="several columns are called vy: rename them"):
+        ti.read_recording(pandas.concat([frame, frame[["vy"]]], axis=1))
+    strange = frame.rename(columns={"r": "YawRate [rad/s]"}).assign(**{"%": 1.0, "[m/s]": 2.0})
+    np.testing.assert_allclose(ti.read_recording(strange).r, log.r, atol=1e-9)
+
+
+def test_errors_of_arrays_name_arguments_and_no_options(log):
+    columns = columns_of(log)
+    steering = 14.6 * np.degrees(columns.pop("delta_f"))
+    with pytest.raises(RecordingError) as caught:
+        ti.read_recording(columns | {"SteeringWheel [deg]": steering, "v": columns.pop("vx")})
+    words = 'columns={"vx": "v [UNIT]", "delta_f": "SteeringWheel [deg] /RATIO"}'
+    assert words in str(caught.value)
+    assert not re.search("--|tireid channels", str(caught.value))
+
+
 def test_columns_of_another_name_and_runs_are_chosen(log):
     columns = columns_of(log)
     columns["yaw_rate"] = columns.pop("r")
@@ -217,7 +267,7 @@ def test_times_of_the_calendar_and_durations_count_from_the_first(log, kind):
     np.testing.assert_allclose(told.t, plain.t, atol=1e-9)
     np.testing.assert_allclose(told.r, plain.r, atol=1e-9)
     stamped["t"][7] = "NaT"
-    with pytest.raises(RecordingError, match="t must be a time in every row, index 7 has none"):
+    with pytest.raises(RecordingError, match="t must be a time in every row, position 7 has none"):
         ti.read_recording(stamped)
 
 
@@ -360,5 +410,19 @@ def test_a_notebook_displays_the_answers_of_a_run(log, car, tires):
     for color in AXLE_COLORS:
         assert page.count(color) == 4  # name, band, curve as far as it is known and beyond
     assert all("<polyline" in tire._repr_html_() for tire in tires.values())
+    assert "line-through" not in page
+    run.__dict__["verdict"] = replace(
+        run.verdict,
+        findings=(Objection("force_missed", "front", "it misses", True),),
+        numbers=tuple(one._replace(valid=one.axle == "rear") for one in run.verdict.numbers),
+    )
+    page = run._repr_html_()
+    assert page.count(markup.STRUCK) == page.count(f'{markup.REFUSED}">') > 3  # front, rear
     filtered = ti.identify(log, car, make_method("linear_kf", car))._repr_html_()
     assert "No tires:" in filtered and "<svg" not in filtered
+
+
+def test_plot_draws_tires_with_their_band_and_a_run_with_its_samples(run):
+    for what, label in ((run.tire, "identified curve"), (run, "curve, steady")):
+        labels = {text.get_text() for one in ti.plot(what).legends for text in one.get_texts()}
+        assert labels >= {label, "band of 90 %"}

@@ -218,6 +218,7 @@ def test_a_unit_in_the_header_is_a_unit_and_need_not_be_told(log, tmp_path):
     assert np.allclose(in_ms.v_y, 3.6 * got.v_y)  # what is told holds
     with pytest.raises(RecordingError, match="must be in a unit of a speed"):
         read_recording(path, columns={"vy": "Yaw Rate"})
+    assert typed("channels", path, "--columns", "vy=Yaw Rate *-1") == 2
 
 
 def test_cells_without_a_value_are_told_and_cut_out_by_the_map_that_is_written(folder, log, capsys):

@@ -7,9 +7,17 @@ import pytest
 
 from identifier.doctor import Diagnosis, Finding
 from identifier.verdict import Verdict
+from identifier.verdict.verdict import Objection
 from models.recordings import LogMap, Repair, read_recording, write_recording
 from tests.tireid.conftest import json_of, learn_words, page_in, typed
-from tireid.diagnoses import _size_text, with_doctor, write_repair
+from tireid.diagnoses import (
+    _size_text,
+    diagnosis_notes,
+    diagnosis_text,
+    unsure_text,
+    with_doctor,
+    write_repair,
+)
 
 RATIO = 14.6
 
@@ -156,3 +164,25 @@ def test_a_verdict_never_passes_over_what_the_doctor_is_sure_of():
     assert said(late, unit, repair=late.repair) == fine
     assert not said(replace(unit, code="factor", channel="v_x")).valid, "it scales all forces"
     assert said(replace(unit, code="factor", channel="a_y")).valid
+
+
+def test_a_repair_that_is_not_sure_can_be_written_by_hand(tmp_path):
+    repair, path = Repair(factor={"delta_f": 1.298}), tmp_path / "log.toml"
+    finding = Finding(code="factor", channel="delta_f", confidence=0.99, repair=repair)
+    said = unsure_text(Diagnosis(name="x", findings=(finding,), unobservable=()), path)
+    assert "rival" in said
+    path.write_text("[repair]\n" + said.rpartition(": ")[2], encoding="utf-8")
+    assert LogMap.from_toml(path).repair == repair
+
+
+def test_what_the_verdict_notes_of_v_y_is_not_noted_again():
+    found = Finding(
+        code="v_y_reads", channel="v_y", size=-0.13, deviation=0.02, unit="m/s", note=True,
+        confidence=0.9, text="v_y reads 0.13 m/s too little",
+    )  # fmt: skip
+    diagnosis = Diagnosis(name="log", findings=(found,), unobservable=())
+    noted = Objection("v_y_reads", None, "v_y reads 0.14 m/s too little", False)
+    verdict = Verdict(findings=(), numbers=(), measures={})
+    assert len(diagnosis_notes(diagnosis, verdict)) == 1
+    assert diagnosis_notes(diagnosis, replace(verdict, findings=(noted,))) == []
+    assert "v_y reads wrong by  -0.130 ± 0.020 m/s" in diagnosis_text(diagnosis)

@@ -47,6 +47,16 @@ def test_several_outputs_are_written_at_once(stored, tmp_path, capsys):
     before = (tmp_path / "car_rear.tir").read_bytes()
     assert typed(*again) == 0
     assert (tmp_path / "car_rear.tir").read_bytes() == before
+    tire.save(tmp_path / "judged.json", valid=False)
+    ti.emit(tmp_path / "judged.json", tir=tmp_path / "car.tir", overwrite=True)
+    judged = (tmp_path / "car_rear.tir").read_text(encoding="utf-8")
+    assert "$ Verdict: not judged on its" in before.decode() and "$ Verdict: NOT valid" in judged
+    numbers = [one for one in tire.estimates() if one.axle == "rear"]
+    assert all(one.title in judged for one in numbers)
+    open_ = [
+        line for line in judged.splitlines() if line.endswith("not identified (default value)")
+    ]
+    assert len(open_) == sum(not one.identified for one in numbers)
 
 
 def test_without_a_flag_one_line_names_them_all(stored, capsys):

@@ -14,6 +14,7 @@ from identifier.paper.laws import Gains, diagonal
 from identifier.paper.network import Network
 from identifier.reproducibility import AxleRmse, Replay, Reproduction
 from identifier.run import History
+from identifier.verdict import WindowForces
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tests.tireid.test_drive_figures import FIGURES as DRIVEN
@@ -91,6 +92,8 @@ def frozen_replays(history):
 
 
 MADE, BLIND = made_up(), made_up(truth=False)
+_RISING = np.linspace(-0.05, 0.05, 20)[:, None] * [1.0, 0.6]
+WINDOWS = WindowForces(np.linspace(20.2, 22.8, 20), 8e4 * _RISING, 9e4 * _RISING, _RISING)
 RESULTS = {
     "instantaneous": {"online": (0.3, 0.2, 0.4), "32": (1.1, 0.9, 1.4)},
     "integral": {"online": (0.3, 0.2, 0.4), "32": (0.4, 0.3, 0.5)},
@@ -103,14 +106,14 @@ FIGURES = {
     "forces without truth": lambda: force_figure(BLIND, frozen_replays(BLIND)),
     "forces of a model car": lambda: force_figure(made_up(5.0), window=(20.5, 21.5)),
     "slip": lambda: slip_figure(MADE.freeze(22.0), MADE.recording),
-    "slip without truth": lambda: slip_figure(BLIND.freeze(22.0), BLIND.recording, BLIND),
+    "slip without truth": lambda: slip_figure(BLIND.freeze(22.0), BLIND.recording, WINDOWS),
     "error": lambda: error_figure(MADE, freeze_times=[21.0]),
     "error under bounds": lambda: error_figure(MADE, {"X": 3.0, "trivial": 0.5}, [21.0]),
     "weights": lambda: weights_figure(MADE, [21.0, 22.0]),
     "inputs": lambda: inputs_figure(made_up(rear=0.01).recording),
     "comparison": lambda: comparison_figure(RESULTS, PAPER),
     "prediction": lambda: prediction_figure(replayed(MADE)),
-    "prediction against online": lambda: prediction_figure(replayed(BLIND), BLIND),
+    "prediction without truth": lambda: prediction_figure(replayed(BLIND), WINDOWS),
     "prediction alone": lambda: prediction_figure(replayed(BLIND)),
 }
 EVERY = FIGURES | DRIVEN
@@ -212,19 +215,13 @@ def test_every_axle_has_its_own_curves_in_the_slip_figure():
     model, recording = unlike_axles(), MADE.recording
     figure = slip_figure(model, recording)
     loads = 1500.0 * 9.81 / 2.7 * np.array([1.5, 1.2])
-    alpha = np.column_stack(
-        [
-            recording.delta_f - np.arctan((recording.v_y + 1.2 * recording.r) / recording.v_x),
-            -np.arctan((recording.v_y - 1.5 * recording.r) / recording.v_x),
-        ]
-    )
-    frozen = model.predict(recording)
+    alpha, frozen = model.lagged_slip(recording), model.predict(recording)
     for axle, axes in enumerate(figure.axes[:2]):
         drawn = {label: line.T * [[np.radians(1.0)], [1e3]] for label, line in curves(axes).items()}
-        slip, force = drawn["frozen curve, steady"]
+        slip, force = drawn["curve, steady"]
         units = np.tanh(slip[:, None] / np.array(model.ladder))
         np.testing.assert_allclose(force, loads[axle] * units @ model.W[axle], rtol=1e-6, atol=1e-6)
-        for label, expected in (("truth", recording.axle_force), ("frozen weights", frozen)):
+        for label, expected in (("truth", recording.axle_force), ("model", frozen)):
             slip, force = drawn[label]
             np.testing.assert_allclose(slip, alpha[:, axle], atol=1e-9)
             np.testing.assert_allclose(force, expected[:, axle], rtol=1e-9, atol=1e-6)
@@ -338,7 +335,7 @@ def test_below_the_forces_stands_what_is_missed_of_them(truth):
     for axle, axes in enumerate(figure.axes[-2:]):
         _, *lines = axes.lines
         drawn = {line.get_label(): line.get_ydata() for line in lines}
-        expected = {"frozen weights": (last - known)[:, axle] / 1e3}
+        expected = {"model": (last - known)[:, axle] / 1e3}
         if truth:
             expected["online"] = (history.axle_force - known)[:, axle] / 1e3
         assert drawn.keys() == expected.keys()
@@ -356,6 +353,24 @@ def test_below_the_curve_stands_what_the_model_misses_of_the_truth():
         above = figure.axes[axle].lines[0]
         np.testing.assert_allclose(cloud.get_ydata(), missed[:, axle], atol=1e-9)
         np.testing.assert_allclose(cloud.get_xdata(), above.get_xdata())
+
+
+def test_without_truth_both_figures_have_the_force_from_the_motion():
+    over_slip = slip_figure(BLIND.freeze(22.0), BLIND.recording, WINDOWS)
+    over_time = prediction_figure(replayed(BLIND), WINDOWS)
+    for figure, at in ((over_slip, np.degrees(WINDOWS.slip)), (over_time, WINDOWS.t[:, None])):
+        for axle, (above, below) in enumerate(zip(figure.axes[:2], figure.axes[2:], strict=True)):
+            x, y = curves(above)["force from the motion"].T
+            np.testing.assert_allclose(x, (at + np.zeros(2))[:, axle])
+            np.testing.assert_allclose(1e3 * y, WINDOWS.measured[:, axle])
+            missed = 1e3 * below.lines[1].get_ydata()
+            np.testing.assert_allclose(missed, (WINDOWS.modelled - WINDOWS.measured)[:, axle])
+
+
+def test_a_guessed_stiffness_is_not_drawn():
+    guessed = replace(CAR, estimated=("cornering_stiffness_front",))
+    figure = slip_figure(replace(unlike_axles(), vehicle=guessed), MADE.recording)
+    assert ["linear tire" in curves(axes) for axes in figure.axes[:2]] == [False, True]
 
 
 @pytest.mark.heavy

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.fuzz.server import SLIP, steady_stiffness
 from identifier.estimate.model import FittedModel
-from identifier.measured import printed_value
+from identifier.measured import with_doubt
 from identifier.methods import METHODS, draws_weights, make_method
 from identifier.paper.design import PaperIdentifier, design_text
 from identifier.tire_model import load_model
@@ -216,9 +216,8 @@ def test_the_first_screen_says_what_is_missed_and_shows_the_curve(ended, law):
         assert 'class="struck"' not in page
         assert verdict["valid"] and json_of(result / "weights.json")["valid"] is True
         assert (stiff["axle"], stiff["state"]) == ("front", "valid")
-    assert printed_value(stiff["value"], stiff["sd"], "N/rad") in outline(page).text.replace(
-        "\xa0", " "
-    )
+    words = with_doubt(1e-3 * stiff["value"], 1e-3 * stiff["sd"])
+    assert words in outline(page).text.replace("\xa0", " ")
     assert "cornering stiffness [kN/rad]" in printed and " N/rad" not in printed
 
 

@@ -110,7 +110,7 @@ def test_given_speeds_have_no_limits_to_plot():
         (["--confidence", "0.4"], "--confidence must lie between"),
         (["--mu", "0.5"], "--mu is of a car that drives: add --laps 1"),
         (["--path", "straight.csv"], "nothing limits the speed: give v_max (--v-max"),
-        (["--path", "straight.csv", "--laps", "1"], "--laps N drives a closed path"),
+        (["--path", "straight.csv", "--laps", "1"], "N times, 'straight' is open"),
         (["--path", "kurve"], "there is no path 'kurve'"),
     ],
 )
@@ -139,4 +139,4 @@ def test_a_lap_is_driven_learnt_from_and_kept(folder, out, capsys, undrawn):
     assert driven["share"] == pytest.approx(0.82) and driven["off_path_m"] < 0.3
     assert driven["driven_s"] == pytest.approx(driven["planned_s"], rel=0.05)
     assert (out / "weights.json").exists() == driven["valid"]
-    assert "lap 1: planned" in capsys.readouterr().out
+    assert "of the limits, limit of a_y" in capsys.readouterr().out

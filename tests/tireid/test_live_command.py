@@ -9,6 +9,7 @@ import socket
 import struct
 import subprocess
 import sys
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -52,6 +53,15 @@ def test_a_log_is_replayed_to_its_end_and_the_last_line_says_what_is_known(drive
     assert front == pytest.approx(1e-3 * car.cornering_stiffness_front, rel=0.3)
     assert rear == pytest.approx(1e-3 * car.cornering_stiffness_rear, rel=0.3)
     assert 0.0 < front_sd < front and 0.0 < rear_sd < rear
+
+
+def test_a_clock_since_1970_is_printed_since_the_first_sample(drive, tmp_path, capsys):
+    log = ti.sample_recording().between(0.0, 2.0)
+    write_recording(replace(log, t=log.t + 1.7e9), tmp_path / "log.csv")
+    assert typed(*words(drive, "--speed", "inf", source=tmp_path / "log.csv")) == 0
+    said = capsys.readouterr()
+    assert "2 s as fast as possible" in said.err
+    assert re.match(r"201 samples; t = 1\.\d s, ", said.out)
 
 
 def test_what_is_recorded_is_every_state_of_the_drive(drive, tmp_path, capsys):

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
+from models.vehicle import sedan
 from tests.pages import faults_of, outline
 from tests.tireid.conftest import learn_words, typed
 from tireid.figures.style import figure_png
@@ -20,6 +21,7 @@ from tireid.report import (
     Section,
     Table,
     merged,
+    origin,
     report_html,
     write_report,
 )
@@ -205,3 +207,8 @@ def test_no_table_is_cut_in_a_window_or_on_a_telephone(tab, logs, tmp_path):
         tab.wait("document.readyState === 'complete' && document.querySelector('table') !== null")
         assert tab.value(f"{cut} e.clientWidth).map(e => e.textContent).join()") == ""
         assert tab.value("document.documentElement.scrollWidth") <= width
+
+
+def test_a_car_has_one_hash_with_its_chassis_and_without_it():
+    with_it, without = (origin("x", car, []) for car in (sedan(), sedan().without_chassis()))
+    assert with_it == without

@@ -15,6 +15,7 @@ from mpc.realtime import Status
 CAR = ti.sedan()
 LAG = CAR.require_chassis().steering_lag
 PATH = ti.paths.Path.from_waypoints([0, 20, 40, 60, 80], [0, 0, 2, 2, 0], name="bend")
+HERE = ti.VehicleState(0.0, 0.0, 0.0, 12.0, 0.0, 0.0)
 SPEED = ti.SpeedProfile(PATH, np.linspace(12.0, 16.0, PATH.s.size))
 
 
@@ -41,6 +42,7 @@ def driven(steers, seen=lambda state: state):
 def test_it_steers_as_a_drive_does():
     whole = ti.drive(PATH, CAR, speeds=SPEED, noise=False, delay=0.02).drive
     mine = tracker()
+    assert not mine.finished
     states, steering = driven(mine)
     assert len(whole) in (len(states) - 1, len(states))  # of which the last is past the end
     np.testing.assert_allclose(steering[: len(whole)], whole.command, atol=1e-9)
@@ -62,25 +64,44 @@ def test_the_plan_begins_at_the_car_and_leads_along_the_path():
     assert plan.shape == (41, 2) and plan[0] == pytest.approx([10.0, 0.3], abs=1e-6)
     end = PATH.project(*plan[-1])
     assert end.s - mine.s == pytest.approx(2.0 * 14.0, rel=0.1) and abs(end.e_y) < 0.2
-    assert (mine.e_y, mine.blind) == (pytest.approx(PATH.project(10.0, 0.3).e_y), 0.0)
+    here = PATH.project(10.0, 0.3)
+    assert (mine.e_y, mine.e_psi) == pytest.approx((here.e_y, -here.psi)) and mine.blind == 0.0
+
+
+@pytest.mark.parametrize("s", [-0.05, 0.0, 100.0, -100.0])
+def test_a_lap_is_first_met_within_half_of_it(s):
+    course = ti.paths.handling_course()
+    mine = ti.Tracker(course, CAR, speeds=10.0)
+    mine.step(ti.VehicleState(*map(float, course.pose(s)), 10.0, 0.2, 0.0))
+    assert mine.s == pytest.approx(s, abs=1e-3) and abs(mine.e_psi) < 1e-3
+
+
+def test_tires_of_another_car_are_refused_until_they_are_mounted():
+    tire = ti.identify(ti.sample_recording(), CAR, check=False).tire
+    light = replace(CAR, mass=900.0, name="light")
+    for drives in (ti.Tracker, ti.drive):
+        with pytest.raises(ValueError, match=r"\(mass 1500, driven 900\): .* tire.mounted_on"):
+            drives(PATH, light, tire, speeds=SPEED)
+    mine = ti.Tracker(PATH, light, tire.mounted_on(light), speeds=SPEED)
+    with pytest.raises(ValueError, match="tire is of another car"):
+        mine.set_tire(tire)
 
 
 def test_what_is_lost_is_bridged_and_said():
     mine, lost = tracker(), math.nan
     with pytest.raises(ValueError, match="the first state needs a number of X, v_x"):
         mine.step(ti.VehicleState(lost, 0.0, 0.0, lost, 0.0, 0.0))
-    here = ti.VehicleState(0.0, 0.0, 0.0, 12.0, 0.0, 0.0)
-    mine.step(here)
+    mine.step(HERE)
     for _ in range(20):
-        assert math.isfinite(mine.step(here._replace(X=lost)))
+        assert math.isfinite(mine.step(HERE._replace(X=lost)))
     assert mine.blind == pytest.approx(0.2) and mine.s == pytest.approx(20 * 0.12, abs=0.01)
     assert mine.status == Status.OK
-    assert math.isfinite(mine.step(here._replace(X=2.5, r=lost)))
+    assert math.isfinite(mine.step(HERE._replace(X=2.5, r=lost)))
     assert (mine.status, mine.blind) == (Status.NOT_FINITE, 0.0)
-    assert math.isfinite(mine.step(here._replace(X=2.6, Y=9.0)))
+    assert math.isfinite(mine.step(HERE._replace(X=2.6, Y=9.0)))
     assert mine.status == Status.OFF_PATH
     mine.reset()
-    mine.step(here._replace(X=60.0, Y=2.0))
+    mine.step(HERE._replace(X=60.0, Y=2.0))
     assert mine.status == Status.OK and mine.s == pytest.approx(PATH.project(60.0, 2.0).s)
 
 
@@ -103,9 +124,18 @@ def test_other_tires_steer_otherwise_from_the_next_step_on():
         (TypeError, lambda: tracker(tire="weights.json"), "can be made of str: give a TireModel"),
         (TypeError, lambda: tracker().step((0.0, 0.0)), "state must be a VehicleState, as"),
         (ValueError, lambda: ti.Tracker(PATH, CAR), "give speeds, such as 15.0 m/s"),
-        (ValueError, lambda: tracker(speeds=-1.0), "speeds in m/s must be positive"),
+        (ValueError, lambda: tracker(speeds=1.0), "speed_profile, must lie between 2 and 100"),
+        (
+            ValueError,
+            lambda: tracker(speeds=np.ones(3)),
+            "or a profile of speed_profile, must be a",
+        ),
         (ValueError, lambda: tracker(period=0.06), "period must be positive and at most 0.05"),
         (ValueError, lambda: tracker(max_steering=0.0), "max_steering must be positive"),
+        (ValueError, lambda: tracker(max_steering=30), "at most 1.2 rad, it is 30: degrees?"),
+        (ValueError, lambda: tracker(max_steering_rate=45), "at most 20 rad/s, it is 45: degrees?"),
+        (ValueError, lambda: tracker().step(HERE._replace(delta=10)), "delta must be at most 0.5"),
+        (ValueError, lambda: tracker().step(HERE._replace(X=np.ones(1))), "X must be a number"),
         (ValueError, lambda: tracker(delay=0.5), "delay must be between 0 and 0.31 s"),
         (ValueError, lambda: tracker().s, "call step first"),
     ],

@@ -22,7 +22,7 @@ def figure_of(rows, rng):
     """Noisy forces over time in rows, below them a curve in its band with a cloud and a shade."""
     figure, panels = axle_panels([1.0] * (rows + 1), sharex=False)
     for axes in panels[:-1].ravel():
-        for name in ("truth", "online", "frozen weights"):
+        for name in ("truth", "online", "model"):
             axes.plot(TIME, rng.normal(0.0, 3.0, len(TIME)), label=name)
         axes.set(ylabel="force\n[kN]", xlabel="time since 1700000000 s [s]")
     for axes in panels[-1]:

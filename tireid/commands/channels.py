@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,10 +15,19 @@ from models.files import write_atomically
 from models.logs.clock import holes, without_codes, without_empty
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
 from models.logs.names import Proposal, propose
-from models.logs.signals import INSTEAD, MEANINGS, NEEDED, QUANTITIES, WHEELS, Signal, given_by
-from models.logs.units import SI, is_given
+from models.logs.signals import (
+    INSTEAD,
+    MEANINGS,
+    NEEDED,
+    QUANTITIES,
+    WHEELS,
+    Signal,
+    given_by,
+    quantity_of,
+)
+from models.logs.units import SI, is_given, to_si
 from models.recordings import LogMap, choice, split_log_argument
-from models.recordings.assembly import require_often, wheel_scales, wheel_units
+from models.recordings.assembly import require_often, units_of, wheel_scales
 from models.recordings.choice import column_of
 from models.recordings.map import CUT
 from models.recordings.wheels import scale_text, wheel_factor, with_scales
@@ -59,6 +69,8 @@ def run(options: argparse.Namespace) -> int:
     headings, turned, world = choice.of_the_car(log, log.headings(), chosen)
     proposal = propose(log, headings, chosen)
     by_map = choice.as_listed(log, log_map.signals, [one.name for one in listed])
+    for name, unit in units_of(log.headings(), by_map).items():
+        to_si(unit, quantity_of(name, unit), f"{log.path}: {column_of(name)}")
     sure = {**choice.standard_signals(log, [one.name for one in headings]), **turned, **by_map}
     signals = choice.likely_signals(sure, proposal)
     signals = choice.with_wheels(signals, proposal)
@@ -93,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
         for name in {channel for one in signals.values() for channel in one.channel} & set(seen):
             require_often(str(log.path), without_empty(seen[name]).t, log.clock)
     if rolls or missing:
-        tell(_missing_text(options.log, missing, proposal, signals))
+        tell(_missing_text(options, missing, proposal, signals))
     if said:
         tell(said)
     if options.write is not None:
@@ -121,8 +133,9 @@ def _wheels(
         wheels, scaled = with_scales(log_map.wheels, signals, scales)
         return scale_text(scales), replace(log_map, wheels=wheels, signals=scaled), True
     try:
-        for name, unit in wheel_units(log.headings(), signals).items():
-            wheel_factor(column_of(name), name, unit, log_map.wheels)
+        for name, unit in units_of(log.headings(), signals).items():
+            if name in WHEELS:
+                wheel_factor(column_of(name), name, unit, log_map.wheels)
     except RecordingError as error:
         return str(error), plain, False
     return "vx is computed from the wheels", plain, True
@@ -167,6 +180,8 @@ def _channels_text(
         name = visible(one.name if len(one.name) <= _LONGEST_NAME else f"{one.name[:44]}...")
         rate = "?" if math.isnan(one.rate) else f"{one.rate:.4g}"
         meant = _meaning(one, signals, proposal, known)
+        if low == high != "?" and meant.startswith("perhaps"):
+            meant = f"constant {low}"
         rows.append([name, visible(one.unit), rate, str(samples), low, high, meant])
     return text_table(rows, "<<>>>><")
 
@@ -210,7 +225,9 @@ def _holes_text(seen: Mapping[str, Channel], signals: _Signals) -> str:
     return "\n".join(said)
 
 
-def _missing_text(log: str, missing: Sequence[str], proposal: Proposal, signals: _Signals) -> str:
+def _missing_text(
+    options: argparse.Namespace, missing: Sequence[str], proposal: Proposal, signals: _Signals
+) -> str:
     if not missing:
         there = given_by(signals)
         needed = [name for name in NEEDED if name in there] + ["a_y"] * ("v_y" not in there)
@@ -228,7 +245,14 @@ def _missing_text(log: str, missing: Sequence[str], proposal: Proposal, signals:
         )
         proposed = [choice.column_word(one, proposal) for one in likely]
         words += proposed or [f'"{column_of(name)}=CHANNEL"']
-    return "\n".join([*lines, f"declare it: tireid channels {log} --columns {' '.join(words)}"])
+    typed: str = options.words
+    for pair in options.columns:
+        if any(word.startswith(f'"{pair.partition("=")[0]}=') for word in words):
+            typed = typed.replace(f" {shlex.quote(pair)}", "", 1)
+    new = " ".join([" --columns", *words])
+    typed += " --force" * (options.write is not None and not options.force)  # it is written now
+    typed = typed.replace(" --columns", new, 1) if " --columns" in typed else typed + new
+    return "\n".join([*lines, f"declare it: {typed}"])
 
 
 def _unsure_toml(missing: Sequence[str], proposal: Proposal) -> str:

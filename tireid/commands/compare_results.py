@@ -43,7 +43,6 @@ from tireid.report import (
     origin,
     write_report,
 )
-from tireid.reports.identify import estimates_notes
 from tireid.verdicts import Verdicts, verdicts_headline, verdicts_notes
 
 
@@ -277,7 +276,8 @@ def _methods_caption(comparison: Comparison) -> str:
 
 
 def _compare_notes(comparison: Comparison) -> list[Note]:
-    said = estimates_notes(comparison.course.vehicle)
+    estimates = comparison.course.vehicle.estimates
+    said = [Note(f"{estimates}.")] * bool(estimates)
     if comparison.course.by_motion:
         text = (
             "Without true forces, methods are judged by the mean force in the motion over 0.3 s, "

@@ -246,7 +246,7 @@ def _learn(found: Results, figures: Images) -> Section:
                 "squares identify it sample by sample; where nothing was excited the prior "
                 "remains. tireid identify makes one estimate of a whole log."
             ),
-            curve_drawing(figures, verdict, slip_caption(found.model, learnt.recording, learnt)),
+            curve_drawing(figures, verdict, slip_caption(found.model, learnt.recording)),
             *learnt_blocks(found, figures)[1:],
             replay_picture(found, figures, "forces", learnt.recording.name),
         ],

@@ -9,7 +9,13 @@ from models.recordings.reader import repair_text
 from tireid import __version__
 from tireid.commands import DONE, NOT_VALID
 from tireid.commands import options as shared
-from tireid.diagnoses import add_repair, diagnosis_text, write_doctor_report, write_repair
+from tireid.diagnoses import (
+    add_repair,
+    diagnosis_text,
+    unsure_text,
+    write_doctor_report,
+    write_repair,
+)
 from tireid.figures.forces import draw_diagnosis
 from tireid.figures.style import save_figures
 from tireid.output import require_free, write_json
@@ -61,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     tell(diagnosis_text(diagnosis))
     if options.repair is not None:
         if after is None:
-            tell(f"no sure repair: with {options.repair} the log stays as it is")
+            tell(unsure_text(diagnosis, options.repair))
         else:
             tell(f"repaired: {repair_text(repair)}")
             tell(f"after the repair, {diagnosis_text(after, unobservable=False)}")

@@ -14,7 +14,7 @@ from identifier.tire_model import TireModel, stored_verdict
 from models.faults import KINDS, SIZED, FaultError, SensorFault
 from models.rules import require_within
 from models.schema import require_few
-from models.vehicle import BICYCLE, GRAVITY, Vehicle, sedan
+from models.vehicle import GRAVITY, Vehicle, sedan
 from mpc.loop.sensing import CarSensors, FaultySensors, imu_and_localization
 from mpc.path import BUILT_IN, Path
 from mpc.path.speed import SHARE
@@ -128,10 +128,10 @@ def run(options: argparse.Namespace) -> int:
     labels = list(dict.fromkeys(every if ALL in options.tires else options.tires))
     shared.require_one(options, "weights", "method", "paper", "design")
     stored = shared.model_of_day(options)
-    conditions = conditions_of(options, stored)
-    setup = conditions.setup
     driving.require_compiler()
     with shared.folder_of(options) as folder:
+        conditions = conditions_of(options, stored)
+        setup = conditions.setup
         if driving.ORACLE in labels:
             setup.oracle()  # what cannot be is said before the car drives
         source, learnt = frozen_tires(options, labels, conditions, stored)
@@ -264,13 +264,14 @@ def conditions_of(
     options: argparse.Namespace, stored: TireModel | None = None
 ) -> driving.Conditions:
     """Return what is to be driven; the car is by default that of stored tires.   stored : tires."""
-    of_sedan = stored is None or stored.vehicle.bicycle == sedan().bicycle
+    of_sedan = stored is None or stored.vehicle.moves_as(sedan())
     vehicle = shared.read_vehicle(options, None if of_sedan else stored, options.weights)
     wish = _parse_speed(options.speed, size_of(vehicle))
     if stored is not None:
-        require_its_car(options, stored.vehicle, vehicle)
+        stored.require_car(vehicle, options.weights, "leave --vehicle out")
+    path = path_of(options, vehicle)
     vehicle, tires = simulated(vehicle, stored)
-    setup = Setup(path_of(options, vehicle), vehicle, options.mu, (), wish, tires=tires)
+    setup = Setup(path, vehicle, options.mu, (), wish, tires=tires)
     drops = tuple(sorted(_parse_drop(text) for text in options.mu_drop))
     for s, _ in drops:
         if not setup.path.closed and s >= (length := setup.path.length):
@@ -320,12 +321,3 @@ def frozen_tires(
         f"frozen ones identified by {law} on {recording.duration:.0f} s of random steering on an "
         f"open field, up to {np.abs(recording.a_y).max():.1f} m/s² sidewards"
     ), run.tire if banded else run.freeze()
-
-
-def require_its_car(options: argparse.Namespace, learnt: Vehicle, driven: Vehicle) -> None:
-    """Refuse tires that were learnt on another car than is driven, whatever either is called."""
-    if learnt.bicycle == driven.bicycle:
-        return
-    key = next(key for key in BICYCLE if getattr(learnt, key) != getattr(driven, key))
-    apart = f"{key} {getattr(learnt, key):.6g}, driven {getattr(driven, key):.6g}"
-    raise ValueError(f"{options.weights} is of another car ({apart}): leave --vehicle out")

@@ -35,10 +35,9 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError("--out goes with --understeer: the other options name their files")
     if not (options.understeer or options.tir or options.slipx or options.ggv or options.steady):
         raise ValueError(f"nothing is asked for: add one or more of {WANTED}")
-    model = shared.stored_model(options.model)
-    assert model is not None
+    shared.stored_model(options.model)  # warns where it is not valid
     emitted = emit(
-        model,
+        options.model,
         tir=options.tir,
         slipx=options.slipx,
         ggv=options.ggv,

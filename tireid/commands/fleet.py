@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from identifier.measured import as_printed
 from identifier.tire_model import STIFFNESS
 from models.extras import needs
 from models.schema import require_few
@@ -202,10 +203,11 @@ def _merge(options: argparse.Namespace) -> int:
                     "on_another_road": one.elsewhere,
                 }
             )
-            C = [number.words for number in one.model.estimates() if number.title == STIFFNESS]
+            C = as_printed(n for n in one.model.estimates() if n.title == STIFFNESS)
+            stiffness = f"{C[0].words}, {C[1].words} {C[0].unit}"
             minutes = f"{one.information.seconds / 60.0:.1f} min"
             slips = f"{known[0]:.1f}, {known[1]:.1f} deg"
-            rows.append([one.name, str(one.logs), minutes, f"{C[0]}, {C[1]} kN/rad", slips])
+            rows.append([one.name, str(one.logs), minutes, stiffness, slips])
         write_json(folder / "models.json", models)
     tell(text_table(rows, "<>>>>"))
     for one in groups:

@@ -120,7 +120,8 @@ def run(options: argparse.Namespace) -> int:
         verdict, replayed = found.verdict, found.evaluated
         figures = found.write(folder, progress.begin(_DRAWING))
         write_json(folder / "doctor.json", {**diagnosis.to_dict(), "applied": repair.tables()})
-        write_identify_report(folder, found, figures, diagnosis, options.words)
+        log_map = shared.given_map(options)
+        write_identify_report(folder, found, figures, diagnosis, options.words, log_map)
         said = (
             found.table(),
             _closing_line(learnt, last, vehicle),
@@ -130,7 +131,7 @@ def run(options: argparse.Namespace) -> int:
             verdict_text(verdict),
         )
     if repair:
-        write_repair(options.repair, shared.given_map(options), diagnosis)
+        write_repair(options.repair, log_map, diagnosis)
         say(f"wrote {options.repair}")
     tell(*said)
     say(f"wrote {options.out}/")

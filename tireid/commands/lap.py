@@ -30,7 +30,6 @@ from tireid.commands.drive import (
     add_path,
     path_of,
     quantity,
-    require_its_car,
 )
 from tireid.driving.laps import drive_laps
 from tireid.driving.runs import FRICTIONS
@@ -82,7 +81,7 @@ def declare(new: Any) -> None:
     shared.add_options(parser, float, numbers)
     shared.add_options(parser, bool, {"--confirm": f"with --laps: {CONFIRM}"})
     parser.set_defaults(confirm=None)
-    shared.add_vehicle(parser, default="that of WEIGHTS; --laps needs its chassis")
+    shared.add_vehicle(parser, default="that of WEIGHTS")
     shared.add_seed(parser, "noise, with --laps")
     shared.add_output(parser, "lap")
 
@@ -106,7 +105,7 @@ def run(options: argparse.Namespace) -> int:
         )
     tire = load_model(source)
     vehicle = shared.read_vehicle(options, tire, source)
-    require_its_car(options, tire.vehicle, vehicle)
+    tire.require_car(vehicle, source, "leave --vehicle out")
     path = path_of(options, vehicle)
     try:
         limits = speed_limits(tire, confidence=options.confidence).scaled(ratio)
@@ -120,7 +119,7 @@ def run(options: argparse.Namespace) -> int:
     elif n < 1.0 or n % 1.0:
         raise ValueError(f"--laps must be a whole number, 1 or more, it is {n:g}")
     elif not path.closed:
-        raise ValueError(f"--laps N drives a closed path N times: leave it out for {path.name}")
+        raise ValueError(f"--laps N drives a closed path N times, {path.name!r} is open")
     with shared.folder_of(options) as folder:
         rows, completed = list[dict[str, float]](), True
         if n is None:
@@ -141,7 +140,7 @@ def run(options: argparse.Namespace) -> int:
                 }  # fmt: skip
                 rows.append(row)
                 tell(
-                    "lap {}: planned {:.2f} s, driven {:.2f} s, {:.2f} of the limits, a_y up to "
+                    "lap {}: planned {:.2f} s, driven {:.2f} s, {:.2f} of the limits, limit of a_y "
                     "{:.2f} m/s²; {:.2f} m off the path".format(*row.values())
                     + ("" if valid else "; it taught nothing")
                 )

@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from identifier.measured import with_doubt
+from identifier.measured import stiffness_words
 from tireid.commands.options import (
     add_log_map,
     add_options,
@@ -22,11 +22,12 @@ from tireid.commands.options import (
     stored_model,
 )
 from tireid.live.live import OLD, Live
-from tireid.live.outputs import Outputs, Store
+from tireid.live.outputs import Outputs, Store, scale_of_steering
 from tireid.live.sources import Source, open_source
 from tireid.live.state import Counts, State
 from tireid.progress import say, tell
 
+_UNIX = 1e5  # s: of a clock that reads more, as a Unix time does, the first sample is 0
 _EVERY = 10.0  # s between two lines while nothing changes
 _GARBAGE = 700, 10, 10  # as Python has it: a run that does not end cannot gather it as others do
 _ENDS = ("SIGINT", "SIGTERM", "SIGHUP")
@@ -66,12 +67,14 @@ def run(options: argparse.Namespace) -> None:
     if record is not None and (record.suffix.lower() != ".mcap" or record.exists()):
         raise ValueError(f"--record {record}: name a new file, one that ends in .mcap")
     tire = stored_model(options.weights)
-    vehicle = read_vehicle(options, tire, options.weights)
+    vehicle, log_map = read_vehicle(options, tire, options.weights), given_map(options)
     with ExitStack() as signals, ExitStack() as stack:  # a second one cuts no end short
-        store = stack.enter_context(closing(Store(options.store))) if options.store else None
+        store = Store(options.store, scale_of_steering(log_map)) if options.store else None
+        if store is not None:
+            stack.enter_context(closing(store))
         live = Live(vehicle, tire, resume=None if store is None else store.stored())
         source = open_source(
-            options.source, given_map(options), live.counts, vehicle=vehicle, speed=options.speed
+            options.source, log_map, live.counts, vehicle=vehicle, speed=options.speed
         )
         live.prepare(v_y=source.v_y is not False)  # before packets come, which would have to wait
         gc.collect()
@@ -84,16 +87,16 @@ def run(options: argparse.Namespace) -> None:
             signals.callback(signal.signal, number, before)
         for line in (source.words, *outputs.words.splitlines()):
             say(line)
-        _follow(live, source, outputs, store)
+        first = _follow(live, source, outputs, store)
     last = live.state()
-    known = _counted(live.counts) or "nothing came" if last is None else _line(last)
+    known = _counted(live.counts) or "nothing came" if last is None else _line(last, first)
     tell(f"{live.counts.samples} samples; {known}")
 
 
-def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -> None:
-    """Pass on what is known, until the source ends or is closed."""
+def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -> float:
+    """Pass on what is known, until the source ends or is closed; return the first time [s]."""
     newest = sent = time.monotonic()
-    said, before, came, counts = -math.inf, None, 0, live.counts
+    said, before, came, first, counts = -math.inf, None, 0, math.nan, live.counts
     for sample in source:
         now = time.monotonic()
         state = None
@@ -106,6 +109,7 @@ def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -
         if sample is None or (state is None and now - sent > OLD):
             state = live.state(now - newest)
         if state is not None:
+            first = state.t if math.isnan(first) else first
             outputs.send(state)
             sent = now
         judged = before if state is None else (state.valid, bool(state.alarm))
@@ -113,19 +117,19 @@ def _follow(live: Live, source: Source, outputs: Outputs, store: Store | None) -
         if judged != before or (due and now - said > _EVERY):
             before, said = judged, now
             counted = _counted(counts) or "nothing comes"
-            say(f"nothing is known yet: {counted}" if state is None else _line(state))
+            say(f"nothing is known yet: {counted}" if state is None else _line(state, first))
             if store is not None:
                 store.offer(live.tires())
     if store is not None:
         store.offer(live.tires())
+    return first
 
 
-def _line(state: State) -> str:
-    """Return what a driver reads of a state, in one line."""
+def _line(state: State, first: float) -> str:
+    """Return what a driver reads of a state, in one line.   first : time of the first one [s]."""
     known = "valid" if state.valid else f"not valid: {state.reason} ({state.origin} tires)"
-    parts = [f"t = {state.t:.1f} s, {known}"]
-    both = map(with_doubt, 1e-3 * state.stiffness, 1e-3 * state.stiffness_sd)
-    parts.append(f"stiffness {' / '.join(both)} kN/rad")
+    parts = [f"t = {state.t - first * (first > _UNIX):.1f} s, {known}"]
+    parts.append(f"stiffness {stiffness_words(state.stiffness, state.stiffness_sd)}")
     if state.friction is not None:
         parts.append(f"friction {state.friction:.2f}")
     alarm = f"ALARM: {state.alarm}" if state.alarm else ""

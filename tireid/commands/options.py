@@ -77,7 +77,7 @@ def read_vehicle(
     known = sedan() if model is None else model.vehicle
     vehicle = known if path is None else Vehicle.from_toml(path)
     if vehicle.estimates:
-        say(f"{source if path is None else path}: {vehicle.estimates}")
+        say(f"{f'car of {source}' if path is None else path}: {vehicle.estimates}")
     mended = _map_path(options)
     numbers: dict[str, Any] = dict(map_of(mended).repair.vehicle)
     if not numbers:

@@ -16,10 +16,10 @@ from identifier.reproducibility import beyond_known
 from identifier.tire_model import TireModel
 from identifier.verdict import within_band
 from models.files import digest
+from models.recordings import LogMap
 from tireid import __version__, output
 from tireid.commands import options as shared
-from tireid.figures.forces import prediction_figure
-from tireid.figures.predict import friction_figure, motion_figure
+from tireid.figures.forces import friction_figure, prediction_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import slip_figure
 from tireid.identified import error_cells
@@ -38,7 +38,6 @@ from tireid.report import (
 from tireid.reports.captions import (
     force_caption,
     friction_caption,
-    motion_caption,
     slip_caption,
 )
 from tireid.reports.identify import (
@@ -48,6 +47,7 @@ from tireid.reports.identify import (
     error_table,
     estimates_notes,
     extrapolated,
+    went_in,
 )
 from tireid.verdicts import (
     known_headline,
@@ -103,15 +103,16 @@ def run(options: argparse.Namespace) -> int:
         output.write_json(folder / "summary.json", facts)
         say("drawing figures")
         figures = {
-            "slip": slip_figure(model, recording),
-            "forces": prediction_figure(prediction),
+            "slip": slip_figure(model, recording, verdict.forces),
+            "forces": prediction_figure(prediction, verdict.forces),
         }
-        if verdict.forces is not None:
-            figures["motion"] = motion_figure(verdict.forces, model.vehicle)
         if friction is not None:
             figures["friction"] = friction_figure(friction)
         images = save_figures(folder, figures)
-        write_predict_report(folder, prediction, images, lines, options.model, options.words)
+        log_map = shared.given_map(options)
+        write_predict_report(
+            folder, prediction, images, lines, options.model, options.words, log_map
+        )
     error, table = prediction.against_truth, ""
     if error is not None:
         cells = [visible(recording.name), *error_cells(error, prediction.true_force)]
@@ -214,7 +215,7 @@ def _prediction_text(prediction: Prediction, facts: Mapping[str, Any]) -> str:
         lines.append("friction: that of the identification drive, which explains every part")
     if friction is not None and not friction.roads:
         lines.append(
-            "friction: that of the identification drive, as far as observable"
+            f"friction: that of the identification drive, as far as observable; {friction.text}"
             if friction.unchanged
             else "friction: not observable, slip is too small"
         )
@@ -228,10 +229,12 @@ def write_predict_report(
     lines: str,
     source: Path,
     command: str,
+    log_map: LogMap,
 ) -> None:
     """Write the report of a prediction.
 
     lines : what is said of it beside its errors.   source : the model's file.
+    log_map : how the log was read.
     """
     model, recording, verdict = prediction.model, prediction.recording, prediction.verdict
     notes = [
@@ -245,31 +248,31 @@ def write_predict_report(
         found.append(error_table([[recording.name, *error_numbers(error, prediction.true_force)]]))
     found += map(sentence, lines.splitlines())
     captions = {"replay": force_caption(recording, prediction.axle_force, model, verdict)}
-    if verdict.forces is not None:
-        captions = {"motion": motion_caption(verdict), **captions}
     if verdict.friction is not None:
         captions["friction"] = friction_caption(verdict.friction)
     found += drawings({**figures, "replay": figures["forces"]}, captions)
     if band := band_sentence(model):
         found.append(band)
     report = Report(
-        title=f"Tires of {source.name} on {recording.name}",
+        title=f"Tires of {model.vehicle.name}, predicted on {recording.name}",
         summary=f"{recording.duration:.4g} s of driving of {model.vehicle.name}, "
-        "predicted by a stored model.",
+        f"predicted by {source.name}.",
         numbers=[
             verdict_headline(verdict),
             *of_answer(verdict, [*model_error_headline(verdict), *known_headline(model)]),
         ],
-        lead=[curve_drawing(figures, verdict, slip_caption(model, recording))],
+        lead=[curve_drawing(figures, verdict, slip_caption(model, recording, verdict.forces))],
         notes=notes,
         sections=[
             verdict_section(verdict, model),
             Section("What it predicts", found),
             *sensors_section(model, [recording]),
+            Section("What went in", went_in(model, log_map)),
             origin(
                 command,
                 model.vehicle,
                 [recording],
+                channels=f"hash {digest(repr(log_map))}",
                 model=f"{source.name}, hash {digest(model.to_dict())}",
             ),
         ],

@@ -16,7 +16,7 @@ from identifier.methods import continuing
 from identifier.run import DivergedError, OnlineIdentifier
 from identifier.tire_model import TireModel
 from models.faults import SensorFault
-from models.rules import require_within
+from models.rules import require_kind, require_within
 from models.tires import Tire
 from models.vehicle import Vehicle
 from mpc.handover.learner import Learner
@@ -387,12 +387,16 @@ def drive(
     VehicleError
         Where the vehicle has no chassis and no identified tires are given.
     ValueError
-        Where a number is not that of a drive, there is no tire to go on learning from or to plan
-        speeds of, speeds are of another path, or no C compiler is there for the tracker.
+        Where a number is not that of a drive, the tire is of another car, there is none to go on
+        learning from or to plan speeds of, speeds are of another path, or no C compiler is there
+        for the tracker.
     """
-    if learning and tire is None:
+    if tire is not None:
+        require_kind(TireModel, "as run.tire", tire=tire)
+        tire.require_car(vehicle)
+    elif learning:
         raise ValueError("learning goes on from a tire: none is given")
-    wish = SpeedWish.of(speeds, tire)
+    wish = SpeedWish.of(speeds, tire, vehicle)
     vehicle, true_tires = (vehicle, tires) if tires else simulated(vehicle, tire)
     conditions = Conditions(
         setup=Setup(path, vehicle, friction, (), wish, tires=true_tires),

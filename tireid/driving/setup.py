@@ -17,13 +17,13 @@ from codegen.arrays import Array
 from identifier.speed_limits import SpeedLimits, speed_limits
 from identifier.tire_model import TireModel
 from models.friction import Friction, FrictionChange
-from models.rules import require_positive
+from models.rules import require_within
 from models.tires import MagicFormula, Tire
 from models.vehicle import GRAVITY, Vehicle, sedan
 from mpc.cars import BRAKES, DoubleTrackCar
 from mpc.path import Path, PathError, SpeedProfile, speed_profile, steady_speed
 from mpc.path.speed import SHARE
-from mpc.problem import Limits, size_of
+from mpc.problem import Guards, Limits, size_of
 from mpc.tires import PredictionTire, oracle_tire
 from mpc.tires.ladder import cornering_force
 
@@ -59,12 +59,16 @@ class SpeedWish(NamedTuple):
     profile: SpeedProfile | None = None
 
     @classmethod
-    def of(cls, speeds: SpeedProfile | float | None, tire: TireModel | None) -> "SpeedWish":
+    def of(
+        cls, speeds: SpeedProfile | float | None, tire: TireModel | None, vehicle: Vehicle
+    ) -> "SpeedWish":
         """Return the wish for a profile, for a speed [m/s], or for what a tire allows."""
         if isinstance(speeds, SpeedProfile):
             return cls(profile=speeds)
         if speeds is not None:
-            require_positive(ValueError, **{"speeds in m/s": speeds})
+            name = "speeds in m/s, or a profile of speed_profile,"
+            plans = Guards.of(vehicle)
+            require_within(ValueError, plans.min_speed, plans.max_speed, **{name: speeds})
             return cls(speed=speeds)
         if tire is None:
             raise ValueError("no tire is given that tells the speed: give speeds, such as 15.0 m/s")

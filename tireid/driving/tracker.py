@@ -9,7 +9,7 @@ import numpy as np
 
 from codegen.arrays import Array
 from identifier.tire_model import TireModel
-from models.rules import require_kind, require_positive
+from models.rules import require_kind, require_number, require_positive
 from models.sensors import is_measured
 from models.vehicle import Vehicle
 from mpc.cars import SPEED_GAIN
@@ -21,8 +21,11 @@ from mpc.path import Path, SpeedProfile
 from mpc.problem import Problem
 from mpc.realtime.instance import Command, Status
 from mpc.realtime.tracker import Tracker as _Tracker
-from mpc.tires import prediction_tire
+from mpc.tires import PredictionTire, prediction_tire
 from tireid.driving.setup import PERIOD, Setup, SpeedWish, require_drivable
+
+# Beyond which an angle is one in degrees: wheels turn by 0.7 rad, and in models within 0.1 s.
+_WIDEST, _FASTEST = 1.2, 20.0  # rad, rad/s
 
 
 class VehicleState(NamedTuple):
@@ -47,6 +50,18 @@ class VehicleState(NamedTuple):
     v_y: float | None = None
     a_y: float | None = None
     delta: float | None = None
+
+
+def _of_car(tire: Any, car: Vehicle) -> PredictionTire:
+    if isinstance(tire, TireModel):
+        tire.require_car(car)
+    return prediction_tire(tire, car)
+
+
+def _require_radians(most: float, unit: str, **values: float) -> None:
+    for name, value in values.items():
+        if abs(value) > most:
+            raise ValueError(f"{name} must be at most {most:g} {unit}, it is {value:g}: degrees?")
 
 
 class Tracker:
@@ -78,7 +93,8 @@ class Tracker:
     TypeError
         Where path, car or tire is another kind of object.
     ValueError
-        Where a number breaks its rule, speeds are of another path, or nothing tells a speed.
+        Where a number breaks its rule, tires are of another car, speeds of another path, or
+        nothing tells a speed.
     NoCompilerError
         Where there is no C compiler.
     """
@@ -98,20 +114,21 @@ class Tracker:
     ) -> None:
         require_kind(Path, "as of paths.Path.from_waypoints or Path.from_csv", path=path)
         require_kind(Vehicle, "as of Vehicle.from_toml or sedan", car=car)
-        model = prediction_tire(car if tire is None else tire, car)
+        model = _of_car(car if tire is None else tire, car)
         self._known = tire if isinstance(tire, TireModel) else None
-        wish = SpeedWish.of(speeds, self._known)
+        wish = SpeedWish.of(speeds, self._known, car)
         problem = Problem.of(car, period)
         limits = problem.limits
         steering = limits.steering if max_steering is None else max_steering
         rate = limits.steering_rate if max_steering_rate is None else max_steering_rate
         require_positive(ValueError, max_steering=steering, max_steering_rate=rate)
-        limits = replace(limits, steering=steering, steering_rate=rate)
-        problem = replace(problem, limits=limits)
+        _require_radians(_WIDEST, "rad", max_steering=steering)
+        _require_radians(_FASTEST, "rad/s", max_steering_rate=rate)
+        problem = replace(problem, limits=replace(limits, steering=steering, steering_rate=rate))
         require_drivable(path, car, steering)
         self._tracker = _Tracker(model, problem, period=period, delay=delay, caution=caution)
         self.profile = Setup(path, car, 1.0, (), wish, wish.limits(self._known)).profile()
-        self._path, self._car = path, car
+        self._path, self._car, self._most = path, car, steering
         self._guide: Guide | None = None
         self._lateral: LateralVelocity | None = None
         self._steered = deque([0.0], maxlen=1 + round(delay / period))  # and acts the first
@@ -131,9 +148,9 @@ class Tracker:
         Raises
         ------
         ValueError
-            Where it is of another kind.
+            Where it is of another kind, or of another car.
         """
-        self._tracker.set_tire(prediction_tire(tire, self._car))
+        self._tracker.set_tire(_of_car(tire, self._car))
 
     def step(self, state: VehicleState) -> float:
         """Return the angle to steer the front road wheels by [rad], positive to the left.
@@ -151,10 +168,14 @@ class Tracker:
         TypeError
             Where it is no `VehicleState`.
         ValueError
-            Where the first one lacks X, Y, psi or v_x.
+            Where a field is no number, or the first state lacks X, Y, psi or v_x, or its delta is
+            beyond max_steering.
         """
         require_kind(VehicleState, "as VehicleState(X, Y, psi, v_x, r)", state=state)
-        X, Y, psi, v_x, r, v_y, a_y, delta = (math.nan if x is None else float(x) for x in state)
+        given = {name: math.nan if x is None else x for name, x in state._asdict().items()}
+        for name, x in given.items():
+            require_number(ValueError, name, x)
+        X, Y, psi, v_x, r, v_y, a_y, delta = map(float, given.values())
         measured = Measured(0.0, X, Y, psi, v_x, v_y, r, delta, a_y)
         guide = self._guide or self._begin(measured, estimates=state.v_y is None)
         if state.delta is None:
@@ -171,8 +192,11 @@ class Tracker:
         if lost:
             raise ValueError(f"the first state needs a number of {', '.join(lost)}")
         place = Place(first.X, first.Y, first.psi, first.v_x)
-        here = self._path.project(place.X, place.Y)
-        wheels = first.delta if is_measured("delta", first.delta) else 0.0
+        here, length = self._path.project(place.X, place.Y), self._path.length
+        if self._path.closed and here.s > 0.5 * length:  # not yet at the start of the first lap
+            here = self._path.project(place.X, place.Y, here.s - length)
+        wheels = 0.0 if math.isnan(first.delta) else first.delta
+        _require_radians(self._most, "rad", delta=wheels)
         self._tracker.reset(wheels)
         self._steered.extend([wheels] * (self._steered.maxlen or 1))
         self._lateral, period = None, self._tracker.period
@@ -195,7 +219,9 @@ class Tracker:
 
     @property
     def s(self) -> float:
-        """Arc length along the path now [m]; a closed path counts laps."""
+        """Arc length along the path now [m]; a closed path counts laps, and is first met within
+        half a lap of its start: s < 0 is before it.
+        """
         return self._located.here.s
 
     @property
@@ -204,9 +230,15 @@ class Tracker:
         return self._located.here.e_y
 
     @property
+    def e_psi(self) -> float:
+        """Heading against that of the path now, to the left [rad]."""
+        return self._located.here.heading_error(self._located.place.psi)
+
+    @property
     def finished(self) -> bool:
         """Whether the car is past the end of an open path; a closed one has none."""
-        return not self._path.closed and self.s >= self._path.length
+        begun = self._guide is not None
+        return begun and not self._path.closed and self.s >= self._path.length
 
     @property
     def blind(self) -> float:

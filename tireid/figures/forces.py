@@ -1,8 +1,7 @@
-"""Axle forces over time as in the paper's Figs. 2-5: online above, frozen replays below.
+"""Axle forces over time: of the model beside those that are known, and as in the paper's Figs. 2-5.
 
-A method that learns from a whole log has replays alone.
-
-And those that the motion shows, over slip angle, as a log is given and as the doctor repairs it.
+And those that the motion shows, over slip angle, as a log is given and as the doctor repairs it;
+and the friction of the road.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,21 +11,26 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from codegen.arrays import Array
+from codegen.arrays import Array, thinning
 from identifier.doctor.readings import Motion, Reading, forces_and_slips
 from identifier.prediction import Prediction
 from identifier.reproducibility import Replay, freeze_key, online_error
 from identifier.run import History
+from identifier.verdict import RoadFriction, WindowForces
 from models.recordings import Recording
 from models.rules import require_kind
 from models.vehicle import Vehicle
 from tireid.figures.style import (
     AXLES,
+    BLACK,
     BLUE,
     FROZEN,
     GREY,
+    MODEL,
+    MOTION,
     ONLINE,
     ORANGE,
+    SKY,
     TRUTH,
     ForceUnit,
     Look,
@@ -54,20 +58,23 @@ def _force_panels(
     rows: Sequence[tuple[str, Sequence[_Curve]]],
     known: Array | None,
     judged: Sequence[_Curve],
-    window: tuple[float, float] | None = None,
     heights: tuple[float, float] = (2.0, 1.0),
+    window: tuple[float, float] | None = None,
+    t: Array | None = None,
 ) -> tuple[Figure, NDArray[Any], ForceUnit]:
     """Draw forces in rows, below them what some miss of those that are known.
 
     rows : title of each behind the axle's name, and its curves.
     known : (n, 2) [N]; None misses nothing.   heights : of a row of forces, of the residual [in].
+    t : of the forces [s]; None is each sample.
     """
+    t = recording.t if t is None else t
     ends = (recording.t[0], recording.t[-1]) if window is None else window
     curves = [force for _, row in rows for force, _ in row]
     reference = curves[0] if known is None else known
     errors = [force - reference for force in curves]
-    part = drawn_samples(recording.t, ends, reference, *curves, *errors)
-    t, unit = drawn_times(recording, recording.t[part]), force_unit_of(reference[part])
+    part = drawn_samples(t, ends, reference, *curves, *errors)
+    t, unit = drawn_times(recording, t[part]), force_unit_of(reference[part])
 
     def scaled(force: Array) -> Array:
         return force[part] / unit.newtons
@@ -85,7 +92,8 @@ def _force_panels(
             panels[-1, axle].axhline(0.0, color=GREY, linewidth=0.6)
             for residual, look in residuals:
                 drawn = np.clip(residual[:, axle], -1e6, 1e6)
-                panels[-1, axle].plot(t, drawn, **{**look, **_RESIDUAL})
+                shape = {} if "marker" in look else _RESIDUAL
+                panels[-1, axle].plot(t, drawn, **{**look, **shape})
         label_time(panels[-1, axle], recording.t)
     if residuals:
         within = (np.clip(residual, *limits) for residual, _ in residuals)
@@ -107,8 +115,7 @@ def force_figure(
     Above each panel stands the error, whatever the window shows: against the true force, or
     against the online force where there is no truth. That of a replay is the one it was made with;
     below it stands the paper's measure, the past against online, where both sides are known. The
-    lowest row shows what the online run and the last freeze miss of that force. Of a method that
-    learns from a whole log there is no online run: it has neither panel nor residual.
+    lowest row shows what the online run and the last freeze miss of that force.
 
     replays : by time of the freeze [s], replays of the same recording; one row of panels each.
     window : first and last time to show [s]; None shows all.
@@ -116,29 +123,28 @@ def force_figure(
     all.
     """
     replays = dict(sorted((replays or {}).items()))
-    recording, truth, first = history.recording, history.recording.axle_force, int(history.online)
-    online: list[_Curve] = [(history.axle_force, ONLINE)] * first
-    drawn_in_all = online if truth is None else [(truth, TRUTH), *online]
+    recording, truth = history.recording, history.recording.axle_force
+    online = (history.axle_force, ONLINE)
+    drawn_in_all = [online] if truth is None else [(truth, TRUTH), online]
     frozen = {at: (replay.axle_force, FROZEN) for at, replay in replays.items()}
-    rows: list[tuple[str, Sequence[_Curve]]] = [(", online", drawn_in_all)] * first
+    rows: list[tuple[str, Sequence[_Curve]]] = [(", online", drawn_in_all)]
     zero = clock_zero(recording.t)  # of the axis below
     rows += [
         (f", frozen at {freeze_key(round(at - zero, 6))} s", [*drawn_in_all, curve])
         for at, curve in frozen.items()
     ]
-    known = history.axle_force if truth is None and first else truth
-    judged = [*(online if truth is not None else []), *list(frozen.values())[-1:]]
-    figure, panels, unit = _force_panels(recording, rows, known, judged, window, (1.45, 1.05))
+    known = history.axle_force if truth is None else truth
+    judged = [*([online] if truth is not None else []), *list(frozen.values())[-1:]]
+    figure, panels, unit = _force_panels(recording, rows, known, judged, (1.45, 1.05), window)
     error = online_error(history, since=since)
     for axle, name in enumerate(AXLES):
         if history.diverged_at is not None:
             note(panels[0, axle], f"diverged at {history.diverged_at:.4g} s")
         elif error is not None:
             note(panels[0, axle], f"RMSE {unit.format(error, axle)}")
-        for axes, (at, replay) in zip(panels[first:, axle], replays.items(), strict=False):
+        for axes, (at, replay) in zip(panels[1:, axle], replays.items(), strict=False):
             note(axes, _errors(replay, unit, axle))
-            if first:
-                mark_freeze(panels[0, axle], at)
+            mark_freeze(panels[0, axle], at)
             mark_freeze(axes, at, prediction=True)
         if len(panels) > len(rows):
             against = "online" if truth is None else "truth"
@@ -160,21 +166,48 @@ def _errors(replay: Replay | Prediction, unit: ForceUnit, axle: int) -> str:
 
 
 @styled
-def prediction_figure(replay: Replay | Prediction, online: History | None = None) -> Figure:
-    """Draw a frozen model on a recording it did not learn from, with what it misses below.
+def prediction_figure(replay: Replay | Prediction, windows: WindowForces | None = None) -> Figure:
+    """Draw the force of a model over a recording beside the known one, the difference below.
 
-    The residual is the frozen force minus the true force, or minus the online force where there is
-    no truth; with neither there is no residual.
+    windows : known where there is no truth: the force that the motion shows. With neither there is
+        no difference.
     """
-    recording, known, look = replay.recording, replay.recording.axle_force, TRUTH
-    if online is not None and known is None:
-        known, look = online.axle_force, ONLINE
-    frozen = (replay.axle_force, FROZEN)
-    row = [frozen] if known is None else [(known, look), frozen]
-    figure, panels, unit = _force_panels(recording, [("", row)], known, [frozen])
-    if known is not None:
+    recording, t = replay.recording, replay.recording.t
+    known, look, model = recording.axle_force, TRUTH, (replay.axle_force, FROZEN)
+    if known is None and windows is not None:
+        t, known, look, model = windows.t, windows.measured, MOTION, (windows.modelled, MODEL)
+    row = [model] if known is None else [(known, look), model]
+    figure, panels, unit = _force_panels(recording, [("", row)], known, [model], t=t)
+    if recording.axle_force is not None:
         for axle, axes in enumerate(panels[0]):
             note(axes, _errors(replay, unit, axle))
+    return figure
+
+
+@styled
+def friction_figure(friction: RoadFriction) -> Figure:
+    """Draw the friction of a drive's road over that of the identification drive, and its doubt."""
+    some = slice(None, None, thinning(len(friction.t)))
+    t, ratio, sd = friction.t[some], friction.ratio[some], friction.sd[some]
+    figure = new_figure(2.8)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
+    ends = ratio * np.exp(-sd), ratio * np.exp(sd)
+    upper.fill_between(
+        t, *ends, label="one standard deviation", color=SKY, alpha=0.5, linewidth=0.0
+    )
+    upper.plot(t, ratio, color=BLUE, label="friction")
+    upper.axhline(1.0, color=GREY, linewidth=0.8, linestyle="--", label="as identified")
+    upper.set(ylabel="friction over that of\nthe identification drive", ylim=(0.0, None))
+    lower.plot(t, friction.another[some], color=ORANGE, label="another road")
+    lower.plot(
+        t,
+        friction.unexplained[some],
+        label="no friction explains it",
+        color=BLACK,
+        linestyle=":",
+    )
+    lower.set(ylabel="probability", ylim=(-0.05, 1.05))
+    label_time(lower, friction.t)
     return figure
 
 

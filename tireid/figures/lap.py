@@ -5,30 +5,14 @@ from itertools import product
 import numpy as np
 from matplotlib.figure import Figure
 
-from models.recordings import Recording
 from mpc.path.speed import POWER, TOP, SpeedProfile
 from tireid.figures.drive import ARC
-from tireid.figures.forces import inputs_figure
 from tireid.figures.style import BLACK, BLUE, Look, new_figure, styled
 
 _POINTS = 2500  # of a lap that are drawn
 _AXLES = {"front": "#A5D2ED", "rear": "#F6CBB0"}
 _ABOVE = 1.15  # of the top speed, up to which the limit of the turn is drawn
 _DASHED: Look = {"color": BLACK, "linewidth": 1.0, "linestyle": (0, (3, 1.5))}
-
-
-def plot(what: Recording | SpeedProfile) -> Figure:
-    """Draw the signals of a recording, or planned speeds: on the map, and over arc length.
-
-    Parameters
-    ----------
-    what : of `read_recording`, or of `speed_profile`.
-    """
-    if not isinstance(what, SpeedProfile):
-        return inputs_figure(what)
-    if what.planned is None:
-        raise ValueError("these speeds are given: plan them by speed_profile to plot their limits")
-    return lap_figure(what)
 
 
 @styled

@@ -1,6 +1,6 @@
 """One look for every figure, set for the time of drawing only: matplotlib's globals stay untouched.
 
-Truth is black, what was identified online blue, frozen weights orange and dashed, the linear tire
+Truth is black, what was identified online blue, the frozen model orange and dashed, the linear tire
 grey and dotted; the colors are those of Okabe and Ito, which color-blind readers tell apart.
 """
 
@@ -24,6 +24,7 @@ from PIL import Image
 
 from codegen.arrays import Array
 from codegen.writing import write_file
+from identifier.measured import printed_unit
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse
 from identifier.run import History
@@ -52,10 +53,13 @@ SERIES = (BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY, GREY)
 
 Look = Mapping[str, Any]  # of a curve, as words of matplotlib
 TRUTH: Look = {"color": BLACK, "linewidth": 1.5, "label": "truth"}
+_POINTS: Look = {"linestyle": "", "marker": ".", "markersize": 3.0}
+MOTION: Look = {**_POINTS, "color": BLACK, "label": "force from the motion"}
 ONLINE: Look = {"color": BLUE, "linewidth": 0.9, "label": "online"}
 FROZEN: Look = {
-    "color": ORANGE, "linestyle": (0, (3.5, 1.2)), "linewidth": 1.1, "label": "frozen weights",
+    "color": ORANGE, "linestyle": (0, (3.5, 1.2)), "linewidth": 1.1, "label": "model",
 }  # fmt: skip
+MODEL: Look = {**_POINTS, "color": ORANGE, "label": "model"}
 LINEAR: Look = {
     "color": GREY, "linestyle": (0, (1, 1.2)), "linewidth": 1.2, "label": "linear tire",
 }  # fmt: skip
@@ -322,8 +326,7 @@ def force_unit_of(force: Array) -> ForceUnit:
 
     force : any shape [N]; what is not finite does not count.
     """
-    large = np.abs(force[np.isfinite(force)]).max(initial=0.0) >= 1000.0
-    return ForceUnit("kN", 1000.0) if large else ForceUnit("N", 1.0)
+    return ForceUnit(*printed_unit("N", force))
 
 
 def paper_design(history: History) -> PaperIdentifier:

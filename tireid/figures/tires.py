@@ -9,21 +9,24 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from codegen.arrays import Array
-from identifier.measured import printed_scale, printed_unit
+from identifier.measured import printed_unit
 from identifier.run import History
+from identifier.tire_model import AXLES as SIDES
 from identifier.tire_model import TireModel
+from identifier.verdict import WindowForces
 from models.bicycle import measured_slip
 from models.recordings import Recording
 from tireid.figures.drive import tire_look
 from tireid.figures.style import (
     AXLES,
-    BLACK,
     BLUE,
     GREEN,
     LINEAR,
-    ORANGE,
+    MODEL,
+    MOTION,
     PURPLE,
     SKY,
+    TRUTH,
     Look,
     axle_panels,
     drawable,
@@ -52,53 +55,65 @@ _CLOUD: Look = {
 }
 
 
+def forces_over_slip(
+    model: TireModel, recording: Recording, windows: WindowForces | None
+) -> WindowForces:
+    """Return the forces of a drive over the slip that makes them, in the paper's sign.
+
+    True ones above the model's minimum speed, else those that the motion shows, else the model's.
+    The slip has neither errors of sensors nor lag of the tires, as far as the model knows them.
+    """
+    if recording.axle_force is None and windows is not None:
+        return windows
+    counted, force = recording.v_x >= model.min_speed, model.predict(recording)
+    if not counted.any():
+        raise ValueError(f"{recording.name}: v_x never reaches {model.min_speed:g} m/s")
+    known = force if recording.axle_force is None else recording.axle_force
+    every = recording.t, known, force, model.lagged_slip(recording)
+    return WindowForces(*(one[counted] for one in every))
+
+
 @styled
-def slip_figure(model: TireModel, recording: Recording, online: History | None = None) -> Figure:
-    """Draw force over slip angle, front and rear: truth, frozen model and linear tire.
+def slip_figure(
+    model: TireModel, recording: Recording, windows: WindowForces | None = None
+) -> Figure:
+    """Draw force over slip angle, front and rear: of the drive, of the model, and a linear tire.
 
     The slip angle has the paper's sign, α = δ - atan2(v_y ± l r, v_x), the negative of ISO 8855, so
-    that the curves rise. Samples below the model's minimum speed are left out.
+    that the curves rise. The linear tire is that of the vehicle file, where it has one.
     """
-    if not (recording.v_x >= model.min_speed).any():
-        raise ValueError(f"{recording.name}: v_x never reaches {model.min_speed:g} m/s")
-    vehicle, force = model.vehicle, model.predict(recording)
-    known, color, label = recording.axle_force, BLACK, "truth"
-    if known is None and online is not None:
-        known, color, label = online.axle_force, BLUE, "online"
-    against = force if known is None else known
+    drawn = forces_over_slip(model, recording, windows)
+    truth, vehicle = recording.axle_force is not None, model.vehicle
+    part = cloud(drawn.t, drawn.slip, drawn.measured, drawn.modelled - drawn.measured)
+    _, reference, modelled, slip = (one[part] for one in drawn)
+    alpha, unit = np.rad2deg(slip), force_unit_of(reference)
+    modelled, reference = modelled / unit.newtons, reference / unit.newtons
+    limits, known = force_range(reference, modelled), truth or windows is not None
 
-    slip = recording.alpha(vehicle.l_f, vehicle.l_r)
-    signals = (slip, force) if known is None else (slip, force, known, force - known)
-    part = cloud(recording.t, *signals)
-    part = part[recording.v_x[part] >= model.min_speed]
-    alpha, frozen, reference = np.rad2deg(slip[part]), force[part], against[part]
-    unit = force_unit_of(reference)
-    frozen, reference = frozen / unit.newtons, reference / unit.newtons
-    limits = force_range(reference, frozen)
-    stiffness = vehicle.cornering_stiffness_front, vehicle.cornering_stiffness_rear
-
-    learnt: Look = {**_CLOUD, "color": ORANGE, "label": "frozen weights"}
-    figure, panels = axle_panels([3.2] if known is None else [3.2, 1.3], sharex="col")
+    look: Look = {**(TRUTH if truth else MOTION), **_CLOUD, "markersize": 3.0, "alpha": 0.35}
+    learnt: Look = {**MODEL, **_CLOUD}
+    figure, panels = axle_panels([3.2, 1.3] if known else [3.2], sharex="col")
     for axle, (axes, lowest) in enumerate(zip(panels[0], panels[-1], strict=True)):
-        x, y, truth = alpha[:, axle], frozen[:, axle], reference[:, axle]
-        if known is not None:
-            look = {**_CLOUD, "color": color, "label": label, "markersize": 3.0, "alpha": 0.35}
-            axes.plot(x, drawable(truth, limits), **look)
-            lowest.axhline(0.0, color=color, linewidth=0.6)
-            lowest.plot(x, np.clip(y - truth, *limits), **learnt)
+        x, y, force = alpha[:, axle], modelled[:, axle], reference[:, axle]
+        if known:
+            axes.plot(x, drawable(force, limits), **look)
+            lowest.axhline(0.0, color=look["color"], linewidth=0.6)
+            lowest.plot(x, np.clip(y - force, *limits), **learnt)
         axes.plot(x, drawable(y, limits), **learnt)
         margin = 0.04 * float(np.ptp(x)) or 1.0
         ends = np.array([x.min() - margin, x.max() + margin])
-        axes.plot(ends, stiffness[axle] / unit.newtons * np.deg2rad(ends), **LINEAR)
+        if (name := f"cornering_stiffness_{SIDES[axle]}") not in vehicle.estimated:
+            stiffness = getattr(vehicle, name) / unit.newtons
+            axes.plot(ends, stiffness * np.deg2rad(ends), **LINEAR)
         if model.known_slip is not None:
             _draw_curve(axes, model, axle, ends, unit.newtons)
-            edge, look = float(np.rad2deg(model.known_slip[axle])), {"lw": 0.0, "zorder": 0}
+            edge, under = float(np.rad2deg(model.known_slip[axle])), {"lw": 0.0, "zorder": 0}
             for low, high in ((ends[0], -edge), (edge, ends[1])):
                 for panel in panels[:, axle] if low < high else ():
-                    panel.axvspan(low, high, color="#EFE9DD", label=_UNKNOWN, **look)
+                    panel.axvspan(low, high, color="#EFE9DD", label=_UNKNOWN, **under)
         axes.set(xlim=ends, ylim=limits)
         _label_slip(lowest)
-    label_forces(panels, unit, residual=known is not None)
+    label_forces(panels, unit, residual=known)
     legend_above(figure, last=(_UNKNOWN,))
     return figure
 
@@ -130,7 +145,7 @@ def _draw_curve(axes: Axes, model: TireModel, axle: int, ends: Array, newtons: f
         color=BLUE,
         linewidth=1.2,
         zorder=4,
-        label=f"frozen curve, {'static load' if model.vehicle.has_downforce else 'steady'}",
+        label=f"curve, {'static load' if model.vehicle.has_downforce else 'steady'}",
     )
 
 
@@ -198,7 +213,8 @@ def learnt_axles_figure(history: History, freeze_times: Sequence[float] = ()) ->
     figure = new_figure(4.4)
     panels = figure.subplots(len(tracks), 1, sharex=True)
     for axes, (title, unit, _), values in zip(panels, tracks, curves, strict=True):
-        label, values = f"{title}\n[{printed_unit(unit)}]", printed_scale(unit) * values
+        unit, size = printed_unit(unit, values)
+        label, values = f"{title}\n[{unit}]", values / size
         for axle, color in enumerate((GREEN, PURPLE)):
             axes.plot(at, values[:, axle], linewidth=1.0, color=color, label=AXLES[axle].lower())
         axes.set(ylabel=label, xlim=(t[0], t[-1]))

@@ -79,11 +79,7 @@ class Live:
     ) -> None:
         require_kind(Vehicle, "as of Vehicle.from_toml or sedan", vehicle=vehicle)
         for one in filter(None, (tire, resume)):
-            if not vehicle.moves_as(one.vehicle):
-                raise ValueError(
-                    f"the tires are of {one.vehicle.name!r} with other numbers than "
-                    f"{vehicle.name!r} has: give that car, or another store or weights"
-                )
+            one.require_car(vehicle, remedy="give that car, or another store or weights")
         self.vehicle, self._counts, self._tire, self._resume = vehicle, Counts(), tire, resume
         self._identifier: OnlineIdentifier | None = None
         self._method: Any = None
@@ -367,7 +363,8 @@ class Live:
         elif self._identifier.stale:
             reason = "samples hold no numbers of a car"
         if friction is not None and friction < LOST:
-            alarm = f"friction {friction:.2f} of the reference, since {self._friction_since:.1f} s"
+            since = self._t - self._friction_since
+            alarm = f"friction {friction:.2f} of the reference, for {since:.1f} s"
         stored = bool(reason) and self._stored is not None
         bias_sd = math.sqrt(model.covariance[1, -1, -1])
         v_y_sd = math.hypot(bias_sd, NOISE) if self.measures_v_y else self._v_y_sd

@@ -11,14 +11,19 @@ from pathlib import Path
 from threading import Event, Thread
 from typing import Any
 
+from codegen.escape import displayed
 from identifier.frozen import FrozenModelError
 from identifier.tire_model import TireModel
 from models.extras import needs
+from models.files import write_atomically
+from models.recordings.map import LogMap
+from models.schema import changed
 from tireid.live.state import State
 from tireid.output import OutputError
 from tireid.progress import say
 
 TOPIC = "/tireid/state"
+AS_LOGGED = "as logged"  # a scale of the steering that nobody declared
 _BACKLOG = 64  # messages that wait for a client: 13 s of them, 0.3 MB
 _CHUNK = 1 << 16  # bytes of a recording between writes: 3 s of it are lost where the run is killed
 _PATIENCE = 1.0  # s for a server to end: a client that does not read would have it wait for ever
@@ -122,16 +127,37 @@ class _Page(BaseHTTPRequestHandler):
         """Be silent."""
 
 
-class Store:
-    """Tires in a folder, from one run to the next; a thread writes the newest each minute."""
+def scale_of_steering(log_map: LogMap) -> str:
+    """Return how a steering angle is scaled, in words of a log.toml."""
+    signal, repair = log_map.signals.get("delta_f"), log_map.repair.factor
+    given = {} if signal is None else changed(signal)
+    said = [f"{key} = {given[key]}" for key in ("factor", "ratio", "table") if key in given]
+    if "delta_f" in repair:
+        said.append(f"repair.factor = {repair['delta_f']}")
+    return ", ".join(said) or AS_LOGGED
 
-    def __init__(self, folder: Path, every: float = 60.0) -> None:
+
+class Store:
+    """Tires in a folder, from one run to the next; a thread writes the newest each minute.
+
+    scale : `scale_of_steering`; tires that were identified with another are refused.
+    """
+
+    def __init__(self, folder: Path, scale: str = AS_LOGGED, every: float = 60.0) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         self._path = folder / "tires.json"
         try:
             self._stored = TireModel.load(self._path) if self._path.exists() else None
         except FrozenModelError as error:
             raise FrozenModelError(f"{error}; move it away or choose another --store") from None
+        beside = folder / "steering.txt"
+        before = beside.read_text(encoding="utf-8", errors="replace") if beside.exists() else scale
+        if self._stored and before != scale:
+            raise FrozenModelError(
+                f"{self._path}: was identified with delta_f {displayed(before)}, --log has it "
+                f"{displayed(scale)}: give the same log.toml or another --store"
+            )
+        write_atomically(beside, scale)
         self._newest, self._end = self._stored, Event()
         self._thread = Thread(target=self._write, args=(every,), daemon=True)
         self._thread.start()

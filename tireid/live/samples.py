@@ -59,7 +59,8 @@ def live_map(log_map: LogMap) -> LogMap:
         "repair.delay": repair.delay, "repair.lag": repair.lag,
         "repair.acceleration_sensor_x": repair.acceleration_sensor_x,
         "signals.delta_r": "delta_r" in signals,
-        **{f"signals.{n}": n in signals and "v_x" not in signals for n in (*WHEELS, *POSE)},
+        **{f"signals.{n}": n in signals and "v_x" not in signals for n in WHEELS},
+        **{f"signals.{name}": name in signals for name in POSE},
         **{f"signals.{name}.sign": one.sign for name, one in signals.items()},
     }  # fmt: skip
     if key := next((key for key, value in declared.items() if value), None):

@@ -94,7 +94,8 @@ def open_source(
     recording, _ = read_repaired(path, vehicle, run, log_map=log_map)
     if np.any(recording.delta_r):
         raise RecordingError(f"{recording.name}: rear axle steers, which cannot be read live")
-    words = f"{recording.name}, {recording.duration:.4g} s at {speed:g} times its speed"
+    pace = f"at {speed:g} times its speed" if math.isfinite(speed) else "as fast as possible"
+    words = f"{recording.name}, {recording.duration:.4g} s {pace}"
     return Source(words, _replayed(recording, speed), lambda: recording.logged_v_y is not None)
 
 

@@ -6,11 +6,11 @@ from codegen.arrays import Array
 from identifier.doctor.readings import Motion, Reading, forces_and_slips
 from identifier.run import History
 from identifier.tire_model import TireModel
-from identifier.verdict import Verdict, within_band
-from identifier.verdict.friction import RoadFriction
-from identifier.verdict.verdict import LARGEST_MODEL_ERROR, PERCENT
+from identifier.verdict import RoadFriction, Verdict, WindowForces
+from identifier.verdict.verdict import PERCENT
 from models.recordings import Recording
 from models.vehicle import Vehicle
+from tireid.figures.tires import forces_over_slip
 
 _CURVE = 200  # points at which a band is compared with the points of a drive
 _SETTLED = 0.1  # of its last value: an estimate within it has converged
@@ -22,66 +22,56 @@ def percents(shares: Array | tuple[float, ...], digits: int = 0) -> str:
     return " / ".join(f"{PERCENT * share:.{digits}f}" for share in shares) + " %"
 
 
-def slip_caption(model: TireModel, recording: Recording, online: History | None = None) -> str:
-    """Return how many of the drawn points lie outside the band, where, and with the tires' lag."""
-    modelled, force, what = model.predict(recording), recording.axle_force, "true forces"
-    if force is None and online is not None:
-        force, what = online.axle_force, "forces identified online"
+def slip_caption(
+    model: TireModel, recording: Recording, windows: WindowForces | None = None
+) -> str:
+    """Return how many of the drawn points lie outside the band, and where."""
     said, band, known = "Axle force over slip angle", model.band, model.known_slip
     if band is None or known is None:
-        return f"{said} of {recording.name}, and the frozen curve."
-    points = modelled if force is None else force
-    moves = recording.v_x >= model.min_speed
-    slip = recording.alpha(model.vehicle.l_f, model.vehicle.l_r)[moves]
+        return f"{said} of {recording.name}, and the curve of the model."
+    drawn = forces_over_slip(model, recording, windows)
+    what, slip = "forces from the motion" if windows else "modelled forces", drawn.slip
+    what = what if recording.axle_force is None else "true forces"
     at = np.linspace(slip.min(), slip.max(), _CURVE)
     low, high = band.at(at)
     outside = np.stack(
         [
             (y < np.interp(x, at, low[:, k])) | (y > np.interp(x, at, high[:, k]))
-            for k, (x, y) in enumerate(zip(slip.T, points[moves].T, strict=True))
+            for k, (x, y) in enumerate(zip(slip.T, drawn.measured.T, strict=True))
         ],
         axis=1,
     )
     places = np.sum(np.abs(slip[..., None]) > known[:, None] * [0.5, 1.0], axis=2)[outside]
     counts = np.bincount(places, minlength=3)
-    most = f", most {_PLACES[counts.argmax()]}" if 2 * counts.max() > places.size else ""
-    if force is not None:
-        left = np.abs(force - modelled)[moves] > band.over(recording)[moves]
-        lagged = f" With the lag of the tires it is {percents(left.mean(axis=0))}."
-    else:
-        what, inside = "modelled forces", within_band(model, recording)
-        share = "" if inside is None else percents(inside)
-        lagged = (
-            f" With the lag of the tires {share} of the force in the motion lies in it."
-            * bool(share)
-        )
-    drawn = f"{percents(outside.mean(axis=0))} of the {what}"
-    return f"{said}: {drawn} lie outside the steady band (front / rear){most}.{lagged}"
+    share = percents(outside.mean(axis=0))
+    some = 2 * counts.max() > places.size and share != "0 / 0 %"
+    most = f", most {_PLACES[counts.argmax()]}" * bool(some)
+    return f"{said}: {share} of the {what} lie outside the steady band (front / rear){most}."
 
 
 def force_caption(
     recording: Recording, force: Array, model: TireModel, verdict: Verdict | None
 ) -> str:
-    """Return how well a frozen model replays a drive.   verdict : on it; None leaves it out."""
-    said, truth = f"Axle forces of {recording.name}, replayed with the frozen model", []
-    if recording.axle_force is not None:
+    """Return how well a model replays a drive.   verdict : on it; None leaves it out."""
+    said, what = f"Axle forces of {recording.name}, by the model", "true force"
+    windows = None if verdict is None else verdict.forces
+    t, known, shares = recording.t, recording.axle_force, None
+    if known is not None:
         moves = recording.v_x >= model.min_speed
-        known, t = recording.axle_force[moves], recording.t[moves]
-        error = force[moves] - known
-        size, rms = (np.sqrt(np.mean(one**2, axis=0)) for one in (known, error))
-        row, axle = np.unravel_index(np.abs(error).argmax(), error.shape)
-        if size.min() > 0.0:
-            truth.append(f"{percents(rms / size, 1)} of the true force (front / rear)")
-        truth.append(
-            f"largest {np.abs(error).max():.0f} N at {t[row]:.4g} s, {('front', 'rear')[axle]}"
-        )
-    elif verdict is not None and verdict.model_error is not None:
-        truth.append(
-            f"{percents(verdict.model_error, 1)} of the force in the motion (front / rear)"
-        )
+        t, known, force = t[moves], known[moves], force[moves]
+        size, rms = (np.sqrt(np.mean(one**2, axis=0)) for one in (known, force - known))
+        shares = rms / size if size.min() > 0.0 else None
+    elif windows is not None and verdict is not None:
+        (t, known, force, _), shares, what = windows, verdict.model_error, "force in the motion"
     if verdict is not None and not verdict.valid:
         said = f"{verdict.word[0].upper()}{verdict.word[1:]}. {said}"
-    return f"{said}: error {', '.join(truth)}." if truth else f"{said}."
+    if known is None:
+        return f"{said}."
+    far = np.abs(force - known)
+    row, axle = np.unravel_index(far.argmax(), far.shape)
+    rms = f"{percents(shares, 1)} of the {what} (front / rear), " if shares is not None else ""
+    most = f"largest {far.max():.0f} N at {t[row]:.4g} s, {('front', 'rear')[axle]}"
+    return f"{said}: error {rms}{most}."
 
 
 def settled_caption(learnt: History) -> str:
@@ -117,27 +107,12 @@ def inputs_caption(recording: Recording) -> str:
     )
 
 
-def motion_caption(verdict: Verdict) -> str:
-    """Return how far the mean forces of a model are from those in the motion, and where most."""
-    windows, errors = verdict.forces, verdict.model_error
-    assert windows is not None
-    far = np.abs(windows.modelled - windows.measured)
-    row, axle = np.unravel_index(far.argmax(), far.shape)
-    limit = f"limit {PERCENT * LARGEST_MODEL_ERROR:.0f} %"
-    rms = "" if errors is None else f" {percents(errors, 1)} rms (front / rear, {limit}),"
-    return (
-        f"Mean force over windows of 0.3 s, from the motion and of the model: error{rms} largest "
-        f"at {windows.t[row]:.4g} s, {('front', 'rear')[axle]}, {far.max():.2g} of the static load."
-    )
-
-
 def friction_caption(friction: RoadFriction) -> str:
     """Return the friction of a road over that of the identification drive, and its extremes."""
     low, middle, high = np.quantile(friction.ratio, [0.0, 0.5, 1.0])
-    roads = "; ".join(road.text for road in friction.roads)
     return (
         f"Friction of the road over that of the identification drive: median {middle:.2f}, "
-        f"{low:.2f} to {high:.2f}{f'; {roads}' if roads else ', no other road reported'}."
+        f"{low:.2f} to {high:.2f}; {friction.text}."
     )
 
 

@@ -20,7 +20,8 @@ from identifier.tire_model import TireModel
 from identifier.verdict import Verdict
 from identifier.verdict.verdict import PERCENT
 from models.files import digest
-from models.recordings import Recording
+from models.recordings import LogMap, Recording
+from models.recordings.choice import column_of
 from models.vehicle import Vehicle
 from tireid import verdicts
 from tireid.diagnoses import diagnosis_notes, diagnosis_section
@@ -50,6 +51,14 @@ from tireid.reports.captions import (
 )
 
 _EXTRAPOLATED = 0.01  # share of the samples beyond the known slip that is worth a note
+_CAR = {  # numbers of a car and their units
+    "mass": "kg",
+    "l_f": "m",
+    "l_r": "m",
+    "yaw_inertia": "kg m²",
+    "cornering_stiffness_front": "N/rad",
+    "cornering_stiffness_rear": "N/rad",
+}
 
 
 def write_identify_report(
@@ -58,10 +67,11 @@ def write_identify_report(
     figures: Images,
     diagnosis: Diagnosis,
     command: str,
+    log_map: LogMap,
 ) -> None:
-    """Write the report of what was learnt."""
+    """Write the report of what was learnt.   log_map : how its logs were read."""
     learnt, model, verdict, evaluated = found.runs[0], found.model, found.verdict, found.evaluated
-    online = learnt if learnt.online else None
+    slip = slip_caption(model, learnt.recording, verdict.forces)
     meaning = "validation drives on which the model is valid"
     third = verdicts.verdicts_headline(evaluated, meaning) or verdicts.known_headline(model)
     numbers = [*verdicts.model_error_headline(verdict), *third]
@@ -72,7 +82,7 @@ def write_identify_report(
             verdicts.verdict_headline(verdict),
             *verdicts.of_answer(verdict, numbers),
         ],
-        lead=[curve_drawing(figures, verdict, slip_caption(model, learnt.recording, online))],
+        lead=[curve_drawing(figures, verdict, slip)],
         notes=[
             *verdicts.verdict_notes(verdict),
             *verdicts.verdicts_notes(evaluated),
@@ -89,13 +99,17 @@ def write_identify_report(
             ),
             Section(
                 "What went in",
-                drawings(figures, {"inputs": inputs_caption(learnt.recording)}),
+                [
+                    *went_in(model, log_map),
+                    *drawings(figures, {"inputs": inputs_caption(learnt.recording)}),
+                ],
             ),
             diagnosis_section(diagnosis),
             origin(
                 command,
                 learnt.vehicle,
                 [run.recording for run in found.runs],
+                channels=f"hash {digest(repr(log_map))}",
                 method=f"{found.method}, hash {digest(learnt.method.numbers())}",
             ),
         ],
@@ -155,12 +169,32 @@ def identify_notes(model: TireModel, runs: Sequence[History]) -> list[Note]:
 
 
 def estimates_notes(vehicle: Vehicle) -> list[Note]:
-    """Return what of a car was not measured, as a note."""
-    return [Note(f"{vehicle.estimates}.")] * bool(vehicle.estimates)
+    """Return that the yaw inertia was not measured, as a note."""
+    text = "The yaw inertia is estimated from mass, l_f and l_r: declare it where it is known."
+    return [Note(text)] * ("yaw_inertia" in vehicle.estimated)
+
+
+def went_in(model: TireModel, log_map: LogMap) -> list[Block]:
+    """Return tables of the numbers of the car and of the channels that were declared."""
+    car, rows = model.vehicle, list[list[Cell]]()
+    for name, unit in _CAR.items():
+        unused = name.startswith("cornering") and model.kind == "fit"
+        origin_of = f"{car.origin(name)}{', not used by this method' * unused}"
+        rows.append([name, f"{getattr(car, name):.6g} {unit}", origin_of])
+    channels = list[list[Cell]]()
+    for name, one in log_map.signals.items():
+        given = {"ratio": one.ratio - 1.0, "factor": one.factor - 1.0, "offset": one.offset}
+        read = [f"{key} {getattr(one, key):g}" for key, change in given.items() if change]
+        how = [one.unit or "its unit", *read, *["table"] * bool(one.table)]
+        channels.append([column_of(name), " + ".join(one.channel), ", ".join(how)])
+    listed = "Declared channels. Signals without a row have standard names or notes below."
+    header = ["signal", "channel", "read as"]
+    tables = [Table(f"The car, {car.name}.", ["number", "value", "origin"], rows)]
+    return [*tables, *[Table(listed, header, channels)] * bool(channels)]
 
 
 def extrapolated(model: TireModel, recording: Recording) -> list[Note]:
-    """Return how much of a drive slips farther than the model knows, as a note."""
+    """Return how much of a drive exceeds the identified slip range, as a note."""
     beyond = beyond_known(model, recording)
     if model.known_slip is None or beyond is None or max(beyond) <= _EXTRAPOLATED:
         return []
@@ -224,7 +258,8 @@ def _errors(found: Results, figures: Images) -> list[Block]:
             rows.append([f"{name}, online", *error_numbers(online_error(run), size)])
         for key, replays in found.frozen.items():
             error = replays[name].against_truth or replays[name].against_online
-            rows.append([f"{name}, frozen, {key} s", *error_numbers(error, size)])
+            named = f"{name}, frozen, {key} s" if online or len(found.frozen) > 1 else name
+            rows.append([named, *error_numbers(error, size)])
     against = "; without one it is against what was identified online" * online
     blocks: list[Block] = [error_table(rows, against)] if any(row[1] for row in rows) else []
     blocks.append(replay_picture(found, figures, "forces", learnt.recording.name))

@@ -229,7 +229,7 @@ class CurveEkf(Method):
 
     @property
     def remark(self) -> str:
-        """Say whether it is more than the textbook's."""
+        """Return whether it extends the textbook filter."""
         if self.textbook:
             return "the textbook's, without lag and offsets"
         return "lag of the tires and offsets of the sensors are identified, as by the default"

@@ -169,6 +169,13 @@ static void test_modes(tireid_state *state, const tireid_params *params)
     number = zero / zero;
     (void)memcpy(&broken, &number, sizeof number); /* the first of them */
     check(tireid_set_weights(state, &broken) == TIREID_BAD_INPUT, "NaN is no weight");
+#if TIREID_RANGES
+    number = 50; /* static axle loads, which no tire carries */
+    (void)memcpy(&broken, &number, sizeof number);
+    check(tireid_set_weights(state, &broken) == TIREID_BAD_INPUT, "weights have limits");
+    (void)tireid_get_weights(state, &after);
+    check(memcmp(&learnt, &after, sizeof learnt) == 0, "weights beyond limits change nothing");
+#endif
 #ifdef VECTOR_NOT_NEGATIVE
     broken = learnt;
     number = -1;

@@ -470,6 +470,25 @@ static bool tireid_keeps_rules(const tireid_real *weight)
 }
 #endif
 
+#if TIREID_RANGES
+/* Whether weights lie in all ranges of the table. */
+static bool tireid_keeps_ranges(const tireid_real *weight)
+{
+    bool keeps = true;
+    uint32_t i;
+    uint32_t j;
+    for (i = 0U; i < TIREID_RANGES; i++) {
+        const tireid_range *range = &tireid_ranges[i];
+        tireid_real sum = TIREID_C(0.0);
+        for (j = 0U; j < range->order; j++) {
+            sum += tireid_shares[range->shares + j] * weight[range->first + j];
+        }
+        keeps = keeps && (sum >= range->low) && (sum <= range->high);
+    }
+    return keeps;
+}
+#endif
+
 #if TIREID_LEARNS
 tireid_status tireid_get_weights(const tireid_state *state, tireid_weights *weights)
 {
@@ -490,6 +509,9 @@ tireid_status tireid_set_weights(tireid_state *state, const tireid_weights *weig
         bool good = tireid_finite(tireid_sum(number, n));
 #if TIREID_RULES
         good = good && tireid_keeps_rules(number);
+#endif
+#if TIREID_RANGES
+        good = good && tireid_keeps_ranges(number);
 #endif
         status = TIREID_BAD_INPUT;
         if (good) {

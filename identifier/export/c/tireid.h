@@ -81,7 +81,8 @@ tireid_status tireid_get_forces(const tireid_state *state, tireid_real force[2])
 tireid_status tireid_get_weights(const tireid_state *state, tireid_weights *weights);
 
 /* Go on with these weights; refused with TIREID_BAD_INPUT, and nothing changed, where one is not
- * finite, or a covariance, an error or a time among them is negative. */
+ * finite or beyond the limits of what is learnt, or a covariance, an error or a time among them is
+ * negative. */
 tireid_status tireid_set_weights(tireid_state *state, const tireid_weights *weights);
 
 /* true: learn (as after tireid_init). false: frozen, weights hold their values. */

@@ -30,6 +30,18 @@ typedef struct {
 } tireid_rule;
 #endif
 
+#if TIREID_RANGES
+/* What `order` numbers of the weights must keep to be taken over: low <= sum of shares of them
+ * <= high. */
+typedef struct {
+    tireid_real low;
+    tireid_real high;
+    uint32_t first;
+    uint32_t order;
+    uint32_t shares; /* the first of them */
+} tireid_range;
+#endif
+
 /* The parts of carried values, each by its own pointer: what small processors read lies within 1 kB
  * of one. */
 #if TIREID_LEARNS

@@ -1,8 +1,9 @@
 /* Identifier and tracker on a car: learn the tires while driving, and steer by what was learnt.
  *
- *     tireid_closed_loop [log.csv]
+ *     tireid_closed_loop [drives.csv]
  *
- * Drives the same double lane changes twice: by the tires of the export, and learning. Returns 0
+ * Drives the same double lane changes twice: by the tires of the export, and learning; writes both
+ * drives to the file, which must not exist. Returns 0
  * where the learning car stays on the road and, once it has learnt, within LEARNT_PEAK.
  */
 #include <math.h>
@@ -180,10 +181,16 @@ static void print(const char *title, const result *found)
 
 int main(int argc, char *argv[])
 {
-    FILE *log = (argc > 1) ? fopen(argv[1], "w") : NULL;
+    FILE *log = (argc > 1) ? fopen(argv[1], "r") : NULL;
     result exported;
     result learnt;
     bool good;
+    if (log != NULL) {
+        (void)fclose(log);
+        fprintf(stderr, "%s: exists and is not replaced, give another name\n", argv[1]);
+        return 2;
+    }
+    log = (argc > 1) ? fopen(argv[1], "w") : NULL;
     if ((argc > 1) && (log == NULL)) {
         fprintf(stderr, "%s: cannot be written\n", argv[1]);
         return 2;

@@ -137,8 +137,11 @@ def test_what_leaves_no_car_is_not_believed():
         assert inertia.plausible(0.9 * most, car) and not inertia.plausible(1.1 * most, car)
         assert inertia.plausible(0.7, car) and not inertia.plausible(0.6, car)
     assert lag.plausible(0.1, CAR) and not lag.plausible(-0.1, CAR)
-    for name in (("velocity_sensor_x", "v_y"), ("acceleration_sensor_x", "a_y")):
-        least, most = -CAR.l_r - 0.5 * CAR.wheelbase, CAR.l_f + 0.5 * CAR.wheelbase
+    for name, beyond in (
+        (("velocity_sensor_x", "v_y"), 0.5 * CAR.wheelbase),
+        (("acceleration_sensor_x", "a_y"), 0.2 * CAR.wheelbase),
+    ):
+        least, most = -CAR.l_r - beyond, CAR.l_f + beyond
         for x in (least, most):
             assert BY_NAME[name].plausible(0.99 * x, CAR)
             assert not BY_NAME[name].plausible(1.01 * x, CAR)

@@ -258,21 +258,26 @@ def test_at_one_speed_bias_and_angle_are_one_error_and_told_apart_where_they_dif
     usual = np.array([0.01, 0.1, 0.01, 0.01, 0.01])
     for value in ([0, 0.2, 0, 0, 0], [0, 0, 0.01, 0, 0], [0, 0.4, -0.01, 0, 0]):
         ((code, text),) = a_day(value, usual=usual).notes
-        assert code == "v_y_reads" and "0.20" in text and "too much at 20 m/s" in text
+        assert (
+            code == "v_y_reads"
+            and "0.20" in text
+            and "too much at the median speed of 20 m/s" in text
+        )
         assert "bias of v_y" in text and "the forces allow for it" in text
     assert "too little" in a_day([0, -0.2, 0, 0, 0], usual=usual).notes[0][1]
     assert a_day([0, 0.25, -0.0125, 0, 0], usual=usual).notes == ()
     unclear = a_day([0, 0.4, 0, 0, 0], [1e-4, 0.03, 1e-4, 1e-4, 1e-4], usual=usual)
     assert "bias of v_y" in unclear.notes[0][1]
     worse = replace(unclear, usual=0.8 * usual)
-    assert "one speed cannot tell" in worse.notes[0][1]
+    assert "this log cannot separate them" in worse.notes[0][1]
     halves = np.zeros((5, 5))  # the sum is known, and that each is half of it is believed
     halves[1:3, 1:3] = [[9.76e-4, -4.877e-5], [-4.877e-5, 2.44e-6]]
     believed = replace(worse, covariance=halves, usual=usual)
     assert (believed.sd[1:3] < 0.4 * usual[1:3]).all()
-    assert "one speed cannot tell" in believed.notes[0][1]
+    assert "this log cannot separate them" in believed.notes[0][1]
     of_two = np.array([[0.04, -0.00199], [-0.00199, 1e-4]])  # bias and angle make up for each other
-    assert sideways(np.array([0.2, 0.0]), of_two, 20.0)
+    assert sideways(np.array([0.2, 0.0]), of_two, 20.0)[0] == pytest.approx(0.2)
+    assert sideways(np.array([-0.2, 0.0]), of_two, 20.0)[0] == pytest.approx(-0.2)
     assert not sideways(np.array([0.2, 0.0]), np.diag(np.diag(of_two)), 20.0)
     still = np.zeros(5), np.zeros((5, 5)), (np.zeros(5), np.zeros(5))
     assert Day.of(*still, np.array([1.0, 30.0, 20.0]), anew=True).speed == 20.0

@@ -216,6 +216,15 @@ static int torture(tireid_params *params)
             printf("the state is not finite after %ld\n", k);
             return 1;
         }
+#if TIREID_LEARNS
+        if ((k % 16) == 0) { /* what it has learnt may be given to it again */
+            const tireid_weights learnt = state.values.weights;
+            if (tireid_set_weights(&state, &learnt) != TIREID_OK) {
+                printf("its own weights are refused after %ld\n", k);
+                return 1;
+            }
+        }
+#endif
 #ifdef BOUNDED
         if (!within_bounds(&state.values.weights)) {
             printf("a bound is broken after %ld\n", k);

@@ -1,6 +1,7 @@
 """The shipped C from Python."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -125,6 +126,38 @@ def test_factors_are_taken_where_no_variance_is_negative(learnt, single, rng):
             assert run.takes({**weights, "UD": factors}) == (place not in diagonal)
             assert (run.state == before) == (place in diagonal)
     assert run.takes(weights)
+
+
+@pytest.mark.parametrize("law", ["axle", "inertial"])
+@pytest.mark.parametrize("single", [False, True])
+def test_weights_are_taken_within_their_limits_and_not_beyond(law, single, learnt, packages):
+    run = learnt[law, single]
+    weights = run.weights
+    assert run.takes(weights)
+    for kept in packages[law].specialized.ranges:
+        old = weights[kept.port].ravel()[kept.first : kept.first + len(kept.shares)]
+        for end, sign in ((kept.low, -1), (kept.high, 1)):
+            for away in (1e-4, -1e-4):  # of the range: outside, inside
+                value = weights[kept.port].copy()
+                missing = end + sign * away * (kept.high - kept.low) - old @ kept.shares
+                value.flat[kept.first] += missing / kept.shares[0]
+                before = run.state
+                taken = run.takes({**weights, kept.port: value})
+                if away > 0.0:
+                    assert (taken, run.state) == (False, before), kept
+                elif kept.port != "W":  # whose numbers keep several ranges
+                    assert taken, kept
+    assert run.takes(weights)
+
+
+@pytest.mark.parametrize("law", ["axle", "inertial"])
+@pytest.mark.parametrize("single", [False, True])
+def test_weights_that_a_run_begins_with_are_taken_wherever_they_lie(law, single):
+    axle = make_method("axle", CAR)
+    model = axle.frozen(CAR, axle.setup(CAR).carry)
+    start = replace(model, W=9.0 * model.W)  # seven loads
+    run = Shipped.of(build_package(make_method(law, CAR), CAR, start), single=single)
+    assert run.takes(run.weights)
 
 
 def test_a_folder_is_loaded_with_its_own_precision(write, slalom):

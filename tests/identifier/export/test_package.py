@@ -233,6 +233,20 @@ def test_the_example_says_which_column_is_missing(law, columns, missing, package
     assert answer.stderr == f"tireid_example: the log has no column {missing}\n"
 
 
+@pytest.mark.parametrize(("library", "app"), [(0, 0), (1, 1), (0, 1), (1, 0)])
+def test_another_precision_than_that_of_the_library_does_not_link(
+    library, app, compiler, packages, write, run
+):
+    folder = write(packages["integral"])
+    options, sources = ("-std=c99", "-Iinclude", "-Isrc"), ("tireid.c", "tireid_equations.c")
+    for source, single in (*((f"src/{one}", library) for one in sources), ("examples/main.c", app)):
+        built = run(compiler, *options, f"-DTIREID_SINGLE={single}", "-c", source, cwd=folder)
+        assert built.returncode == 0, built.stderr
+    linked = run(compiler, "tireid.o", "tireid_equations.o", "main.o", "-lm", cwd=folder)
+    assert (linked.returncode == 0) == (library == app)
+    assert library == app or "tireid_init" in linked.stderr
+
+
 def test_a_project_of_its_own_can_use_the_package(packages, write, run):
     folder = write(packages["integral"])
     project = folder / "project"

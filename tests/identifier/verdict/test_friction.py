@@ -132,6 +132,16 @@ def test_the_filter_finds_the_friction_with_its_doubt(ln):
     assert (found.t == WINDOWS).all() and len(found.roads) == (ln != 0.0)
 
 
+def test_it_says_why_another_road_is_not_reported():
+    found = from_windows(-0.6)
+    assert found.text == found.roads[0].text
+    likely = found._replace(another=np.minimum(found.another, 0.97))
+    assert "no other road reported (at " in likely.text and "is 0.97, 0.99 is needed" in likely.text
+    wide = found._replace(sd=found.sd + 1.0)
+    assert "within two standard deviations of 1" in wide.text
+    assert from_windows(0.0).text == "no other road reported"
+
+
 def test_a_zero_of_the_slip_is_found_for_each_friction():
     found = from_windows(0.0, zero=0.012)
     assert found.another[-1] < 0.05 and found.roads == ()

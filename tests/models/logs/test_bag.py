@@ -142,6 +142,17 @@ def test_messages_of_cars_are_read_with_their_units(kind, tmp_path):
     assert not any("covariance" in name or "stamp" in name for name in units)
 
 
+def test_messages_that_came_in_another_order_are_sorted_by_their_stamps(tmp_path):
+    kind, messages = car_topics()["/twist"]
+    (early, first), (late, second) = messages[10:12]
+    messages[10:12] = [(early, second), (late, first)]
+    log = open_log(write(tmp_path / "bag", {"/twist": (kind, messages)}))
+    (channel,) = log.read(["/twist/twist.linear.y"])
+    assert np.array_equal(channel.t, np.arange(50) / 100)
+    assert np.array_equal(channel.values, np.arange(50) + 1.0)
+    assert log.notes == ("the clock of /twist: samples out of order are sorted: 1",)
+
+
 def random_message(rng):
     def word():
         return "x" * int(rng.integers(0, 9))

@@ -1,4 +1,4 @@
-"""Stamps that fall or repeat, mended where it is asked for: the samples of the right log, said."""
+"""Times that decrease or repeat, mended where declared: the samples of the right log, said."""
 
 from itertools import pairwise
 

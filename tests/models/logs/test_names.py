@@ -42,7 +42,7 @@ livePose.angularVelocityDevice.z, Ist-Gierrate, Vitesse de lacet, Velocità di i
 velocidad_guiñada, omega, Angular Velocity
 """,
     "delta_f": """
-delta_f, RoadWheelAngle, /ackermann_cmd/drive.steering_angle,
+delta_f, RoadWheelAngle, /ackermann_cmd/drive.steering_angle, /drive/drive.steering_angle,
 /vehicle/status/steering_status/steering_tire_angle, Radlenkwinkel, roadwheelAngle,
 Delta_Wheel
 """,
@@ -77,7 +77,9 @@ Lenkradwinkelgeschw, Gierbeschleunigung, Raddrehzahl VL, vitesse_roue_FL,
 Lateral Wind Speed, Yaw Rate Setpoint, couple volant, Motordrehzahl, engine_omega, omega_fl,
 consigne de vitesse, radar.LateralVelocity, Obj01_vLat, lead.vRel, DAS_setSpeed,
 KBI_angez_Geschw, SAS_Speed, Seitenwind, local_ang_vel_y, motor_omega, Steer_L1, Steer_R1,
-LWI_VZ_Lenkradwinkel, ESP_VZ_Gierrate, yaw_rate_sign
+LWI_VZ_Lenkradwinkel, ESP_VZ_Gierrate, yaw_rate_sign,
+/drive/drive.speed, /drive/speed, /car/ackermann_cmd/drive.speed, /cmd_vel/linear.x,
+/cmd_vel/angular.z
 """)
 
 

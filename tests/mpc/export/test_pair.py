@@ -109,9 +109,13 @@ def test_cmake_builds_both_and_the_learning_car_keeps_its_lane(law, single, pair
     answer = run("ctest", "--test-dir", "build", cwd=folder)
     assert answer.returncode == 0, answer.stdout
     assert "3 tests" in answer.stdout or "out of 3" in answer.stdout
-    log = folder / "log.csv"
+    log = folder / "drives.csv"
     answer = run(str(folder / "build" / "tireid_closed_loop"), str(log))
     assert answer.returncode == 0, answer.stdout
+    written = log.read_text()
+    again = run(str(folder / "build" / "tireid_closed_loop"), str(log))
+    assert (again.returncode, "exists" in again.stderr) == (2, True)
+    assert log.read_text() == written
     rows = require_lane_kept(answer.stdout, log)
     assert (rows[:, -1] <= 1).all()
 

@@ -73,7 +73,7 @@ def test_other_columns_comments_empty_lines_separators_and_decimals_do_not_matte
 
 def test_an_open_path_stays_open_and_the_caller_decides(tmp_path):
     half = write(tmp_path, "x,y\n" + rows(RING[:13]))
-    assert not Path.from_csv(half).closed
+    assert repr(Path.from_csv(half)).endswith(" m, open>")
     assert Path.from_csv(half, closed=True).closed
     whole = write(tmp_path, "x,y\n" + rows(RING))
     assert not Path.from_csv(whole, closed=False).closed
@@ -90,6 +90,7 @@ def test_an_open_path_stays_open_and_the_caller_decides(tmp_path):
         ("x,y\n1,2\n3,\n", "y must be a finite number, line 3 has none"),
         ("x,y\n1,2\nnan,3\n", "x must be a finite number, line 3 has none"),
         ("x,y\n1,2\n1,2\n3,4\n", "numbers 1 and 2 are both"),
+        ("x,y\n8.4,49\n8.40028,49\n8.4002,48.9999\n", "is 0.00041 m long: are X and Y degrees"),
     ],
 )
 def test_bad_files_are_named_with_the_place(tmp_path, text, message):

@@ -19,8 +19,10 @@ import pytest
 from identifier.baselines.linear import LinearModel
 from identifier.frozen import FrozenModelError
 from identifier.tire_model import TireModel
+from models.logs.signals import Signal
+from models.recordings import LogMap
 from models.vehicle import sedan
-from tireid.live.outputs import TOPIC, Outputs, Store
+from tireid.live.outputs import TOPIC, Outputs, Store, scale_of_steering
 from tireid.live.state import SLIP, Counts, Point, State
 from tireid.output import OutputError
 
@@ -223,10 +225,18 @@ def test_the_store_holds_the_newest_tires_for_the_next_run(tmp_path, tires):
     assert store.stored() is None
     for tire in tires:
         store.offer(tire)
-    assert not list(folder.iterdir())  # until a minute is over
+    assert not (folder / "tires.json").exists()  # until a minute is over
     store.close()
     assert Store(folder).stored().to_dict() == tires[-1].to_dict()
-    assert [path.name for path in folder.iterdir()] == ["tires.json"]
+    assert {path.name for path in folder.iterdir()} == {"tires.json", "steering.txt"}
+    other = LogMap(signals={"delta_f": Signal(channel=("steer",), factor=1.34)})
+    with pytest.raises(
+        FrozenModelError, match=r"delta_f 'as logged', --log has it 'factor = 1.34'"
+    ):
+        Store(folder, scale_of_steering(other))
+    Store(
+        folder, scale_of_steering(LogMap(signals={"delta_f": Signal(channel=("steer",))}))
+    ).close()
 
 
 def test_the_store_writes_by_itself(tmp_path, tires):

@@ -17,6 +17,7 @@ WIDE, NARROW = 1200, 500  # px
 # A folder into which each picture is written, to be looked at.
 PICTURES = os.environ.get("TIREID_PICTURES")
 NAN = np.nan
+KILO = ("force", "force_sd", "stiffness", "stiffness_sd")  # of a car, smaller of a model of one
 UNKNOWN = {
     **dict.fromkeys(["friction", "friction_since", "side_slip", "side_slip_sd", "point"]),
     **dict.fromkeys(["understeer", "understeer_sd", "a_y_limit", "a_y_limit_sd"], NAN),
@@ -79,6 +80,10 @@ def test_the_page_says_what_is_known_and_when_nothing_comes(tab):
         for words in ("100.0 ± 2.0", "0.57 ± 0.23", "lost\t3", "-0.34 ± 0.04", "1.74"):
             assert words in shown
         look(tab, "good")
+        small = made(420.3, **{n: getattr(made(0.0), n) / 1e3 for n in KILO})
+        tab.wait(f"{text}.includes('Stiffness [N/rad]\\t100.0')", lambda: outputs.send(small))
+        assert tab.value("plots.rear.axes[1].label") == "force [N]"
+        look(tab, "small")
         alarm = "friction 0.62 of the reference"
         bad = made(420.4, valid=False, reason="another road", alarm=alarm, friction=0.62)
         tab.wait(f"{text}.includes({alarm!r})", lambda: outputs.send(bad))
