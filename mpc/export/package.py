@@ -1,5 +1,6 @@
 """The package of a tracker: C sources, self-test, build file, README and manifest, by path."""
 
+import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import asdict, is_dataclass
@@ -16,7 +17,7 @@ from codegen.package import rows
 from codegen.template import Values, Words, filled
 from identifier.frozen import vehicle_numbers
 from mpc.prediction import build_stage, state_size
-from mpc.problem import Problem
+from mpc.problem import Problem, size_of
 from mpc.realtime import Measurement, Status, Tracker
 from mpc.realtime.c_source import PREFIX, c_sources
 from mpc.realtime.tracker import TOLERANCE as SOLVER_TOLERANCE
@@ -93,18 +94,21 @@ def record(tracker: Tracker, steps: int = _STEPS) -> Vectors:
     problem, period = tracker.problem, tracker.period
     stride = max(1, round(problem.dt / period))
     offset = round(float(tracker.times[1]) / period)
-    road = _road(steps + offset + stride * problem.horizon, period)
-    road[steps - _SLOW + offset + stride * (problem.horizon - 1), 1] = 1.0
+    size = size_of(tracker.tire.vehicle)
+    pace = math.sqrt(size)  # of times and speeds
+    road = _road(steps + offset + stride * problem.horizon, period, pace)
+    road[steps - _SLOW + offset + stride * (problem.horizon - 1), 1] = pace
     blank = np.zeros((steps, 4)), np.zeros((steps, 2))
     vectors = Vectors(*blank, road, offset, stride)
     car = _Car(tracker)
+    car.x[0] = 0.3 * size
     for k in range(steps):
         vectors.measured[k] = np.round(car.x[:4], _DIGITS)
         for name, value in FAULTS.get(k, {}).items():
             vectors.measured[k, Measurement._fields.index(name)] = value
         command = tracker.step(vectors.measurement(k, problem.horizon))
         vectors.expected[k] = command.steering, int(command.status)
-        car.advance(command.steering, road[k, 0], _SPEED)
+        car.advance(command.steering, road[k, 0], _SPEED * pace)
     tracker.reset()
     return vectors
 
@@ -116,7 +120,6 @@ class _Car:
         tire = tracker.tire
         self.step, self.period, self.weights = build_stage(tire.structure), tracker.period, tire
         self.x = np.zeros(state_size(tire.structure))
-        self.x[0] = 0.3
         self.car = tire.car * np.array([_HEAVIER, _HEAVIER, 1.0, 1.0])
         self.on_the_way = deque([0.0] * round(tracker.delay / tracker.period))
 
@@ -127,15 +130,15 @@ class _Car:
         self.x = np.array(self.step(self.x, *numbers, *ALL, ca.DM.zeros(7))[0]).ravel()
 
 
-def _road(n: int, period: float) -> Array:
+def _road(n: int, period: float, pace: float) -> Array:
     """Return a lane change and its way back, bent by cubics, (n, 2)."""
-    t = period * np.arange(n)
+    t = period * np.arange(n) / pace
     kappa = np.zeros(n)
     for begin, sign in ((0.4, 1.0), (0.4 + _LANE_CHANGE, -1.0)):
         z = np.clip((t - begin) / _LANE_CHANGE, 0.0, 1.0)
         kappa += sign * (1.0 - 2.0 * z) * z * (1.0 - z)
-    kappa *= _LATERAL / _SPEED**2 / 0.0962  # the largest value of the cubic
-    road = np.stack([kappa, _SPEED - 0.25 * t], axis=1)
+    kappa *= _LATERAL / (_SPEED * pace) ** 2 / 0.0962  # the largest value of the cubic
+    road = np.stack([kappa, pace * (_SPEED - 0.25 * t)], axis=1)
     return road.round(_DIGITS)
 
 

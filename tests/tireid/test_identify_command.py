@@ -216,7 +216,7 @@ def test_the_first_screen_says_what_is_missed_and_shows_the_curve(ended, law):
         assert 'class="struck"' not in page
         assert verdict["valid"] and json_of(result / "weights.json")["valid"] is True
         assert (stiff["axle"], stiff["state"]) == ("front", "valid")
-    words = with_doubt(1e-3 * stiff["value"], 1e-3 * stiff["sd"])
+    words = with_doubt(*(x and 1e-3 * x for x in (stiff["value"], stiff["sd"])))
     assert words in outline(page).text.replace("\xa0", " ")
     assert "cornering stiffness [kN/rad]" in printed and " N/rad" not in printed
 

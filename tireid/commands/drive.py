@@ -42,7 +42,8 @@ _EPILOG = (
     "sensors show that it slides, and the tires at the end are used. linear is the tire of the "
     "vehicle file, oracle the true tire of the plant, learning begins with "
     "the frozen tires and updates them while driving. "
-    "Exit code 0 where the first of the cars reached the end of the path, else 1."
+    "Exit code 0 where the first of the cars reached the end of the path and its tracker planned "
+    "in 90 % of the steps, else 1."
 )
 
 

@@ -68,7 +68,7 @@ class Tracker:
     """Steers a car along a path by a plan of the next 2 s; it is what steers in `tireid.drive`.
 
     For a model car, of a wheelbase below 1.5 m, lengths, speeds and times of plans and limits are
-    those of its size: at 1:10 it plans 0.6 s and drives from 0.6 m/s on.
+    those of its size: at 1:10 it plans 0.5 s and drives from 0.5 m/s on.
 
     Attributes: profile, the wanted speed along the path.
 
@@ -84,8 +84,8 @@ class Tracker:
     delay : from a state until its steering has reached the wheels [s], the lag of the steering
         included; at most 31 periods.
     max_steering : largest angle of the front road wheels [rad]; None: 0.5.
-    max_steering_rate : fastest change of it [rad/s]; None: 0.8, of a model car more, such as 2.5 at
-        1:10.
+    max_steering_rate : fastest change of it [rad/s]; None: 0.8, for a model car more, such as 3.2
+        at 1:10.
     caution : share of the tires' uncertainty that the plan allows for, from 0 to 1.
 
     Raises
