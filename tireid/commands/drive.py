@@ -105,8 +105,8 @@ def declare(new: Any) -> None:
         metavar="NAME",
         help="full: v_y is measured; imu: yaw rate and a_y of an inertial unit on the body (0.003 "
         "rad/s and 0.1 m/s² of noise, biases of 0.001 and 0.05), wheel speed (0.03 m/s), steering, "
-        "position (2 cm) and heading (0.1 degrees) of a localization, and no v_y: an identifier "
-        "estimates it while driving (%(default)s)",
+        "position (2 cm, of a model car less) and heading (0.1 degrees) of a localization, and no "
+        "v_y: an identifier estimates it while driving (%(default)s)",
     )
     text = (
         f"a sensor that breaks on the path, times in s (v_y:biased:3:inf:0.5); kinds: "
