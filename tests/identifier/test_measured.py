@@ -52,6 +52,6 @@ def test_a_summary_says_what_the_model_misses_once_somebody_looked(tmp_path):
     tire.save(tmp_path / "tire.json")
     assert ti.TireModel.load(tmp_path / "tire.json").summary() == tire.summary()
     assert run.freeze().model_error is None
-    assert "model error" not in run.freeze().summary()
+    assert "\nmodel error" not in run.freeze().summary()
     for other in (tire.at_friction(0.5), tire.mounted_on(tire.vehicle)):
         assert other.model_error is None
