@@ -123,15 +123,17 @@ def summary(values: Mapping[str, Values]) -> Table:
             for key, value in estimate.items()
             if re.fullmatch(rf"{place}/\w+/{how}", key) and key.split("/")[1] not in OWN
         }
-        best = min(others, key=others.__getitem__)
+        least = min(others, key=others.__getitem__)
         ours = float(estimate[f"{place}/fit/{how}"])
-        rows.append([what, f"{ours:.1f} %", f"{others[best]:.1f} %, `{best}`"])
+        rows.append([what, f"{ours:.1f} %", f"{others[least]:.1f} %, `{least}`"])
     error = {name: float(slip[f"cars/all/{name}/rms"]) for name in ("inertial", "joint_ekf")}
     what = f"Side slip without a sensor of v_y, {slip['cars']} random cars: median"
     rows.append([what, f"{error['inertial']:.2f}°", f"{error['joint_ekf']:.2f}°, `joint_ekf`"])
     rms = {name: float(worth[f"iso-3888-2/97/1.0/{name}/rms"]) for name in ("axle", "paper")}
     what = "Path deviation in ISO 3888-2 at 97 % of the grip: rms, median of 10 drives"
-    rows.append([what, f"{rms['axle']:.1f} cm", f"{rms['paper']:.1f} cm, the paper's network"])
+    lost = 10 - int(worth["iso-3888-2/97/1.0/paper/completed"])
+    best = f"{rms['paper']:.1f} cm, the paper's network, {lost} of 10 lost"
+    rows.append([what, f"{rms['axle']:.1f} cm", best])
     return Table(("task", "tireid", "best alternative"), rows)
 
 
