@@ -1,12 +1,12 @@
-"""Does a stored model notice that a drive is on another road than that which taught it?
+"""Does a stored model notice that a drive is on another road than that of its identification?
 
     python -m benchmarks.road_friction [--quick] [--record]
 
 Random cars of four classes learn on a drive with good sensors, with their v_y and without. Then
 they are driven at random on the same road, and on one whose friction changes at a random time, to
 0.3 to 0.8 of it and to 1.25 to 1.6; `Prediction.friction` of the stored model is asked of each. A
-road is told in time within a second of the moment from which the old curve, at the true motion and
-at speeds at which the verdict looks, is wrong by more than 15 % of the static load of an axle:
+road is detected in time within a second of the moment from which the old curve, at the true motion
+and at speeds at which the verdict looks, is wrong by more than 15 % of the static load of an axle:
 before that no tire slides otherwise than it did. Constants of the filter were chosen on seeds 100
 to 105.
 """
@@ -33,7 +33,7 @@ from models.recordings import Recording
 
 EACH = 6  # cars of a class
 SAME, DROPS, RISES = 2, 3, 1  # drives of a car
-LESS, MORE = (0.3, 0.8), (1.25, 1.6)  # friction over that of the road that taught
+LESS, MORE = (0.3, 0.8), (1.25, 1.6)  # friction over that of the identification
 WHEN = (4.0, 12.0)  # s, of the change, which takes a tenth of a second
 SPIN, SLOWED = 0.3, 0.4  # largest |v_y/v_x|, and least v_x over that wanted, of a drive that counts
 DRAWS = 60
@@ -43,17 +43,17 @@ WAYS = ("with_v_y", "without_v_y")
 
 
 class Asked(NamedTuple):
-    """What was told of a drive.
+    """What was detected of a drive.
 
-    ratio : true friction, 1 where nothing changes.   after : when the change was told, since the
-    old curve was wrong [s]; inf never, nan where it never was wrong.   early : whether another road
-    was told before, or where there is none.   told : friction at last, nan where none was told.
+    ratio : true friction, 1 where nothing changes.   after : when the change was detected, since
+    the old curve was wrong [s]; inf never, nan where it never was wrong.   early : whether another
+    road was detected before, or where there is none.   detected : friction at last, nan for none.
     """
 
     ratio: float
     after: float
     early: bool
-    told: float
+    detected: float
 
 
 def driven(
@@ -102,7 +102,7 @@ def wrong_at(model: ti.TireModel, drive: Recording, since: float) -> float:
 def asked(
     model: ti.TireModel, log: Recording, ratio: float, change: float, wrong: float
 ) -> Asked | None:
-    """Return what a stored model tells of a log; None where nothing can be told.
+    """Return what a stored model tells of a log; None where nothing can be detected.
 
     Parameters
     ----------
@@ -117,28 +117,28 @@ def asked(
     roads = found.roads
     after = [one.first for one in roads if one.first >= change]
     late = math.nan if math.isinf(wrong) else min(after, default=math.inf) - wrong
-    told = roads[-1].ratio if roads else math.nan
-    return Asked(ratio, late, any(one.first < change for one in roads), told)
+    detected = roads[-1].ratio if roads else math.nan
+    return Asked(ratio, late, any(one.first < change for one in roads), detected)
 
 
 def case(job: tuple[str, int]) -> dict[str, list[Asked]]:
-    """Return what was told of the drives of a random car, with its v_y and without.
+    """Return what was detected of the drives of a random car, with its v_y and without.
 
     Parameters
     ----------
     job : class of the car, and seed.
     """
     kind, seed = job
-    lesson, rng = drawn(kind, seed), np.random.default_rng([seed, 77])
-    car, log = lesson.car, blind(lesson.log(rng))
+    taught, rng = drawn(kind, seed), np.random.default_rng([seed, 77])
+    car, log = taught.car, blind(taught.log(rng))
     logs = {"with_v_y": log, "without_v_y": replace(log, v_y=None)}
     models = {way: ti.identify(one, car.declared, check=False).tire for way, one in logs.items()}
     less = np.exp(rng.uniform(math.log(LESS[0]), math.log(LESS[1]), DROPS))
-    told: dict[str, list[Asked]] = {way: [] for way in WAYS}
+    detected: dict[str, list[Asked]] = {way: [] for way in WAYS}
     for ratio in (*[1.0] * SAME, *less.tolist(), *rng.uniform(*MORE, RISES).tolist()):
         for way, found in of_drive(car, models, ratio, rng).items():
-            told[way].append(found)
-    return told
+            detected[way].append(found)
+    return detected
 
 
 def of_drive(
@@ -153,7 +153,7 @@ def of_drive(
     ratio : friction after the change.
     rng : source of randomness.
     """
-    drive, told = driven(car, ratio, rng), {}
+    drive, detected = driven(car, ratio, rng), {}
     if drive is None:
         return {}
     exact, change = drive
@@ -163,17 +163,17 @@ def of_drive(
         wrong = wrong_at(models["with_v_y"], exact, change)
         found = asked(model, log, ratio, change, wrong)
         if found is not None:
-            told[way] = found
-    return told
+            detected[way] = found
+    return detected
 
 
 def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
-    """Print, record and judge what was told of all drives in one way.
+    """Print, record and judge what was detected of all drives in one way.
 
     Parameters
     ----------
     way : one of `WAYS`.
-    every : what was told.
+    every : what was detected.
     targets : collects what is missed.
     """
     early = 100.0 * float(np.mean([one.early for one in every]))
@@ -190,10 +190,12 @@ def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
         after = np.array([one.after for one in slid])
         found = 100.0 * float(np.mean(np.isfinite(after)))
         targets.record(f"{way}/{name}/slid", len(slid))
-        targets.record(f"{way}/{name}/told", found)
-        print(f"  {way}, {name}: {len(slid)} that slid, {found:.0f} % told")
+        targets.record(f"{way}/{name}/detected", found)
+        print(f"  {way}, {name}: {len(slid)} that slid, {found:.0f} % detected")
         if name == "drop":
-            off = [abs(one.told / one.ratio - 1.0) for one in slid if not math.isnan(one.told)]
+            off = [
+                abs(one.detected / one.ratio - 1.0) for one in slid if not math.isnan(one.detected)
+            ]
             soon = 100.0 * float(np.mean(after <= SOON))
             label = f"{way.replace('_', ' ', 1)}: detected within 1 s"
             targets.at_least(label, soon, 90.0, key=f"{way}/drop/soon")
@@ -202,11 +204,11 @@ def report(way: str, every: Sequence[Asked], targets: Targets) -> None:
 
 def canary() -> Values:
     """Return what a stored model tells of one drop of friction."""
-    lesson, rng = drawn("sedan", FIRST_SEED), np.random.default_rng(0)
+    taught, rng = drawn("sedan", FIRST_SEED), np.random.default_rng(0)
     models = {
-        "with_v_y": ti.identify(blind(lesson.log(rng)), lesson.car.declared, check=False).tire
+        "with_v_y": ti.identify(blind(taught.log(rng)), taught.car.declared, check=False).tire
     }
-    (found,) = of_drive(lesson.car, models, 0.5, rng).values()
+    (found,) = of_drive(taught.car, models, 0.5, rng).values()
     return found._asdict()
 
 
@@ -219,8 +221,9 @@ def tables(v: Values) -> dict[str, Table]:
     """
     rows = [
         [way.replace("_", " ", 1), f"{v[f'{way}/drives']}", f"{v[f'{way}/early']:.1f}",
-         f"{v[f'{way}/drop/slid']}", f"{v[f'{way}/drop/soon']:.0f}", f"{v[f'{way}/drop/told']:.0f}",
-         f"{v[key]:.0f}" if (key := f"{way}/rise/told") in v else ""]
+         f"{v[f'{way}/drop/slid']}", f"{v[f'{way}/drop/soon']:.0f}",
+         f"{v[f'{way}/drop/detected']:.0f}",
+         f"{v[key]:.0f}" if (key := f"{way}/rise/detected") in v else ""]
         for way in WAYS
     ]  # fmt: skip
     header = ("log", "drives", "false alarms [%]", "drops that matter", "detected within 1 s [%]",
@@ -235,8 +238,8 @@ def main() -> int:
     jobs = [(kind, FIRST_SEED + k) for k in range(each) for kind in classes]
     every: dict[str, list[Asked]] = defaultdict(list)
     with ProcessPoolExecutor() as pool:
-        for told in pool.map(case, jobs):
-            for way, some in told.items():
+        for detected in pool.map(case, jobs):
+            for way, some in detected.items():
                 every[way] += some
     for way in WAYS:
         report(way, every[way], targets)

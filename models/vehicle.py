@@ -275,8 +275,8 @@ class Vehicle:
     yaw_inertia: float = None  # type: ignore[assignment]  # a number from `__post_init__` on
     l_f: float
     l_r: float
-    cornering_stiffness_front: float = None  # type: ignore[assignment]
-    cornering_stiffness_rear: float = None  # type: ignore[assignment]
+    cornering_stiffness_front: float = None  # type: ignore[assignment]  # as yaw_inertia
+    cornering_stiffness_rear: float = None  # type: ignore[assignment]  # as yaw_inertia
     downforce_area_front: float = 0.0
     downforce_area_rear: float = 0.0
     cg_height: float | None = None

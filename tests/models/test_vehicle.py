@@ -211,7 +211,7 @@ def test_what_braking_wants_to_know_comes_back_from_files(tmp_path):
 
 
 def test_what_a_chassis_leaves_out_is_typical_of_the_size_of_the_car(tmp_path):
-    """The rules give back the built-in sedan to a fifth; what is stated stays."""
+    """The rules agree with the built-in sedan to a fifth; what is stated stays."""
     car = replace(sedan(), chassis=None, cg_height=0.55).with_chassis()
     c = car.require_chassis()
     for one in c.estimated:

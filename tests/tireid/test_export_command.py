@@ -64,8 +64,8 @@ def test_single_precision_is_the_default_of_the_build(tmp_path):
 def test_a_y_is_an_input_where_it_is_asked_for(tmp_path, capsys):
     for words, inputs in (([], "v_x, v_y, r, delta_f, delta_r"), (["--with-a-y"], "delta_r, a_y")):
         assert typed("export", "--out", tmp_path / f"a{len(words)}", *words) == 0
-        told = [line for line in capsys.readouterr().err.splitlines() if "reads" in line]
-        assert f" {inputs}; " in told[0]
+        printed = [line for line in capsys.readouterr().err.splitlines() if "reads" in line]
+        assert f" {inputs}; " in printed[0]
 
 
 @pytest.mark.heavy
@@ -87,9 +87,9 @@ def test_what_was_learnt_without_a_lateral_velocity_goes_on_without_it(
     out, weights = tmp_path / "package", str(tmp_path / "weights.json")
     words = ["--weights", weights, "--fmu"]
     assert typed("export", "--out", out, *words) == 0
-    told = capsys.readouterr().err
-    assert "reads v_x, r, delta_f, delta_r, a_y; v_y is an output; one step each 10 ms" in told
-    assert "tireid_fmi2.fmu, tireid_fmi3.fmu" in told
+    printed = capsys.readouterr().err
+    assert "reads v_x, r, delta_f, delta_r, a_y; v_y is an output; one step each 10 ms" in printed
+    assert "tireid_fmi2.fmu, tireid_fmi3.fmu" in printed
     package = Shipped.from_folder(out)
     np.testing.assert_array_equal(package.weights["W"], model.W)
     run, expected = package.run(drive), identify(drive, CAR, method, start=model)
@@ -155,10 +155,10 @@ def test_the_band_is_exported_as_it_was_calibrated(tmp_path, logs, capsys):
     run = identify(read_recording(logs / "slalom.csv"), CAR, make_method("axle", CAR))
     calibrated(run).save(tmp_path / "weights.json")
     words = ["export", "--band", "--weights", tmp_path / "weights.json"]
-    assert typed(*words, "--out", tmp_path / "told") == 0
-    manifest = json_of(tmp_path / "told" / "tireid.json")
+    assert typed(*words, "--out", tmp_path / "printed") == 0
+    manifest = json_of(tmp_path / "printed" / "tireid.json")
     assert manifest["band"] == calibrated(run).calibration.to_dict()
-    assert "half_band" in (tmp_path / "told" / "include" / "tireid_config.h").read_text()
+    assert "half_band" in (tmp_path / "printed" / "include" / "tireid_config.h").read_text()
     assert exporting.UNCALIBRATED not in capsys.readouterr().err
     again = exporting.export(Run(history=run), tmp_path / "run", band=True)
     assert again.package.specialized.band == manifest["band"]
