@@ -36,6 +36,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").r
 GIVEN = ("car.toml", "log.csv", "other.csv", "tire.json", "out/mine")
 AT_ONCE = 2  # pages; more than two cores are rare where documents are made
 LONGEST = 600  # s of a block: what takes longer hangs
+ENDS = 60  # s from SIGINT to the end of what runs in the background
 READ = ("text", "json", "sql", "matlab")  # languages of what is only read; Sphinx has {those}
 # `make docs` has done these.
 INSTALLS = re.compile(r"^(pip install |python3 -m venv |\. \.venv/).*$", re.M)
@@ -84,7 +85,10 @@ def python(code: str, page: str, names: dict[str, Any]) -> str:
 
 
 def start(code: str, page: str) -> "subprocess.Popen[str]":
-    """Start shell lines; the first that fails ends them and is named."""
+    """Start shell lines; the first that fails ends them and is named.
+
+    They end by SIGINT also where this script does not, as in the background of a shell.
+    """
     trap = f"trap 'echo \"{page}:$LINENO: exit code $?\" >&2' ERR; "
     return subprocess.Popen(
         ["bash", "-euc", trap + code],
@@ -92,6 +96,7 @@ def start(code: str, page: str) -> "subprocess.Popen[str]":
         stderr=subprocess.STDOUT,
         encoding="utf-8",
         start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
 
@@ -130,10 +135,18 @@ def interrupt(shells: "list[subprocess.Popen[str]]", page: str) -> None:
     for shell in shells:
         if shell.poll() is None:
             os.killpg(shell.pid, signal.SIGINT)
-    said = [shell.communicate(timeout=LONGEST)[0] for shell in shells]
-    for shell, out in zip(shells, said, strict=True):
+    failed = []
+    for shell in shells:
+        try:
+            out, _ = shell.communicate(timeout=ENDS)
+        except subprocess.TimeoutExpired:
+            os.killpg(shell.pid, signal.SIGKILL)
+            shell.communicate()
+            out = f"{shell.args[-1].strip()}: runs on for {ENDS} s after SIGINT"
         if shell.returncode not in (0, 130, -signal.SIGINT):
-            raise SnippetError("\n".join([f"{page}: in the background:", *out.splitlines()[-8:]]))
+            failed.append("\n".join([f"{page}: in the background:", *out.splitlines()[-8:]]))
+    if failed:
+        raise SnippetError("\n".join(failed))
 
 
 def compile_c(code: str, before: str, page: str) -> None:

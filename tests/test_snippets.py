@@ -1,6 +1,8 @@
 """What pages show is run: README's example learns the tire, and what fails is named by its line."""
 
+import contextlib
 import re
+import signal
 
 import numpy as np
 import pytest
@@ -83,6 +85,21 @@ def test_blocks_run_in_order_in_one_namespace_and_folder(tmp_path):
         "11: needs a car",
         "15: needs no-such-program",
     ]
+
+
+@pytest.mark.parametrize("ends", [True, False])
+def test_what_runs_in_the_background_ends_where_sigint_is_ignored(ends, tmp_path, monkeypatch):
+    """As where `make docs` itself runs in the background of a shell."""
+    trap = "" if ends else "trap '' INT; "
+    text = f"<!-- background -->\n```sh\n{trap}touch ready; sleep 30; true\n```\n"
+    text += "<!-- run: until [ -e ready ]; do sleep 0.1; done -->\n"
+    monkeypatch.setattr("docs.snippets.ENDS", 2)
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with contextlib.nullcontext() if ends else pytest.raises(SnippetError, match="runs on for"):
+            run_page(page(tmp_path, text), tmp_path)
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.parametrize(

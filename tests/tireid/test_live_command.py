@@ -10,6 +10,7 @@ import struct
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -134,7 +135,9 @@ def test_without_the_extra_one_line_says_what_to_install(
 def started(*given):
     line = [sys.executable, "-m", "tireid", *map(str, given)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen(line, cwd=ROOT, **pipes)
+    # A test in the background of a shell would hand on that SIGINT is ignored.
+    interruptible = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    return subprocess.Popen(line, cwd=ROOT, preexec_fn=interruptible, **pipes)
 
 
 def until(text, process):
