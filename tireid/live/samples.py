@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models.logs.can import CALENDAR, EXTENDED, reader_of, wanted
-from models.logs.clock import FASTER, GAP_INTERVALS, ON_STEP
+from models.logs.clock import BEYOND, FASTER, GAP_INTERVALS, ON_STEP, RECENT
 from models.logs.log import RecordingError, some
 from models.logs.signals import BETA, INSTEAD, POSE, WHEELS, Signal, quantity_of
 from models.logs.units import PER_SECOND, TIME, is_given, time_unit, to_si
@@ -195,7 +195,7 @@ class _Channel:
 
     def at(self, t: float) -> float:
         """Return the value at an instant [s], as `models.logs.clock` has it; NaN in a gap."""
-        while len(self.last) > 2 and self.last[2][0] <= t - DT:
+        while len(self.last) > RECENT and self.last[RECENT][0] <= t - DT:
             self.last.popleft()
         there = [one for one in self.last if one[0] <= t + _NEAR]
         if not there or t - there[-1][0] > max(self._longest, GAP_INTERVALS * self.interval):
@@ -207,7 +207,11 @@ class _Channel:
         before, old = there[-2] if len(there) > 1 else (here, now)
         step, ahead = here - before, t - here
         if ahead > _NEAR and 0.0 < step <= GAP_INTERVALS * self.interval:
-            return now + min(ahead, step) / step * (now - old)
+            recent = [value for _, value in there[-RECENT:]]
+            low, high = min(recent), max(recent)
+            room = BEYOND * (high - low)
+            change = min(max(now - old, low - room - now), high + room - now)
+            return now + min(ahead, step) / step * change
         return now
 
 
