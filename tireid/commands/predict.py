@@ -126,7 +126,7 @@ def _model(options: argparse.Namespace) -> TireModel:
     """Return the model, on the car that drove."""
     model = shared.stored_model(options.model)
     assert model is not None
-    vehicle = shared.read_vehicle(options, model, options.model)
+    vehicle = shared.read_vehicle(options, model)
     if vehicle.moves_as(model.vehicle):
         return model
     if not model.scales_with_load:

@@ -198,7 +198,7 @@ TITLES = (
     "bias of v_y",
     "mounting angle of the v_y sensor",
     "place of the v_y sensor ahead of the center of gravity",
-    "steering angle, relative error",
+    "correction of the steering angle",
 )
 
 
