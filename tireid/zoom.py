@@ -10,7 +10,7 @@ import math
 import re
 import zlib
 from base64 import b64encode
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,8 +20,10 @@ import numpy as np
 from codegen.arrays import Array
 
 LARGEST = 60_000  # bytes that a report has for its plots
-# Figures, by name: the curves, and forces and v_y over time.
-ZOOMED = ("slip", "forces", "inputs", "side_slip", "tires", "lateral")
+# Figures, by name: the curves, and forces and v_y over time; and of many replays the first, so that
+# two axles of each have the columns of a picture left.
+_ZOOMED = ("slip", "forces", "inputs", "side_slip", "tires", "lateral")
+_REPLAYS = 2
 _COLUMNS, _COLUMNS_AT_FIRST = 1200, 400  # of a panel: at most, and those that are tried first
 # Room over size that is good, share of the columns that would fill it, and how often to try.
 _FULL, _TRIM, _TRIES = 1.15, 0.97, 6
@@ -102,6 +104,12 @@ class Drawn(bytes):
     """A figure as PNG; its panels, where it may be looked at closer."""
 
     zoom: Zoom = ()
+
+
+def zoomed(names: Iterable[str]) -> set[str]:
+    """Return which figures of a report may be looked at closer."""
+    replays = [name for name in names if name.startswith("replay_")]
+    return {*_ZOOMED, *replays[:_REPLAYS]}
 
 
 def zoom_of(figure: Any) -> Zoom:

@@ -11,7 +11,7 @@ import pytest
 from tests.tireid.test_report import page_of
 from tireid.figures.style import axle_panels, figure_png, styled
 from tireid.report import Picture, Section
-from tireid.zoom import LARGEST, Drawn, Series, plots_html, zoom_of
+from tireid.zoom import LARGEST, Drawn, Series, plots_html, zoom_of, zoomed
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
 TIME, SLIP = 1.7e9 + np.arange(20_000) / 100.0, np.linspace(-9.0, 9.0, 200)
@@ -68,6 +68,11 @@ def test_plots_of_many_long_signals_are_small_and_as_the_figure_has_them():
         assert np.flatnonzero(np.isnan(y)).tolist() == gap
         assert np.delete(y, gap) == pytest.approx(np.delete(x, gap) + offset, abs=1e-4)
     assert len(arrays[cloud["x"]]) < 320 and panels[-1]["spans"][0][:2] == [7.0, 9.0]
+
+
+def test_curve_forces_signals_and_the_first_replays_may_be_looked_at_closer():
+    names = ["inputs", "slip", "forces", "weights", *(f"replay_{k}" for k in range(9))]
+    assert [name for name in names if name in zoomed(names)] == [*names[:3], *names[4:6]]
 
 
 def test_a_thinned_line_has_every_peak_and_the_gaps_between_segments():
