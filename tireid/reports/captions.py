@@ -151,24 +151,23 @@ def curves_caption(
     drops : arc length [m] from which friction is another, and which: curves of the end count from
         the last on, the others up to the first.
     """
-    slip, force, said = axle_slip(drive), drive.axle_force, list[str]()
+    slip, force, said = axle_slip(drive), drive.axle_force, dict[str, list[str]]()
     first, last = (drops[0][0], drops[-1][0]) if drops else (np.inf, -np.inf)
-    for later, driven, where in (
-        (False, drive.s < first, f" up to {first:g} m"),
-        (True, drive.s >= last, f" from {last:g} m on"),
-    ):
-        found = []
-        for curve in curves:
-            drawn = zip(slip.T, curve.force.T, strict=True)
-            at = np.stack([np.interp(x, curve.alpha, y, np.nan, np.nan) for x, y in drawn], axis=1)
-            at = np.nan_to_num(at) * driven[:, None]
-            power = np.sum(at**2, axis=0)
-            if curve.label.endswith(AT_THE_END) == later and power.all():
-                found.append(f"{curve.label} {percents(np.sum(at * force, axis=0) / power)}")
-        said += [f"{', '.join(found)}{where * bool(drops)}"] * bool(found)
+    for curve in curves:
+        driven, where = drive.s < first, f" up to {first:g} m"
+        if curve.label.endswith(AT_THE_END):
+            driven, where = drive.s >= last, f" from {last:g} m on"
+        drawn = zip(slip.T, curve.force.T, strict=True)
+        at = np.stack([np.interp(x, curve.alpha, y, np.nan, np.nan) for x, y in drawn], axis=1)
+        at = np.nan_to_num(at) * driven[:, None]
+        power = np.sum(at**2, axis=0)
+        if power.all():
+            share = percents(np.sum(at * force, axis=0) / power)
+            said.setdefault(where * bool(drops), []).append(f"{curve.label} {share}")
+    found = "; ".join(f"{', '.join(one)}{where}" for where, one in said.items())
     return (
         "True force of the first drive over that of the curves at its slip (front / rear): "
-        f"{'; '.join(said) or 'no slip'}."
+        f"{found or 'no slip'}."
     )
 
 
