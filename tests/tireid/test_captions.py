@@ -71,7 +71,7 @@ def test_a_law_that_errs_less_is_counted_here_and_in_the_paper():
     ours = {"instantaneous": {"a": high, "b": low}, "integral": {"a": low, "b": high}}
     paper = {"instantaneous": {"a": 1.5, "b": 1.5}, "integral": {"a": 0.5, "b": 0.6}}
     said = comparison_caption({**ours, "instantaneous_scaled": {}}, paper)
-    assert "of instantaneous: integral in 1 of 2 columns, in 2 of 2 of the paper. H" in said
+    assert "of instantaneous: integral in 1 of 2 columns, 2 of the paper's 2. H" in said
 
 
 def test_a_report_lists_the_car_and_its_channels(run):

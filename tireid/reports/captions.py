@@ -180,11 +180,11 @@ def comparison_caption(
     medians = {law: {name: q[0] for name, q in row.items()} for law, row in results.items()}
     for law in others:
         said = []
-        for table, whose in ((medians, "columns"), (paper, "of the paper")):
+        for table, whose in ((medians, "{} of {} columns"), (paper, "{} of the paper's {}")):
             row, least = table.get(law, {}), table.get(first, {})
             less = [row[name] < least[name] for name in row if name in least]
-            said += [f"in {sum(less)} of {len(less)} {whose}"] * bool(less)
-        found += [f"{VARIANTS[law].title} {', '.join(said)}"] * bool(said)
+            said += [whose.format(sum(less), len(less))] * bool(less)
+        found += [f"{VARIANTS[law].title} in {', '.join(said)}"] * bool(said)
     return (
         f"Median error below that of {VARIANTS[first].title}: "
         f"{'; '.join(found) or 'nothing to compare'}. Hollow marks are the paper's values."
