@@ -12,6 +12,7 @@ from models.friction import Friction, FrictionChange
 from models.recordings import read_recording, write_recording
 from tests.identifier.conftest import steered
 from tests.tireid.conftest import json_of, page_in, refusal, rewritten, table_of, typed
+from tests.tireid.test_zoom import unpacked
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +67,9 @@ def test_it_leaves_a_report_with_figures(model, logs, blind, tmp_path, capsys):
         out = tmp_path / name
         summary, _ = predicted(out, model, asked)
         page = page_in(out)
-        for figure in ("slip", "forces"):
+        for figure in ("slip", "forces", "inputs"):
             assert (out / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
-        assert page.count("<img") == 2
+        assert page.count("<img") == len(unpacked(page)[0]) == 3, "all have a Zoom"
         front, rear = (f"{100.0 * x:.1f}" for x in summary["verdict"]["measures"]["force_missed"])
         assert f"<dd>{front} / {rear} %</dd>" in page
         assert f"model error over the force in the motion: {front} / {rear} %" in (
