@@ -34,7 +34,7 @@ from mpc.handover.road import RoadWatch, at_friction, fit_friction
 from mpc.handover.rules import Rules
 from mpc.tires import PredictionTire, prediction_tire
 from tireid.live.clock import DT, Clock, Instant
-from tireid.live.state import LIVE, SLIP, STORED, Counts, Point, State
+from tireid.live.state import LIVE, REACH, SLIPS, STORED, Counts, Point, State
 
 EVERY = 20  # instants between two states
 AT_ONCE = 5  # samples that are taken together
@@ -52,6 +52,7 @@ NOISE = 0.03  # m/s, of v_y as coupled receivers have it
 LOST = 0.9  # of the friction of the reference, below which there is an alarm
 REFERENCE = 1000  # instants, 10 s, through which tires explain the motion, to be the reference
 PUSH = 1.5  # m/s² of braking or driving, beyond which another friction is not looked for
+_BEYOND = 1.2  # of the known slip: to where curves reach
 _LOST_SAMPLES = 5  # in a row, after which the road is looked at anew
 _NO_POINT = np.zeros((3, 2))
 
@@ -378,7 +379,6 @@ class Live:
             reason=reason,
             origin=STORED if stored else LIVE,
             alarm=alarm,
-            slip=SLIP,
             **(self._stored or self._live if stored else self._live),
             friction=friction,
             friction_since=None if math.isnan(self._friction_since) else self._friction_since,
@@ -403,8 +403,11 @@ class Live:
 def _numbers(tires: TireModel) -> dict[str, Any]:
     """Return what a state gives of tires, by its fields."""
     car, band = tires.vehicle, require_band(tires)
-    loads, force, both = np.array(car.axle_loads), tires.force(SLIP), np.arange(2)
-    sd = band.half(SLIP) / normal_quantile(LEVEL)
+    known, both = tires.known_slip, np.arange(2)
+    assert known is not None
+    slip = np.linspace(0.0, max(REACH, _BEYOND * float(known.max())), SLIPS)
+    loads, force = np.array(car.axle_loads), tires.force(slip)
+    sd = band.half(slip) / normal_quantile(LEVEL)
     peak, stiffness = force.argmax(axis=0), tires.stiffness
     grip, grip_sd = force[peak, both] / loads, sd[peak, both] / loads
     weaker = int(grip.argmin())
@@ -416,9 +419,10 @@ def _numbers(tires: TireModel) -> dict[str, Any]:
         stiffness_sd = np.array([one.sd for one in tires.estimates() if one.title == STIFFNESS])
     each = car.mass / car.wheelbase * np.array([car.l_r, -car.l_f]) / stiffness
     return {
+        "slip": slip,
         "force": force.T,
         "force_sd": sd.T,
-        "known_slip": tires.known_slip,
+        "known_slip": known,
         "stiffness": stiffness,
         "stiffness_sd": stiffness_sd,
         "grip": grip,

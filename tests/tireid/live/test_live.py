@@ -99,6 +99,14 @@ def test_another_rate_is_what_reading_such_a_log_makes_of_it(car, log, rate):
         assert same_bits(found, offline) or live.counts.samples < len(read)
 
 
+def test_curves_reach_beyond_the_known_slip_and_grip_is_their_largest_force(car, log, stored):
+    state = fed(Live(car, stored.at_friction(4.0)), log)[2]
+    assert state.origin == "stored" and (state.known_slip > 0.2).any()
+    assert state.slip[-1] > max(state.known_slip)
+    loads = np.array(car.axle_loads)
+    np.testing.assert_allclose(state.grip, state.force.max(axis=1) / loads)
+
+
 def test_a_state_says_what_is_known_and_how_well(car, log, stored):
     states = fed(Live(car), log)
     assert np.allclose(np.diff([state.t for state in states]), 0.2)
