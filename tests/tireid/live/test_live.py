@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tireid as ti
+from identifier.axle.slip import beyond_play
 from models.friction import Friction, FrictionChange
 from models.maneuvers import Slalom
 from models.plant import Plant
@@ -289,6 +290,14 @@ def test_a_v_y_that_never_changes_is_never_valid(car, log):
     """As odometry of wheels sends it."""
     states = fed(Live(car), replace(log, v_y=np.zeros(len(log))))
     assert not any(state.valid for state in states) and "v_y never changes" in states[-1].reason
+
+
+def test_play_of_the_steering_is_no_tire_and_stored_tires_are_given(car, log, stored):
+    at, slip = np.linspace(-1.0, 1.0, 20001), log.alpha(car.l_f, car.l_r)[:, 0]
+    loose = log.delta_f + np.interp(slip, beyond_play(at, 0.01), at) - slip
+    states = fed(Live(car, stored), replace(log, delta_f=loose), part=slice(0, 2000))
+    assert not any(state.valid for state in states) and states[-1].origin == "stored"
+    assert "front curve is flat about zero slip" in states[-1].reason
 
 
 def test_tires_that_miss_a_share_of_the_force_are_not_valid(car):
