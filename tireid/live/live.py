@@ -418,7 +418,7 @@ def _flat(model: AxleModel, least: float) -> Any:
 
     least : bound of their stiffness [static axle loads/rad].
     """
-    slip, slope = SLIP[1:, None], 1.0 / np.array(model.ladder)
+    slip, slope = np.linspace(0.0, REACH, SLIPS)[1:, None], 1.0 / np.array(model.ladder)
     P = model.covariance[:, : slope.size, : slope.size]
     steeper = unit_matrix(slip[:, 0], model.ladder) / slip - (1.0 + LARGEST_MODEL_ERROR) * slope
     along = np.vstack([-slope, steeper])
