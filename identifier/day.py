@@ -34,7 +34,7 @@ _ROWS = (  # title, unit that is printed, per SI, of NUMBERS
     ("bias of v_y", " m/s", 1.0),
     ("mounting angle of the v_y sensor", "°", math.degrees(1.0)),
     ("place of the v_y sensor ahead of the center of gravity", " m", 1.0),
-    ("steering angle, relative error", " %", 100.0),
+    ("correction of the steering angle", " %", 100.0),
 )
 
 

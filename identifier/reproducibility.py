@@ -116,16 +116,18 @@ def counted_samples(
 
 def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] | None:
     """Return the share of the samples with more slip than the model knows; None if nobody can tell.
+
+    The slip is that of its curves: lagged, without the errors of the sensors that it finds.
+
     recording : the drive; samples below the model's minimum speed do not count.
     """
     known = model.known_slip
     if known is None:
         return None
-    beyond, count, car = np.zeros(2), 0, model.vehicle
+    beyond, count, slip = np.zeros(2), 0, model.lagged_slip(recording)
     for part in blocks(len(recording)):
         counted = recording.v_x[part] >= model.min_speed
-        alpha = np.abs(recording.alpha(car.l_f, car.l_r, part)[counted])
-        beyond += np.count_nonzero(alpha > known, axis=0)
+        beyond += np.count_nonzero(np.abs(slip[part][counted]) > known, axis=0)
         count += int(np.count_nonzero(counted))
     if count == 0:
         return None

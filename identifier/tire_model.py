@@ -472,9 +472,8 @@ class TireModel(ABC):
         """Return force curve, equations of motion and prediction step, the weights in them.
 
         Speed must be positive. `dynamics` is stiff: the lag vanishes where a tire slides. Integrate
-        it implicitly or by `step`, which holds the lag above half of itself: beyond the grip v_y is
-        off by 10 % with steps of 50 ms, by 1 % with 10 ms. Explicit Runge-Kutta goes wrong there
-        with steps above 2 ms.
+        it implicitly or by `step`, which holds the lag above dt/2. An explicit Runge-Kutta of
+        `dynamics` goes wrong there unless its steps are far shorter than those of `step`.
         """
         x = ca.MX.sym("x", 4 if self.lagged else 2)
         delta, v_x, dt = ca.MX.sym("delta"), ca.MX.sym("v_x"), ca.MX.sym("dt")

@@ -169,7 +169,7 @@ _MODEL_INERTIA = 0.5  # of m l_f l_r, of a car shorter than `FULL_SIZE`
 _STIFFNESS_SHARE = 14.0  # of the static load of the axle [1/rad]
 _OF_LOAD = ("N/rad", f"{_STIFFNESS_SHARE:g} static axle loads per rad")
 _RULES = {  # unit and rule
-    "yaw_inertia": ("kg m2", f"mass l_f l_r, {_MODEL_INERTIA:g} of it for a model car"),
+    "yaw_inertia": ("kg m²", f"mass l_f l_r, {_MODEL_INERTIA:g} of it for a model car"),
     "cornering_stiffness_front": _OF_LOAD,
     "cornering_stiffness_rear": _OF_LOAD,
 }
@@ -315,7 +315,7 @@ class Vehicle:
         typical = self.mass * self.l_f * self.l_r  # about that; 0.4 times it in models
         if not 0.05 < self.yaw_inertia / typical < 20.0:
             raise VehicleError(
-                f"yaw_inertia in kg m^2 must be 0.05 to 20 times mass * l_f * l_r = {typical:.4g}, "
+                f"yaw_inertia in kg m² must be 0.05 to 20 times mass * l_f * l_r = {typical:.4g}, "
                 f"it is {self.yaw_inertia:g}: check the units"
             )
         for name, load in zip(("front", "rear"), self.axle_loads, strict=True):
@@ -330,7 +330,7 @@ class Vehicle:
             unit = 0.5 * _AIR_DENSITY * DOWNFORCE_SPEED**2 / load  # static loads per m^2
             if not _LEAST_PRESS <= getattr(self, name) * unit <= _MOST_PRESS:
                 raise VehicleError(
-                    f"{name} in m^2 must lie between {_LEAST_PRESS / unit:.3g} and "
+                    f"{name} in m² must lie between {_LEAST_PRESS / unit:.3g} and "
                     f"{_MOST_PRESS / unit:.3g}, a downforce of {_LEAST_PRESS:g} to {_MOST_PRESS:g} "
                     f"static loads of the axle at {DOWNFORCE_SPEED:g} m/s, it is "
                     f"{getattr(self, name):g}: check the units"

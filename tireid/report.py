@@ -27,7 +27,7 @@ from models.files import digest, digest_of_bytes, write_atomically
 from models.recordings import Recording
 from models.vehicle import Vehicle
 from tireid import __version__
-from tireid.zoom import Zoom, plots_html
+from tireid.zoom import Drawn, Zoom, plots_html
 
 _SIGNATURES = {  # of files, by their kind
     b"\x89PNG\r\n\x1a\n": "png",
@@ -150,11 +150,6 @@ class Picture:
             raise ValueError(f"the picture {self.caption!r} must be SVG, PNG, GIF or WebP")
         object.__setattr__(self, "image", data)
 
-    @property
-    def zoom(self) -> Zoom:
-        """Panels that a browser draws in its place; none of most."""
-        return getattr(self.image, "zoom", ())
-
 
 Block = str | Table | Picture  # running text is a str
 
@@ -191,15 +186,16 @@ class Report(NamedTuple):
 def report_html(report: Report) -> str:
     """Return a report as one HTML page; tables and figures are numbered through."""
     title = html(report.title)
-    tables, figures, zooms = count(1), count(1), dict[str, Zoom]()
+    tables, figures = count(1), count(1)
+    zooms, spare = dict[str, Zoom](), dict[str, Zoom]()
 
     def written(block: Block) -> str:
         if isinstance(block, Table):
             return _table(block, next(tables))
         if isinstance(block, Picture):
             number = next(figures)
-            if block.zoom:
-                zooms[f"figure-{number}"] = block.zoom
+            if isinstance(block.image, Drawn) and block.image.zoom:
+                (spare if block.image.spare else zooms)[f"figure-{number}"] = block.image.zoom
             return _picture(block, number)
         return f"<p>{_inline(block)}</p>"
 
@@ -228,7 +224,7 @@ def report_html(report: Report) -> str:
     ]
     head += _numbers(report.numbers) + lead + _notes(report.notes)
     contents = ['<nav aria-label="Contents">', "<ol>", *entries, "</ol>", "</nav>"]
-    body = [*head, *contents, *parts, plots_html(zooms)]
+    body = [*head, *contents, *parts, plots_html(zooms, spare)]
     return "\n".join([*body, "</body>", "</html>"]) + "\n"
 
 

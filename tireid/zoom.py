@@ -22,7 +22,9 @@ from codegen.arrays import Array
 LARGEST = 60_000  # bytes that a report has for its plots
 # Figures, by name: the curves, and forces and v_y over time.
 ZOOMED = ("slip", "forces", "inputs", "side_slip", "tires", "lateral")
+REPLAY = "replay_"  # how names begin of those that have a zoom while there is room
 _COLUMNS, _COLUMNS_AT_FIRST = 1200, 400  # of a panel: at most, and those that are tried first
+_COARSE = 140  # columns: a picture has about 560 points an axle, and each column four of them
 # Room over size that is good, share of the columns that would fill it, and how often to try.
 _FULL, _TRIM, _TRIES = 1.15, 0.97, 6
 _POINTS = 300  # of a cloud
@@ -99,9 +101,10 @@ Zoom = Sequence[Panel]
 
 
 class Drawn(bytes):
-    """A figure as PNG; its panels, where it may be looked at closer."""
+    """A figure as PNG; its panels, where it may be looked at closer, or while there is room."""
 
     zoom: Zoom = ()
+    spare = False
 
 
 def zoom_of(figure: Any) -> Zoom:
@@ -179,22 +182,42 @@ def _spans(axes: Any) -> Iterator[tuple[float, float, str]]:
             yield float(x[0]), float(x[0]), to_hex(line.get_color())
 
 
-def plots_html(zooms: Mapping[str, Zoom]) -> str:
+def plots_html(zooms: Mapping[str, Zoom], spare: Mapping[str, Zoom]) -> str:
     """Return what a page needs to draw panels in place of pictures; nothing where there are none.
 
-    zooms : by the id of the figure.
+    zooms : by the id of the figure.   spare : the first of them, while there is room.
     """
-    if not any(zooms.values()):
-        return ""
-    columns, script, page = _COLUMNS_AT_FIRST, _script(), ""
+    page, _ = _fitting(zooms)
+    for name in spare:
+        zooms = {**zooms, name: spare[name]}
+        larger, columns = _fitting(zooms)
+        if columns < _COARSE:
+            break
+        page = larger
+    return page
+
+
+def _fitting(zooms: Mapping[str, Zoom]) -> tuple[str, int]:
+    """Return the largest page that there is room for, and its columns."""
+    columns, page, fitted, before = _COLUMNS_AT_FIRST, "", 0, (0, 0)
+    if not zooms:
+        return page, fitted
+    script = _script()
+    room = LARGEST - len(script)
     for _ in range(_TRIES):
         data = _packed("zoom-data", _data(zooms, columns))
-        share = (LARGEST - len(script)) / len(data)
-        page = data + script if share >= 1.0 else page
-        if share >= 1.0 and (share < _FULL or columns == _COLUMNS):
+        size = len(data)
+        if fitted < columns and size <= room:
+            page, fitted = data + script, columns
+        full = size <= room < _FULL * size
+        if full or columns == before[0] or (size <= room and columns == _COLUMNS):
             break
-        columns = max(1, min(int(_TRIM * share * columns), _COLUMNS))
-    return page
+        more = (size - before[1]) / (columns - before[0])  # of each column; points have none
+        before = columns, size
+        columns = max(
+            1, min(int(columns + (_TRIM * room - size) / (more or size / columns)), _COLUMNS)
+        )
+    return page, fitted
 
 
 @cache

@@ -33,7 +33,7 @@ CERTAIN = 0.99  # confidence in what samples show by themselves
 NOT_MEASURED = ("computed", "copied")  # codes of what no sensor showed
 LATERAL = ("v_y", "r", "delta_f", "a_y")
 UNITS = {"v_x": "m/s", "v_y": "m/s", "r": "rad/s", "delta_f": "rad", "delta_r": "rad",
-         "a_y": "m/s^2"}  # fmt: skip
+         "a_y": "m/s²"}  # fmt: skip
 _ESTIMATED, _SWITCHED = ("v_y", "r"), 2  # channels that may be, how often they are off in a turn
 
 

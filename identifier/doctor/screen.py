@@ -164,7 +164,7 @@ def _quiet_finding(recording: Recording) -> Finding | None:
     return Finding(
         code="straight",
         size=peak,
-        unit="m/s^2",
+        unit="m/s²",
         confidence=0.99,
         text=f"the car hardly corners: v_x r reaches {peak:.2g} m/s² of the "
         f"{_QUIET:g} that are needed; drive a lane change or a slalom",

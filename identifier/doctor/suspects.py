@@ -157,7 +157,7 @@ def _of_channels() -> tuple[Suspect, ...]:
     offsets = (
         ("v_y_bias", "v_y", "m/s", 0.4, 0.02, "speed", " m/s", 1.0),
         ("r_bias", "r", "rad/s", 0.03, 0.002, "rate", " rad/s", 1.0),
-        ("a_y.offset", "a_y", "m/s^2", 0.7, 0.05, "", " m/s²", 1.0),
+        ("a_y.offset", "a_y", "m/s²", 0.7, 0.05, "", " m/s²", 1.0),
         ("steering_zero", "delta_f", "rad", 0.03, 0.0015, "", "°", _DEGREES),
     )
     found = [
@@ -202,7 +202,7 @@ SUSPECTS = (
             "the {origin} yaw inertia is {size} times the right one"),
     Suspect("bank", "bank", "", "rad", 0.03, 0.003, "",
             "the road falls by {size} to the left, or there is side wind", "°", _DEGREES),
-    Suspect("downforce_f", "downforce", "", "s^2/m^2", 2e-4, 5e-5, "",
+    Suspect("downforce_f", "downforce", "", "s²/m²", 2e-4, 5e-5, "",
             "forces grow with speed, as by a downforce of {size}",
             " % of the weight at 100 km/h", 100.0 * (100.0 / 3.6) ** 2),
 )  # fmt: skip

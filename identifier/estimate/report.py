@@ -11,6 +11,7 @@ from identifier.estimate.latent import TRUST
 from identifier.estimate.posterior import Reach, Segment
 from identifier.estimate.priors import Priors
 from identifier.frozen import FORMAT, vehicle_from, vehicle_numbers
+from identifier.measured import with_doubt
 from identifier.motion.parameters import INDEX, NAMES, UNITS, curve_index
 from identifier.tire_model import AXLES, GRIP, RELAXATION, STIFFNESS, Axle, Estimate, Reached
 from models.schema import Table
@@ -109,13 +110,14 @@ def notes(reach: Reach, p: Array, covariance: Array) -> tuple[tuple[str, str], .
         for one in reach.segments
     ]
     k = INDEX["steering_gain"]
-    gain, sd = float(p[k]), float(np.sqrt(covariance[k, k]))
-    if abs(gain) > max(_SURELY * sd, _NOTED_GAIN):
+    factor, sd = 1.0 + float(p[k]), float(np.sqrt(covariance[k, k]))
+    if abs(factor - 1.0) > max(_SURELY * sd, _NOTED_GAIN):
         listed.append(
             (
                 "steering_gain",
-                f"the front wheels turn {1.0 + gain:.2f} ± {sd:.2f} times as far as the log says "
-                "(± with the tires estimated): check the steering ratio; the curves allow for it",
+                f"the steering angle reads {with_doubt(1.0 / factor, sd / factor**2)} times the "
+                "right value (± with the tires estimated): check the steering ratio, or multiply "
+                f"delta_f by {factor:.3g}; the curves allow for it",
             )
         )
     k = INDEX["steering_play"]

@@ -76,7 +76,7 @@ def physics_contradiction(recording: Recording) -> str | None:
     largest = float(np.percentile(np.abs(w.v_x_r), 95))
     if largest > _LARGEST_V_X_R:
         return (
-            f"r must be in rad/s, |v_x r| below {_LARGEST_V_X_R:g} m/s^2, it is "
+            f"r must be in rad/s, |v_x r| below {_LARGEST_V_X_R:g} m/s², it is "
             f"{largest:.4g}; degrees per second? multiply r by pi/180"
         )
     turn = steering(w)
@@ -275,7 +275,7 @@ _BLAMED = {
     1 / 3.6: "vx must be in m/s: ay {}; km/h? divide vx by 3.6",
     1 / 2.237: "vx must be in m/s: ay {}; mph? divide vx by 2.237",
     3.6: "vx must be in m/s: ay {}; m/s that were read as km/h? multiply vx by 3.6",
-    9.81: "ay {}; m/s^2 that were read as g? divide ay by 9.81",
+    9.81: "ay {}; m/s² that were read as g? divide ay by 9.81",
     57.3: "r must be in rad/s: ay {}; rad/s that were read as deg/s? multiply r by 180/pi",
 }
 

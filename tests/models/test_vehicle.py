@@ -149,7 +149,7 @@ def test_what_a_file_leaves_out_is_estimated_and_said(tmp_path):
     assert car.cornering_stiffness_front == 1.2e5
     assert car.yaw_inertia == 1500.0 * (1.1 * 1.6)
     assert car.cornering_stiffness_rear == pytest.approx(14.0 * 1500.0 * GRAVITY * 1.1 / 2.7)
-    assert "yaw_inertia = 2640 kg m2" in car.estimates
+    assert "yaw_inertia = 2640 kg m²" in car.estimates
     assert "rear = 8.393e+04 N/rad (14 static axle loads per rad)" in car.estimates
     assert "stiffness_front" not in car.estimates
     assert car_of(tmp_path, SIX).estimates == ""

@@ -25,7 +25,7 @@ def test_what_it_writes_is_read_with_stated_estimates(tmp_path, capsys):
     assert car.chassis is None
     assert typed("check", "--vehicle", path) == 0
     said = capsys.readouterr()
-    told = "estimated, as the vehicle file leaves it out: yaw_inertia = 2674 kg m2"
+    told = "estimated, as the vehicle file leaves it out: yaw_inertia = 2674 kg m²"
     assert (said.out + said.err).count(told) == 1
 
 

@@ -12,6 +12,7 @@ from models.friction import Friction, FrictionChange
 from models.recordings import read_recording, write_recording
 from tests.identifier.conftest import steered
 from tests.tireid.conftest import json_of, page_in, refusal, rewritten, table_of, typed
+from tests.tireid.test_zoom import unpacked
 
 
 @pytest.fixture(scope="module")
@@ -66,9 +67,9 @@ def test_it_leaves_a_report_with_figures(model, logs, blind, tmp_path, capsys):
         out = tmp_path / name
         summary, _ = predicted(out, model, asked)
         page = page_in(out)
-        for figure in ("slip", "forces"):
+        for figure in ("slip", "forces", "inputs"):
             assert (out / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
-        assert page.count("<img") == 2
+        assert page.count("<img") == len(unpacked(page)[0]) == 3, "all have a Zoom"
         front, rear = (f"{100.0 * x:.1f}" for x in summary["verdict"]["measures"]["force_missed"])
         assert f"<dd>{front} / {rear} %</dd>" in page
         assert f"model error over the force in the motion: {front} / {rear} %" in (
@@ -114,8 +115,9 @@ def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys, undrawn):
     tire = ti.identify(log, ti.sedan()).freeze(t=1.6)  # the slalom has just begun
     tire.save(tmp_path / "young.json")
     words = tmp_path / "young.json", logs / "quick.csv", "--accept"
-    summary, columns = predicted(tmp_path / "out", *words)
-    beyond = np.mean(np.abs(columns["alpha_f_rad"]) > tire.known_slip[0])
+    summary, _ = predicted(tmp_path / "out", *words)
+    slip = tire.lagged_slip(read_recording(logs / "quick.csv"))[:, 0]
+    beyond = np.mean(np.abs(slip) > tire.known_slip[0])
     assert summary["beyond_known_slip"][0] == pytest.approx(beyond, abs=1e-3)
     assert beyond > 0.2
     assert f"which {100.0 * beyond:.0f} /" in capsys.readouterr().out

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.tireid.test_report import page_of
-from tireid.figures.style import axle_panels, figure_png, styled
+from tireid.figures.style import axle_panels, figure_png, save_figures, styled
 from tireid.report import Picture, Section
 from tireid.zoom import LARGEST, Drawn, Series, plots_html, zoom_of
 
@@ -49,7 +49,7 @@ def unpacked(page):
 
 def test_plots_of_many_long_signals_are_small_and_as_the_figure_has_them():
     figure = figure_of(4, np.random.default_rng(1))
-    page = plots_html({"figure-1": zoom_of(figure)})
+    page = plots_html({"figure-1": zoom_of(figure)}, {})
     assert 0.8 * LARGEST < len(page.encode()) <= LARGEST
     figures, arrays = unpacked(page)
     panels = figures["figure-1"]
@@ -68,6 +68,14 @@ def test_plots_of_many_long_signals_are_small_and_as_the_figure_has_them():
         assert np.flatnonzero(np.isnan(y)).tolist() == gap
         assert np.delete(y, gap) == pytest.approx(np.delete(x, gap) + offset, abs=1e-4)
     assert len(arrays[cloud["x"]]) < 320 and panels[-1]["spans"][0][:2] == [7.0, 9.0]
+
+
+def test_replays_have_a_zoom_while_that_leaves_the_others_fine(tmp_path, undrawn):
+    names, rng = ["error", *(f"replay_{k}" for k in range(4)), "forces"], np.random.default_rng(4)
+    images = save_figures(tmp_path, {name: figure_of(1, rng) for name in names})
+    figures, arrays = unpacked(page_of("t", [Section("h", [Picture(images[n], n) for n in names])]))
+    assert list(figures)[:2] == ["figure-6", "figure-2"] and len(figures) < 5
+    assert all(len(arrays[figures["figure-6"][0]["series"][k]["y"]]) >= 280 for k in range(3))
 
 
 def test_a_thinned_line_has_every_peak_and_the_gaps_between_segments():

@@ -21,6 +21,7 @@ from tireid.commands.demo_story import SPEED, STORY, Story, run_story
 from tireid.commands.paper import (
     MEANING,
     MEASURES_MEAN,
+    compared,
     settings,
     study_table,
     table_text,
@@ -55,7 +56,7 @@ from tireid.report import (
     printed,
     write_report,
 )
-from tireid.reports.captions import slip_caption
+from tireid.reports.captions import comparison_caption, slip_caption
 from tireid.reports.identify import curve_drawing, identify_notes, learnt_blocks, replay_picture
 from tireid.verdicts import model_error_headline, verdict_headline, verdict_notes, verdict_section
 
@@ -113,7 +114,7 @@ def drive_section(driven: _Cases, folder: Path) -> Section:
         ),
         film_picture(folder / _SLIPPERY / f"drive.{_FILM}", slippery.drives.runs),
         *_scores(slippery),
-        *known_blocks(slippery.drives.runs, slippery.figures),
+        *known_blocks(slippery.drives, slippery.figures),
         (
             "The lane change of ISO 3888-2 at 0.79 g, nine tenths of what the tires can give; its "
             f"film is {LANE_CHANGE}/drive.{_FILM}."
@@ -274,13 +275,7 @@ def _predict(story: Story, figures: Images) -> Section:
 
 
 def _paper_study(story: Story, study: Study, figures: Images) -> Section:
-    seeds = len(study.errors["slalom"]["integral"])
     certified = certificate_table.verdict_line(story.certificate)
-    captions = {
-        "slalom": f"Table II of the paper beside ours, RMSE of the axle force [kN]: median and "
-        f"quartiles of {seeds} seeds.",
-        "step_steer": "Table I of the paper beside ours, RMSE of the axle force [kN].",
-    }
     blocks: list[Block] = [
         (
             "The paper's network, its gains from the phase margin of their loop, beside the "
@@ -298,11 +293,11 @@ def _paper_study(story: Story, study: Study, figures: Images) -> Section:
             f"{printed(MEASURES_MEAN)}"
         ),
     ]
-    for maneuver, caption in captions.items():
-        blocks.append(study_table(maneuver, study, caption))
+    for maneuver in study.errors:
+        blocks.append(study_table(maneuver, study))
         if f"{maneuver}_errors" in figures:  # a law that diverged on every seed has none
-            what = "The table as a picture; hollow marks are the paper's values."
-            blocks.append(Picture(figures[f"{maneuver}_errors"], what))
+            caption = printed(comparison_caption(*compared(study, maneuver)))
+            blocks.append(Picture(figures[f"{maneuver}_errors"], caption))
     said = (MEANING, settings(GAINS, NETWORK).splitlines()[0])
     blocks += [printed(one) for one in said]
     return Section("The paper's study", blocks, folded=True)

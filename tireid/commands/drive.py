@@ -265,7 +265,7 @@ def conditions_of(
 ) -> driving.Conditions:
     """Return what is to be driven; the car is by default that of stored tires.   stored : tires."""
     of_sedan = stored is None or stored.vehicle.moves_as(sedan())
-    vehicle = shared.read_vehicle(options, None if of_sedan else stored, options.weights)
+    vehicle = shared.read_vehicle(options, None if of_sedan else stored)
     wish = _parse_speed(options.speed, size_of(vehicle))
     if stored is not None:
         stored.require_car(vehicle, options.weights, "leave --vehicle out")

@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> None:
     if options.caution and not options.mpc:
         raise ValueError("--caution goes with --mpc: it is of the tracker")
     start = shared.model_of_day(options)
-    vehicle = shared.read_vehicle(options, start, options.weights)
+    vehicle = shared.read_vehicle(options, start)
     v_y = options.method != WITHOUT_V_Y
     if start is None or (v_y and shared.method_is_given(options)):
         _, method = shared.chosen_method(options, vehicle, online=True)

@@ -104,7 +104,7 @@ def run(options: argparse.Namespace) -> int:
             "says what to drive"
         )
     tire = load_model(source)
-    vehicle = shared.read_vehicle(options, tire, source)
+    vehicle = shared.read_vehicle(options, tire)
     tire.require_car(vehicle, source, "leave --vehicle out")
     path = path_of(options, vehicle)
     try:

@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> None:
     if record is not None and (record.suffix.lower() != ".mcap" or record.exists()):
         raise ValueError(f"--record {record}: name a new file, one that ends in .mcap")
     tire = stored_model(options.weights)
-    vehicle, log_map = read_vehicle(options, tire, options.weights), given_map(options)
+    vehicle, log_map = read_vehicle(options, tire), given_map(options)
     with ExitStack() as signals, ExitStack() as stack:  # a second one cuts no end short
         store = Store(options.store, scale_of_steering(log_map)) if options.store else None
         if store is not None:

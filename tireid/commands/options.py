@@ -59,14 +59,10 @@ def add_vehicle(
     parser.add_argument("--vehicle", required=required, type=Path, metavar="FILE", help=text)
 
 
-def read_vehicle(
-    options: Namespace, model: TireModel | None = None, source: Path | None = None
-) -> Vehicle:
+def read_vehicle(options: Namespace, model: TireModel | None = None) -> Vehicle:
     """Return the car of --vehicle, without it that of a model or the sedan, as --log repairs it.
 
-    What of it is estimated or repaired is said.
-
-    source : the file of the model.
+    What of it is estimated, unless the tires of the model were identified so, or repaired is said.
     """
     path: Path | None = options.vehicle
     if path is not None and path.suffix.lower() != ".toml":
@@ -76,8 +72,8 @@ def read_vehicle(
         )
     known = sedan() if model is None else model.vehicle
     vehicle = known if path is None else Vehicle.from_toml(path)
-    if vehicle.estimates:
-        say(f"{f'car of {source}' if path is None else path}: {vehicle.estimates}")
+    if vehicle.estimates not in ("", known.estimates):
+        say(f"{path}: {vehicle.estimates}")
     mended = _map_path(options)
     numbers: dict[str, Any] = dict(map_of(mended).repair.vehicle)
     if not numbers:

@@ -35,7 +35,7 @@ from models.vehicle import sedan
 from tireid.commands.certificate_table import verdict_line
 from tireid.commands.options import add_output, folder_of
 from tireid.figures.forces import force_figure
-from tireid.figures.paper import SCHEME, comparison_figure
+from tireid.figures.paper import SCHEME, Quartiles, comparison_figure
 from tireid.figures.style import save_figures
 from tireid.output import text_table, write_json
 from tireid.progress import Progress, say, tell
@@ -140,15 +140,19 @@ def _header() -> list[str]:
     return names
 
 
-def study_table(maneuver: str, study: Study, caption: str) -> Table:
-    return Table(caption, [printed(word) for word in _header()], _rows(maneuver, study))
+def _title(maneuver: str, study: Study) -> str:
+    seeds = len(study.errors[maneuver]["integral"])
+    return f"{_TITLES[maneuver]}, median (quartiles) of {seeds} seeds"
+
+
+def study_table(maneuver: str, study: Study) -> Table:
+    header = [printed(word) for word in _header()]
+    return Table(f"{_title(maneuver, study)}.", header, _rows(maneuver, study))
 
 
 def table_text(maneuver: str, study: Study) -> str:
     lines = [_header(), *_rows(maneuver, study)]
-    seeds = len(study.errors[maneuver]["integral"])
-    title = f"{_TITLES[maneuver]}, median (quartiles) of {seeds} seeds"
-    return "\n".join([title, text_table(lines, indent="  "), ""])
+    return "\n".join([_title(maneuver, study), text_table(lines, indent="  "), ""])
 
 
 def settings(gains: Gains, network: Network) -> str:
@@ -192,15 +196,16 @@ def write_study(folder: Path, study: Study) -> dict[str, bytes]:
     return save_figures(folder, figures)
 
 
-def _draw(study: Study, maneuver: str) -> dict[str, Figure]:
-    """Draw what did not diverge."""
-    figures = {}
+def compared(
+    study: Study, maneuver: str
+) -> tuple[dict[str, dict[str, Quartiles]], dict[str, dict[str, float]]]:
+    """Return what `comparison_figure` draws of a maneuver: ours, and the paper's values."""
     labels = {ONLINE: "online,\nto truth"}  # both measures side by side
     for t in FREEZES[maneuver]:
         frozen = f"frozen at {freeze_key(t)} s,"
         labels[frozen_column(PAST_ONLINE, t)] = f"{frozen}\npast to online"
         labels[frozen_column(ALL, t)] = f"{frozen}\nall to truth"
-    results = {
+    ours = {
         law: {labels[n]: (q["median"], q["q25"], q["q75"]) for n, q in row.items() if n in labels}
         for law, row in study.tables()[maneuver].items()
     }
@@ -208,8 +213,14 @@ def _draw(study: Study, maneuver: str) -> dict[str, Figure]:
         law: {labels[name]: value for name, value in row.items()}
         for law, row in printed_values(maneuver).items()
     }
-    if any(results.values()):
-        figures[f"{maneuver}_errors"] = comparison_figure(results, printed)
+    return ours, printed
+
+
+def _draw(study: Study, maneuver: str) -> dict[str, Figure]:
+    """Draw what did not diverge."""
+    figures, (ours, printed) = dict[str, Figure](), compared(study, maneuver)
+    if any(ours.values()):
+        figures[f"{maneuver}_errors"] = comparison_figure(ours, printed)
     onset = ONSETS[maneuver]
     window = (onset - 1.0, float(study.recordings[maneuver].t[-1]))
     for law in LAWS:

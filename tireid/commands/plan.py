@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--steering-ratio must be 1 to 100, it is {ratio:g}")
     area = options.area
     model = shared.stored_model(options.weights)
-    vehicle = shared.read_vehicle(options, model, options.weights)
+    vehicle = shared.read_vehicle(options, model)
     numbers = {
         "speeds": options.speed, "time": options.time, "friction": options.mu,
         "share": 0.01 * options.grip, "seed": seed,

@@ -19,7 +19,7 @@ from models.files import digest
 from models.recordings import LogMap
 from tireid import __version__, output
 from tireid.commands import options as shared
-from tireid.figures.forces import friction_figure, prediction_figure
+from tireid.figures.forces import friction_figure, inputs_figure, prediction_figure
 from tireid.figures.style import save_figures
 from tireid.figures.tires import slip_figure
 from tireid.identified import error_cells
@@ -105,6 +105,7 @@ def run(options: argparse.Namespace) -> int:
         figures = {
             "slip": slip_figure(model, recording, verdict.forces),
             "forces": prediction_figure(prediction, verdict.forces),
+            "inputs": inputs_figure(recording),
         }
         if friction is not None:
             figures["friction"] = friction_figure(friction)
@@ -126,7 +127,7 @@ def _model(options: argparse.Namespace) -> TireModel:
     """Return the model, on the car that drove."""
     model = shared.stored_model(options.model)
     assert model is not None
-    vehicle = shared.read_vehicle(options, model, options.model)
+    vehicle = shared.read_vehicle(options, model)
     if vehicle.moves_as(model.vehicle):
         return model
     if not model.scales_with_load:
@@ -267,7 +268,7 @@ def write_predict_report(
             verdict_section(verdict, model),
             Section("What it predicts", found),
             *sensors_section(model, [recording]),
-            Section("What went in", went_in(model, log_map)),
+            Section("What went in", went_in(model, log_map, recording, figures)),
             origin(
                 command,
                 model.vehicle,

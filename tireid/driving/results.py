@@ -58,6 +58,7 @@ from tireid.report import (
     printed,
     write_report,
 )
+from tireid.reports.captions import curves_caption
 
 NO_FILM = "none"
 _AT_LIMIT = 0.99  # of a limit: the steering rate is at it
@@ -299,7 +300,7 @@ def write_drive_report(
         notes=_drive_notes(drives),
         sections=[
             Section("How the car drove", _drive_blocks(folder, drives, figures, film)),
-            Section("The tracker's tires", known_blocks(runs, figures)),
+            Section("The tracker's tires", known_blocks(drives, figures)),
             Section("Timing", drawings(figures, {"solve_times": _timing_caption(first)})),
             origin(
                 command,
@@ -418,9 +419,10 @@ def film_picture(path: Path, runs: _Runs) -> Picture:
     return Picture(path, caption, READ["film"])
 
 
-def known_blocks(runs: _Runs, figures: Images) -> list[Block]:
+def known_blocks(drives: Drives, figures: Images) -> list[Block]:
     """Return what trackers believed of the tires, and what they were given on the way."""
-    given, lateral = estimate_scores(runs[0].drive), ""
+    runs, first, setup = drives.runs, drives.runs[0].drive, drives.conditions.setup
+    given, lateral = estimate_scores(first), ""
     if given is not None:
         lateral = (
             f": rms error of the estimate {given.rms_error_m_s:.3f} m/s, "
@@ -428,8 +430,7 @@ def known_blocks(runs: _Runs, figures: Images) -> list[Block]:
             f"{100.0 * given.within_two_sd:.0f} % of the errors within two standard deviations"
         )
     captions = {
-        "tires": "Forces of the first drive, and the tire models of the trackers. An identified "
-        "curve ends at the slip up to which it was identified.",
+        "tires": curves_caption(first, _known_curves(runs, setup, drives.learnt), setup.drops),
         "lateral": f"Lateral velocity, which no sensor measured{lateral}.",
     }
     blocks: list[Block] = [*drawings(figures, captions)]

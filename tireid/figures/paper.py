@@ -133,7 +133,7 @@ def _lines(axes: Axes, t: Array, values: Array, color: str, label: str) -> None:
     axes.plot(t, drawn, color=color, linewidth=0.7)[0].set_label(label)
 
 
-_Quartiles = tuple[float, float, float]  # median, lower and upper quartile
+Quartiles = tuple[float, float, float]  # median, lower and upper quartile
 _MARKS = {  # color, marker
     "instantaneous": (ORANGE, "s"),
     "integral": (BLUE, "o"),
@@ -143,7 +143,7 @@ _MARKS = {  # color, marker
 
 @styled
 def comparison_figure(
-    results: Mapping[str, Mapping[str, _Quartiles]],
+    results: Mapping[str, Mapping[str, Quartiles]],
     paper: Mapping[str, Mapping[str, float]],
 ) -> Figure:
     """Draw medians of the force RMSE with whiskers from quartile to quartile, the paper's hollow.

@@ -28,7 +28,7 @@ from identifier.measured import printed_unit
 from identifier.paper.design import PaperIdentifier
 from identifier.reproducibility import AxleRmse
 from identifier.run import History
-from tireid.zoom import ZOOMED, Drawn, zoom_of
+from tireid.zoom import REPLAY, ZOOMED, Drawn, zoom_of
 
 PAGE = 7.16  # width of both columns of a paper [in]
 RESOLUTION = 200  # [dots per inch]
@@ -203,7 +203,8 @@ def save_figures(folder: Path, figures: Mapping[str, Figure]) -> dict[str, bytes
     images = dict[str, bytes]()
     for name, one in figures.items():
         images[name] = drawn = Drawn(figure_png(one))
-        drawn.zoom = zoom_of(one) if name in ZOOMED else ()
+        drawn.spare = name.startswith(REPLAY)
+        drawn.zoom = zoom_of(one) if drawn.spare or name in ZOOMED else ()
         write_file(folder / f"{name}.png", drawn)
     return images
 

@@ -13,6 +13,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import islice
 from operator import mul
 from pathlib import Path
 from types import EllipsisType, NoneType
@@ -197,17 +198,21 @@ class _Channel:
         """Return the value at an instant [s], as `models.logs.clock` has it; NaN in a gap."""
         while len(self.last) > RECENT and self.last[RECENT][0] <= t - DT:
             self.last.popleft()
-        there = [one for one in self.last if one[0] <= t + _NEAR]
-        if not there or t - there[-1][0] > max(self._longest, GAP_INTERVALS * self.interval):
+        last, end = self.last, len(self.last)
+        while end and last[end - 1][0] > t + _NEAR:
+            end -= 1
+        if not end or t - last[end - 1][0] > max(self._longest, GAP_INTERVALS * self.interval):
             return math.nan
-        here, now = there[-1]
+        here, now = last[end - 1]
         if self.interval < DT / FASTER:
-            recent = [value for time, value in there if time > t - DT + _NEAR] or [now]
-            return sum(recent) / len(recent)
-        before, old = there[-2] if len(there) > 1 else (here, now)
+            begin = end - 1
+            while begin and last[begin - 1][0] > t - DT + _NEAR:
+                begin -= 1
+            return sum(last[k][1] for k in range(begin, end)) / (end - begin)
+        before, old = last[end - 2] if end > 1 else (here, now)
         step, ahead = here - before, t - here
         if ahead > _NEAR and 0.0 < step <= GAP_INTERVALS * self.interval:
-            recent = [value for _, value in there[-RECENT:]]
+            recent = [value for _, value in islice(last, max(end - RECENT, 0), end)]
             low, high = min(recent), max(recent)
             room = BEYOND * (high - low)
             change = min(max(now - old, low - room - now), high + room - now)

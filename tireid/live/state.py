@@ -9,7 +9,7 @@ import numpy as np
 from codegen.arrays import Array
 
 LIVE, STORED = "live", "stored"  # whose numbers a state gives
-SLIP = np.linspace(0.0, 0.2, 41)  # [rad], of the curves
+SLIPS, REACH = 41, 0.2  # of the curves: points, and how far they reach at least [rad]
 
 
 class Point(NamedTuple):

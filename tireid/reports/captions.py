@@ -1,16 +1,22 @@
 """What a figure shows, in a sentence computed from the data that it draws."""
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from codegen.arrays import Array
 from identifier.doctor.readings import Motion, Reading, forces_and_slips
+from identifier.paper.design import VARIANTS
 from identifier.run import History
 from identifier.tire_model import TireModel
 from identifier.verdict import RoadFriction, Verdict, WindowForces
 from identifier.verdict.verdict import PERCENT
 from models.recordings import Recording
 from models.vehicle import Vehicle
-from tireid.figures.tires import forces_over_slip
+from mpc.loop.record import Drive
+from tireid.figures.drive import AT_THE_END
+from tireid.figures.paper import Quartiles
+from tireid.figures.tires import TireCurve, axle_slip, forces_over_slip
 
 _CURVE = 200  # points at which a band is compared with the points of a drive
 _SETTLED = 0.1  # of its last value: an estimate within it has converged
@@ -94,6 +100,7 @@ def inputs_caption(recording: Recording) -> str:
         {
             "steering": (np.degrees(recording.delta_f), "°"),
             "yaw rate": (np.degrees(recording.r), "°/s"),
+            "v_y": (recording.v_y, " m/s"),
             "a_y": (recording.a_y, " m/s²"),
         },
     )
@@ -134,3 +141,51 @@ def diagnosis_caption(
     if not found:
         return "Force over slip angle: too little is driven."
     return f"Force over slip angle: correlation {', '.join(found)} (front / rear)."
+
+
+def curves_caption(
+    drive: Drive, curves: Sequence[TireCurve], drops: Sequence[tuple[float, float]]
+) -> str:
+    """Return the forces of a drive over those of curves at its slip, where these are drawn.
+
+    drops : arc length [m] from which friction is another, and which: curves of the end count from
+        the last on, the others up to the first.
+    """
+    slip, force, said = axle_slip(drive), drive.axle_force, dict[str, list[str]]()
+    first, last = (drops[0][0], drops[-1][0]) if drops else (np.inf, -np.inf)
+    for curve in curves:
+        driven, where = drive.s < first, f" up to {first:g} m"
+        if curve.label.endswith(AT_THE_END):
+            driven, where = drive.s >= last, f" from {last:g} m on"
+        drawn = zip(slip.T, curve.force.T, strict=True)
+        at = np.stack([np.interp(x, curve.alpha, y, np.nan, np.nan) for x, y in drawn], axis=1)
+        at = np.nan_to_num(at) * driven[:, None]
+        power = np.sum(at**2, axis=0)
+        if power.all():
+            share = percents(np.sum(at * force, axis=0) / power)
+            said.setdefault(where * bool(drops), []).append(f"{curve.label} {share}")
+    found = "; ".join(f"{', '.join(one)}{where}" for where, one in said.items())
+    return (
+        "True force of the first drive over that of the curves at its slip (front / rear): "
+        f"{found or 'no slip'}."
+    )
+
+
+def comparison_caption(
+    results: Mapping[str, Mapping[str, Quartiles]],
+    paper: Mapping[str, Mapping[str, float]],
+) -> str:
+    """Return in how many columns laws err less than the first, here and as the paper prints."""
+    (first, *others), found = results, []
+    medians = {law: {name: q[0] for name, q in row.items()} for law, row in results.items()}
+    for law in others:
+        said = []
+        for table, whose in ((medians, "{} of {} columns"), (paper, "{} of the paper's {}")):
+            row, least = table.get(law, {}), table.get(first, {})
+            less = [row[name] < least[name] for name in row if name in least]
+            said += [whose.format(sum(less), len(less))] * bool(less)
+        found += [f"{VARIANTS[law].title} in {', '.join(said)}"] * bool(said)
+    return (
+        f"Median error below that of {VARIANTS[first].title}: "
+        f"{'; '.join(found) or 'nothing to compare'}. Hollow marks are the paper's values."
+    )

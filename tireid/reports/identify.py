@@ -97,13 +97,7 @@ def write_identify_report(
                 "How well it predicts",
                 [*_evaluated(evaluated), *_errors(found, figures)],
             ),
-            Section(
-                "What went in",
-                [
-                    *went_in(model, log_map),
-                    *drawings(figures, {"inputs": inputs_caption(learnt.recording)}),
-                ],
-            ),
+            Section("What went in", went_in(model, log_map, learnt.recording, figures)),
             diagnosis_section(diagnosis),
             origin(
                 command,
@@ -174,8 +168,10 @@ def estimates_notes(vehicle: Vehicle) -> list[Note]:
     return [Note(text)] * ("yaw_inertia" in vehicle.estimated)
 
 
-def went_in(model: TireModel, log_map: LogMap) -> list[Block]:
-    """Return tables of the numbers of the car and of the channels that were declared."""
+def went_in(
+    model: TireModel, log_map: LogMap, recording: Recording, figures: Images
+) -> list[Block]:
+    """Return the numbers of the car, the channels that were declared, and the signals."""
     car, rows = model.vehicle, list[list[Cell]]()
     for name, unit in _CAR.items():
         unused = name.startswith("cornering") and model.kind == "fit"
@@ -190,7 +186,8 @@ def went_in(model: TireModel, log_map: LogMap) -> list[Block]:
     listed = "Declared channels. Signals without a row have standard names or notes below."
     header = ["signal", "channel", "read as"]
     tables = [Table(f"The car, {car.name}.", ["number", "value", "origin"], rows)]
-    return [*tables, *[Table(listed, header, channels)] * bool(channels)]
+    tables += [Table(listed, header, channels)] * bool(channels)
+    return [*tables, *drawings(figures, {"inputs": inputs_caption(recording)})]
 
 
 def extrapolated(model: TireModel, recording: Recording) -> list[Note]:

@@ -199,7 +199,7 @@ def test_a_channel_without_a_sensor_is_told_and_not_asked_further(noisy):
     found = only(replace(noisy, a_y=np.full(T.size, 0.25)), "frozen a_y")
     assert found.confidence == CERTAIN
     assert (
-        found.size == pytest.approx(noisy.duration) and "a_y is 0.25 m/s^2 throughout" in found.text
+        found.size == pytest.approx(noisy.duration) and "a_y is 0.25 m/s² throughout" in found.text
     )
 
 

@@ -14,6 +14,7 @@ from identifier.measured import with_doubt
 from identifier.methods import make_method
 from identifier.motion.parameters import INDEX, NAMES
 from identifier.prediction import predict
+from identifier.reproducibility import beyond_known
 from identifier.run import identify
 from models.maneuvers import SampledSteer
 from models.plant import Plant
@@ -47,6 +48,7 @@ def test_zeros_of_another_day_are_found_and_do_not_reach_the_forces(tire):
     assert day["steering_zero"] == pytest.approx(ZERO, rel=0.2)
     assert day["v_y_bias"] + day.speed * day["v_y_angle"] == pytest.approx(BIAS, rel=0.1)
     assert missed(tire, other).max() < missed(tire, clean).max() + 0.02
+    assert beyond_known(tire, other) == pytest.approx(beyond_known(tire, clean), abs=0.01)
     held = tire.of_day(tire.on(clean))
     assert missed(held, other).max() > 0.2  # as the sensors of a day without them read it
 
@@ -198,7 +200,7 @@ TITLES = (
     "bias of v_y",
     "mounting angle of the v_y sensor",
     "place of the v_y sensor ahead of the center of gravity",
-    "steering angle, relative error",
+    "correction of the steering angle",
 )
 
 

@@ -282,7 +282,7 @@ def test_a_fit_notes_what_its_drives_had_beside_tires(gain, sd, outcome):
     assert "from 3 to 8 s the friction was 0.50 ± 0.04 times" in listed["another_road"]
     assert "50 ms late" in listed["a_y_late"]
     if outcome:
-        assert "turn 1.10 ± 0.02 times as far" in listed["steering_gain"]
+        assert "reads 0.909 ± 0.017 times the right value" in listed["steering_gain"]
     assert "not_observable" in dict(report.notes(reach._replace(parted=0.01), p, covariance))
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tireid as ti
+from identifier.axle.slip import beyond_play
 from models.friction import Friction, FrictionChange
 from models.maneuvers import Slalom
 from models.plant import Plant
@@ -97,6 +98,14 @@ def test_another_rate_is_what_reading_such_a_log_makes_of_it(car, log, rate):
     np.testing.assert_allclose(found.stiffness, offline.stiffness, rtol=0.01)
     if rate < 100.0:  # straight lines between samples, to the last instant that is known
         assert same_bits(found, offline) or live.counts.samples < len(read)
+
+
+def test_curves_reach_beyond_the_known_slip_and_grip_is_their_largest_force(car, log, stored):
+    state = fed(Live(car, stored.at_friction(4.0)), log)[2]
+    assert state.origin == "stored" and (state.known_slip > 0.2).any()
+    assert state.slip[-1] > max(state.known_slip)
+    loads = np.array(car.axle_loads)
+    np.testing.assert_allclose(state.grip, state.force.max(axis=1) / loads)
 
 
 def test_a_state_says_what_is_known_and_how_well(car, log, stored):
@@ -281,6 +290,14 @@ def test_a_v_y_that_never_changes_is_never_valid(car, log):
     """As odometry of wheels sends it."""
     states = fed(Live(car), replace(log, v_y=np.zeros(len(log))))
     assert not any(state.valid for state in states) and "v_y never changes" in states[-1].reason
+
+
+def test_play_of_the_steering_is_no_tire_and_stored_tires_are_given(car, log, stored):
+    at, slip = np.linspace(-1.0, 1.0, 20001), log.alpha(car.l_f, car.l_r)[:, 0]
+    loose = log.delta_f + np.interp(slip, beyond_play(at, 0.01), at) - slip
+    states = fed(Live(car, stored), replace(log, delta_f=loose), part=slice(0, 2000))
+    assert not any(state.valid for state in states) and states[-1].origin == "stored"
+    assert "front curve is flat about zero slip" in states[-1].reason
 
 
 def test_tires_that_miss_a_share_of_the_force_are_not_valid(car):

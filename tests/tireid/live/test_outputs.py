@@ -23,9 +23,10 @@ from models.logs.signals import Signal
 from models.recordings import LogMap
 from models.vehicle import sedan
 from tireid.live.outputs import TOPIC, Outputs, Store, scale_of_steering
-from tireid.live.state import SLIP, Counts, Point, State
+from tireid.live.state import REACH, SLIPS, Counts, Point, State
 from tireid.output import OutputError
 
+SLIP = np.linspace(0.0, REACH, SLIPS)
 FREE = ("127.0.0.1", 0)
 
 
