@@ -227,7 +227,7 @@ def test_areas_of_downforce_come_into_the_car_and_may_be_of_lift(drive):
     kept = Repair.of_table(Table(repair.tables(), "", RecordingError, "repair."))
     _, car = kept.apply(drive, CAR)
     assert car == replace(CAR, **areas)
-    with pytest.raises(VehicleError, match=r"downforce_area_rear in m.2 must lie between"):
+    with pytest.raises(VehicleError, match=r"downforce_area_rear in m² must lie between"):
         Repair(vehicle={"downforce_area_rear": -50.0}).apply(drive, CAR)
 
 
