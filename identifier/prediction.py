@@ -89,7 +89,8 @@ class Prediction:
             if share is not None
         ]
         said = f"explained are {' and '.join(shares)} acceleration" if shares else ""
-        return said + "; the yaw acceleration is too small to check the model" * small
+        why = "the yaw moment is a small difference of the axle forces of this car"
+        return said + f"; {why}: the yaw acceleration cannot check the model" * small
 
 
 def predict(model: TireModel, recording: Recording, *, since: float | None = None) -> Prediction:

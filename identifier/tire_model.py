@@ -438,7 +438,8 @@ class TireModel(ABC):
 
     def _remarks(self) -> list[str]:
         band = [] if self.band is None else [f"band: {self.band.origin}"]
-        return [*band, self.vehicle.estimates] if self.vehicle.estimates else band
+        notes = [text for _, text in self.drives.notes]
+        return [*notes, *band, *filter(None, [self.vehicle.estimates])]
 
     def drawn_slip(self) -> tuple[Array, NDArray[np.bool_]]:
         """Return slip angles for a drawing [rad] (k,), and whether each axle knows them (k, 2)."""

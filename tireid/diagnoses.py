@@ -7,6 +7,7 @@ from pathlib import Path
 
 from identifier.doctor import Diagnosis, Finding
 from identifier.doctor.diagnosis import WITHOUT_V_Y
+from identifier.doctor.finding import HARDLY
 from identifier.doctor.samples import NOT_MEASURED
 from identifier.measured import with_doubt
 from identifier.verdict import Verdict
@@ -106,7 +107,8 @@ def diagnosis_text(diagnosis: Diagnosis, *, unobservable: bool = True) -> str:
 
 def unsure_text(diagnosis: Diagnosis, path: Path) -> str:
     """Return why nothing was repaired, and how to do it by hand in a log.toml."""
-    repairs = [repair_text(one.repair) for one in diagnosis.findings if one.repair]
+    likely = (one for one in diagnosis.findings if one.confidence >= HARDLY)
+    repairs = [repair_text(one.repair) for one in likely if one.repair]
     said = f"no sure repair: with {path} the log stays as it is"
     if not repairs:
         return said

@@ -62,11 +62,13 @@ class _Rules:
     ahead: float = 6.0  # what it has over its rival,
     clear: float = 3.5  # deviations of its size,
     better: float = 0.03  # and share by which its model misses less of a part left out
+    far: float = 2.0  # deviations `wide` that no declared yaw inertia is off: the log is
     unexplained: float = 0.25  # share of the force missed, from which nothing was understood
     untold: float = 0.6  # of `wide`, what is left by a drive that does not tell a size
 
 
 RULES = _Rules()
+ANOTHER_R = "; try another channel of r, if the log has one"  # it may come on time
 SLOW = "sizes of faults: the car hardly drives, or not fast enough"
 _OF_ONE_LOG = (
     "sizes of faults but in the longest segment: no tire explains all with the same sensors"
@@ -436,7 +438,11 @@ class Search:
         if alike:
             others = ", ".join(x.suspect.name for x in alike)
             text += f"; this drive cannot separate it from: {others}"
-        repair = suspect.repair(size, vehicle)
+        far = abs(one.value) > RULES.far * suspect.wide and suspect.code not in vehicle.estimated
+        of_inertia = suspect.code == "yaw_inertia"
+        repair = None if of_inertia and far else suspect.repair(size, vehicle)
+        late_r = suspect.code in ("delay", "lag") and suspect.channel == "r"
+        text += ANOTHER_R * (not sure and (late_r or of_inertia))
         real = math.erf(abs(one.value) / (math.sqrt(2.0) * deviation))
         return Finding(
             code=suspect.code,
@@ -551,7 +557,8 @@ def _of_one_device(listed: list[Finding], vehicle: Vehicle) -> list[Finding]:
             continue
         both = replace(
             one, channel=TURNING.channel, size=size, repair=TURNING.repair(size, vehicle),
-            text=TURNING.words(size, one.deviation, vehicle), sure=one.sure and other.sure,
+            text=TURNING.words(size, one.deviation, vehicle) + ANOTHER_R * (not one.sure),
+            sure=one.sure and other.sure,
             confidence=min(one.confidence, other.confidence), group=max(one.group, other.group),
         )  # fmt: skip
         return [both if x is one else x for x in listed if x is not other]

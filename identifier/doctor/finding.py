@@ -7,7 +7,7 @@ from typing import Any
 
 from models.recordings.repair import Repair
 
-_MOST_CONFIDENCE = 0.99  # confidence that is given
+HARDLY, _MOST_CONFIDENCE = 0.01, 0.99  # confidence that is given
 _MATTERS = 0.5  # confidence that something is wrong, from which it is given as such
 
 
@@ -64,7 +64,9 @@ class Finding:
 
     @property
     def percent(self) -> str:
-        """The confidence as text; 99 % at most, as a log alone proves nothing."""
+        """The confidence as text; 1 to 99 %, as a log alone proves nothing."""
+        if self.confidence < HARDLY:
+            return f"<{100.0 * HARDLY:.0f} %"
         return f"{100.0 * min(self.confidence, _MOST_CONFIDENCE):.0f} %"
 
     def to_dict(self) -> dict[str, Any]:

@@ -203,7 +203,7 @@ def _repeats(
             f"{name} holds its last value {again} times, typically for {1e3 * typical:.3g} ms "
             f"({100.0 * of_all / len(recording):.2g} % of the log){most}: samples were lost on the "
             "way and repeated"
-        )
+        ) + ", or it is a command, constant until the next one" * (name == "delta_f")
         yield _found("held", name, typical, 0.95, text)
     elif frozen:
         yield _found("frozen", name, length * dt, 0.95, _stopped(name, first, length * dt))

@@ -171,8 +171,10 @@ def one_run(path: Path, runs: Sequence[str], run: str | None) -> str | None:
 
 def some(names: Sequence[str], most: int = _SOME) -> str:
     """Return names for a message, the first of many, on one line."""
-    listing = visible(", ".join(names[:most]))
-    cut = len(names) > most or len(listing) > _LONGEST
+    first = names[:most]
+    while len(listing := visible(", ".join(first))) > _LONGEST and len(first) > 1:
+        first = first[:-1]
+    cut = len(names) > len(first) or len(listing) > _LONGEST
     return listing[:_LONGEST] + (f", ... ({len(names)})" if cut else "")
 
 

@@ -56,7 +56,7 @@ _NAMES_WORDS = 0.9  # confidence in the words of a name
 _VAGUE = 0.82  # confidence in one such word
 HINT = 0.5  # a word of the name beside a unit that fits: named, never taken
 _NO_UNIT_LOSS = 0.25  # of confidence, where neither file nor name tells the unit
-_FILTERED_LOSS = 0.08  # of confidence, so that the channel that was filtered stands back
+_SECOND_LOSS = 0.08  # of confidence, so that what was filtered or commanded stands back
 STILL = 0.25  # of confidence that is left to a channel that never changes
 _APART = 0.04  # of confidence: nearer ones are equal
 _LARGEST_ROAD = 1.2  # [rad]: an angle that goes further is that of a hand wheel
@@ -232,10 +232,10 @@ def _field(name: str) -> str:
     return topic.rpartition("/")[2] if field.lower() in _GENERIC else field
 
 
-def _is_commanded(name: str) -> bool:
-    """Return whether a name of ROS is a field of a command: of a /cmd_vel, or "drive.speed"."""
+def is_commanded(name: str) -> bool:
+    """Return whether a name is a command's, of ROS a field of one: of a /cmd_vel, "drive.speed"."""
     if not name.startswith("/"):
-        return False
+        return not _COMMANDS.isdisjoint(_words_of(name))
     topic, _, field = name.rpartition("/")
     parts = (topic.rpartition("/")[2], *field.split(".")[:-1])
     return "drive" in parts or not _COMMANDS.isdisjoint(_words_of(" ".join(parts)))
@@ -261,7 +261,8 @@ def _name_confidence(signal: str, name: str) -> float:
     while name.startswith("/") and len(listed) > 1 and listed[-1] in _GENERIC:
         listed = listed[:-1]
     rule, words = _RULES[signal], _with_parts(listed)
-    if signal not in ("delta_f", _HAND) and _is_commanded(name):
+    commanded = name.startswith("/") and is_commanded(name)
+    if signal not in ("delta_f", _HAND) and commanded:
         return 0.0
     stems = [listed]
     while len(listed) > 1 and listed[-1] in _SOURCES:
@@ -276,7 +277,7 @@ def _name_confidence(signal: str, name: str) -> float:
         len(ends) > 1 and name[-2:-1] not in "./" and name[-1:] != "v"
     ):  # the R of "M_Mtr_D2_R" is a side, or anything
         ends = [end for end in ends if len(end) > 1]
-    loss = _FILTERED_LOSS if words & _FILTERED else 0.0
+    loss = _SECOND_LOSS if commanded or words & _FILTERED else 0.0
     if rule.known & set(ends) or any(_matches(group, words) for group in rule.words):
         return _NAMES_WORDS - loss
     return _VAGUE if rule.vague & set(ends) else 0.0

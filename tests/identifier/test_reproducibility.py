@@ -218,6 +218,4 @@ def test_what_explains_less_than_nothing_is_said_to_explain_nothing(history):
     still = replace(prediction, motion=replace(motion, yaw_rms=0.0))
     assert still.motion_text() == "explained are 99.0 % of the lateral acceleration"
     slow = replace(prediction, motion=replace(motion, yaw_rms=0.01))
-    assert slow.motion_text().endswith(
-        "acceleration; the yaw acceleration is too small to check the model"
-    )
+    assert slow.motion_text().endswith("of this car: the yaw acceleration cannot check the model")

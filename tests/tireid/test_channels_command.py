@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tireid as ti
+from models.logs.log import some
 from models.recordings import RecordingError, read_recording, write_recording
 from tests.tireid.conftest import columns_of, json_of, learn_words, page_in, typed
 
@@ -68,6 +69,33 @@ def test_what_is_there_of_a_log_without_lateral_velocity_is_what_stands_in_for_i
     path.write_text("\n".join(["t,vx,r,ay,delta_f", *rows]))
     assert typed("channels", path) == 0
     assert "all that is needed is there: vx, r, delta_f, ay\n" in capsys.readouterr().out
+
+
+def test_beside_a_declared_pose_no_velocity_is_written_and_a_command_is_marked(
+    log, tmp_path, capsys
+):
+    columns = {"x [m]": log.t, "y [m]": log.r, "yaw [rad]": log.r, "vx [m/s]": log.v_x}
+    columns |= {"vy [m/s]": log.v_y, "yaw_rate [rad/s]": log.r, "gyro_z [rad/s]": 1.1 * log.r}
+    columns |= {"steer_cmd [rad]": log.delta_f, "ay [m/s^2]": log.a_y}
+    path, by = written(tmp_path / "log.csv", log, columns), tmp_path / "log.toml"
+    words = ["vx=vx", "vy=vy", "x=x", "y=y", "heading=yaw", "delta_f=steer_cmd"]
+    assert typed("channels", path, "--columns", *words, "--write", by) == 0
+    assert set(tomllib.loads(by.read_text())["signals"]) == {"x", "y", "heading", "delta_f", "a_y"}
+    said = capsys.readouterr().out
+    assert "all that is needed is there: vx, vy, r, delta_f; vx, vy, r from the pose\n" in said
+    for name, meant in (
+        ("vx", "vx, not read: it is from the pose"),
+        ("yaw_rate", "r, not read: it is from the pose"),
+        ("steer_cmd", "delta_f: front steering angle, commanded and not measured"),
+    ):
+        assert next(line for line in said.splitlines() if line.startswith(name)).endswith(meant)
+
+
+def test_names_in_a_message_are_whole():
+    names = [f"/topic_{k}/pose.pose.orientation.x" for k in range(28)]
+    listed, end = some(names).split(", ..."), " (28)"
+    assert listed[1] == end and set(listed[0].split(", ")) <= set(names)
+    assert some(names[:2]) == ", ".join(names[:2])
 
 
 @pytest.mark.heavy

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from PIL import Image, ImageSequence
 
 from models.faults import SensorFault
-from models.vehicle import sedan
+from models.vehicle import Vehicle, sedan
 from mpc.loop.record import Drive, Plan
 from mpc.path import Path
 from mpc.tires import prediction_tire
@@ -150,6 +150,21 @@ def test_the_camera_sees_what_is_ahead_to_the_right_and_left_above():
         left = view.transform((X - np.sin(psi), Y + np.cos(psi))) - here
         assert ahead[0] > 0.9 and left[1] > 0.9
         assert abs(here[0]) < 0.5
+
+
+def test_of_a_model_car_the_picture_has_less_ground():
+    small = Vehicle(mass=1.6, l_f=0.08, l_r=0.09).with_chassis()
+    wide = []
+    for car in (CAR, small):
+        figure = Figure(figsize=film.SIZE)
+        film.draw(
+            figure,
+            film.Film("made up", {"frozen": replace(made_up(LANE, 0.0), vehicle=car)}, CURVES),
+            1.0,
+        )
+        wide.append(np.ptp(figure.axes[0].get_xlim()))
+    assert wide[0] == film.BEHIND + film.AHEAD
+    assert wide[1] / wide[0] == pytest.approx(small.wheelbase / CAR.wheelbase, rel=0.1)
 
 
 @pytest.mark.parametrize(("drives", "kind"), [(ON_LANE, "webp"), (ON_COURSE, "gif")])

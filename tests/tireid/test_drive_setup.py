@@ -1,5 +1,6 @@
 """What is driven: when the car is expected where, where its road changes, and what a case is."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from tireid.commands.drive import parse_fault
 from tireid.driving import runs
 from tireid.driving.results import headline
 from tireid.driving.runs import Conditions
-from tireid.driving.setup import Setup, SpeedWish, _profile, simulated
+from tireid.driving.setup import Setup, SpeedWish, _profile, faster_than, simulated
 
 AROUND = np.linspace(0.0, 2.0 * np.pi, 101)[:-1]
 COURSE = Path.from_waypoints(90.0 * np.cos(AROUND), 40.0 * np.sin(AROUND), closed=True, name="oval")
@@ -67,6 +68,21 @@ def test_how_fast_a_share_of_the_tires_is_never_follows_from_the_road(monkeypatc
         dry._replace(limits=None).speeds()
     with pytest.raises(AssertionError, match="the true tire"):
         dry.oracle()
+
+
+def test_a_plan_within_the_speed_of_the_log_is_asked_for_and_still_brakes_for_bends():
+    free = setup(COURSE, SpeedWish(share=0.7))._replace(limits=SpeedLimits.ellipse(8.0))
+    top = 0.5 * (free.speeds().min() + free.speeds().max())
+    slower = float(
+        re.search(r"add --v-max ([\d.]+)m/s$", faster_than(free.speeds(), top, "add"))[1]
+    )
+    bounded = free._replace(wish=free.wish._replace(most=slower)).speeds()
+    assert faster_than(bounded, top, "add") == ""
+    assert bounded.max() == pytest.approx(slower) and top - slower < 0.1
+    assert bounded.min() == pytest.approx(free.speeds().min())
+    constant = (SpeedWish(speed=9.0), COURSE), (SpeedWish(a_y=4.0), LANE)
+    assert all(setup(path, wish).constant for wish, path in constant)
+    assert not free.constant and not setup(COURSE, SpeedWish(a_y=4.0)).constant
 
 
 def test_tires_that_are_not_sure_tell_no_speed():
@@ -129,10 +145,13 @@ def test_a_case_is_said_with_its_speeds_share_drops_delay_and_seed():
     drive = setup(COURSE, SpeedWish(a_y=0.5 * GRAVITY))
     words = said(drive, delay=0, noise=False)
     low, high = drive.speeds().min(), drive.speeds().max()
-    assert f"oval at {low:.1f} to {high:.1f} m/s, up to 0.5 g in bends; friction 1;" in words
+    assert (
+        f"oval at {low:.1f} to {high:.1f} m/s as planned, up to 0.5 g in bends; friction 1;"
+        in words
+    )
     assert "0 ms delay, no noise" in words
     drive = setup(COURSE, SpeedWish(share=0.7))._replace(limits=SpeedLimits.ellipse(9.0))
-    assert "m/s, 70 % of what the identified tires allow, earned on the way;" in said(
+    assert "m/s as planned, 70 % of what the identified tires allow, earned on the way;" in said(
         drive, confirm=True
     )
 

@@ -14,11 +14,12 @@ from codegen.escape import visible
 from models.files import write_atomically
 from models.logs.clock import holes, without_codes, without_empty
 from models.logs.log import Channel, Listed, LogFile, RecordingError, one_run, some
-from models.logs.names import Proposal, propose
+from models.logs.names import Proposal, is_commanded, propose
 from models.logs.signals import (
     INSTEAD,
     MEANINGS,
     NEEDED,
+    POSE,
     QUANTITIES,
     WHEELS,
     Signal,
@@ -40,6 +41,8 @@ _CUT_BY_MAP = "rejected without --cut-holes or a map with that key, as of --writ
 _MOST_NUMBERS = 5e7  # that are read for ranges; of a larger log only those of likely channels
 _LONGEST_NAME = 48  # letters of a channel in the table
 _Signals = Mapping[str, Signal]
+_OF_POSE = ("v_x", "v_y", "r")
+_COMMANDED = ", commanded and not measured"
 _NO_RADIUS = "\n# [wheels]\n# radius =   # by which a wheel rolls [m]\n"
 
 
@@ -82,6 +85,8 @@ def run(options: argparse.Namespace) -> int:
         and given == replace(given, channel=hand.channel, ratio=1.0, table=())
     ):
         del signals["delta_f"]  # declared without the ratio that it wants
+    if _is_posed(signals) and not choice.has_wheels(signals):
+        signals = {n: one for n, one in signals.items() if n not in ("v_x", "v_y")}  # not used
     missing = choice.missing_signals(signals)
     tell(*_head(log, chosen))
     coded = {name: without_codes(one) for name, one in _seen(log, listed, signals, chosen).items()}
@@ -115,6 +120,11 @@ def run(options: argparse.Namespace) -> int:
         write_atomically(options.write, text)
         say(f"wrote {options.write}" + (": what is missing stands behind # in it" * bool(behind)))
     return DONE if rolls and not missing else FAILS
+
+
+def _is_posed(signals: _Signals) -> bool:
+    """Return whether a pose is read, of which v_x, v_y and r are made."""
+    return set(POSE) <= set(signals)
 
 
 def _wheels(
@@ -197,15 +207,19 @@ def _meaning(listed: Listed, signals: _Signals, proposal: Proposal, known: froze
                 remark = f" ({guess.confidence:.0%})"
             remark += ", its sign turned" if signal.factor < 0.0 and name not in known else ""
             remark += f", its sign in {visible(signal.sign)}" if signal.sign else ""
+            remark += _COMMANDED * is_commanded(channel)
             among = f", with {len(signal.channel) - 1} more" if len(signal.channel) > 1 else ""
             return f"{column_of(name)}: {MEANINGS[name]}{remark}{among}"
     for name, guess in proposal.guesses.items():
         for one in (guess, *proposal.rivals.get(name, ())):
             if channel in one.channel and INSTEAD.get(name) in signals:
                 return f"{column_of(name)}, not read beside {column_of(INSTEAD[name])}"
+            if channel in one.channel and name in _OF_POSE and _is_posed(signals):
+                return f"{column_of(name)}, not read: it is from the pose"
             if channel in one.channel and name not in signals:
                 unit = f" in {one.unit}" if one.unit and not is_given(listed.unit) else ""
                 hand = ", of the hand wheel: give its ratio" if one.hand else ""
+                hand += _COMMANDED * is_commanded(channel)
                 doubt = "; another is as likely" if name in proposal.rivals else ""
                 return f"perhaps {column_of(name)}{unit} ({one.confidence:.0%}){hand}{doubt}"
     return ""
@@ -231,7 +245,9 @@ def _missing_text(
     if not missing:
         there = given_by(signals)
         needed = [name for name in NEEDED if name in there] + ["a_y"] * ("v_y" not in there)
-        return f"all that is needed is there: {', '.join(map(column_of, needed))}"
+        posed = [column_of(name) for name in _OF_POSE if name not in signals]
+        pose = f"; {', '.join(posed)} from the pose" * _is_posed(signals)
+        return f"all that is needed is there: {', '.join(map(column_of, needed))}{pose}"
     lines, words = list[str](), list[str]()
     for name in missing:
         likely = choice.stand_ins(name, proposal)

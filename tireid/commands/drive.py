@@ -64,7 +64,7 @@ def declare(new: Any) -> None:
             "(%(default)s)",
         ),
     }
-    shared.add_options(parser, str, given)
+    shared.add_options(parser, str, given | V_MAX)
     text = "friction from arc length S [m] on, known to oracle only; may be repeated"
     parser.add_argument("--mu-drop", action="append", default=[], metavar="S:MU", help=text)
     parser.add_argument(
@@ -155,6 +155,7 @@ SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6}
 ACCELERATIONS = {"g": GRAVITY, "m/s2": 1.0, "m/s²": 1.0}
 BARE = {"": 1.0}  # without a unit
 SHARES = {"%": 0.01}
+V_MAX = {"--v-max V": "largest speed of the plan: 200km/h or 60m/s (none)"}
 
 
 def quantity(text: str, *units: Mapping[str, float]) -> tuple[float, str]:
@@ -169,6 +170,10 @@ def quantity(text: str, *units: Mapping[str, float]) -> tuple[float, str]:
         if found and 0.0 < float(found[1]) < math.inf:
             return float(found[1]) * factors[found[2]], found[2]
     return math.nan, ""
+
+
+def _require_speed(size: float, **given: float) -> None:
+    require_within(ValueError, *(round(v * math.sqrt(size), 2) for v in _SPEEDS), **given)
 
 
 def _parse_speed(text: str, size: float = 1.0) -> SpeedWish:
@@ -188,14 +193,23 @@ def _parse_speed(text: str, size: float = 1.0) -> SpeedWish:
     if not unit:
         raise ValueError(f"--speed {text} has no unit: write {text}%, {text}g or {text}m/s")
     if unit in SPEEDS:
-        bounds = (round(v * math.sqrt(size), 2) for v in _SPEEDS)
-        require_within(ValueError, *bounds, **{"--speed in m/s": value})
+        _require_speed(size, **{"--speed in m/s": value})
         return SpeedWish(speed=value)
     if unit in SHARES:
         require_within(ValueError, 5.0, 150.0, **{"--speed in %": 100.0 * value})
         return SpeedWish(share=value)
     require_within(ValueError, 0.2, 30.0, **{"--speed in m/s²": value})
     return SpeedWish(a_y=value)
+
+
+def parse_v_max(text: str | None) -> float | None:
+    """Return the speed of --v-max [m/s], None where it is not given.   text : such as 60m/s."""
+    if text is None:
+        return None
+    value, _ = quantity(text, SPEEDS)
+    if math.isnan(value):
+        raise ValueError(f"--v-max wants a speed, 200km/h or 60m/s, not {text!r}")
+    return value
 
 
 def _parse_drop(text: str) -> tuple[float, float]:
@@ -244,7 +258,7 @@ ALL = "all"
 
 
 def add_path(parser: Any, default: str) -> None:
-    text = f"{', '.join(BUILT_IN)}, or way-points with the columns X_m, Y_m (%(default)s)"
+    text = f"{', '.join(BUILT_IN)}, or way-points with columns x and y, as x_m,y_m (%(default)s)"
     shared.add_options(parser, str, {"--path NAME|FILE.csv": (default, text)})
 
 
@@ -266,12 +280,18 @@ def conditions_of(
     """Return what is to be driven; the car is by default that of stored tires.   stored : tires."""
     of_sedan = stored is None or stored.vehicle.moves_as(sedan())
     vehicle = shared.read_vehicle(options, None if of_sedan else stored)
-    wish = _parse_speed(options.speed, size_of(vehicle))
+    size, v_max = size_of(vehicle), parse_v_max(options.v_max)
+    wish = _parse_speed(options.speed, size)
+    if v_max is not None:
+        _require_speed(size, **{"--v-max in m/s": v_max})
+        wish = wish._replace(most=v_max)
     if stored is not None:
         stored.require_car(vehicle, options.weights, "leave --vehicle out")
     path = path_of(options, vehicle)
     vehicle, tires = simulated(vehicle, stored)
     setup = Setup(path, vehicle, options.mu, (), wish, tires=tires)
+    if v_max is not None and setup.constant:
+        raise ValueError(f"--v-max: --speed {options.speed} is constant on this path: lower that")
     drops = tuple(sorted(_parse_drop(text) for text in options.mu_drop))
     for s, _ in drops:
         if not setup.path.closed and s >= (length := setup.path.length):

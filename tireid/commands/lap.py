@@ -26,8 +26,9 @@ from tireid.commands.drive import (
     BARE,
     CONFIRM,
     SHARES,
-    SPEEDS,
+    V_MAX,
     add_path,
+    parse_v_max,
     path_of,
     quantity,
 )
@@ -47,7 +48,6 @@ _SUCH = {
     "share": "a share, 70% or 0.7",
     "engine": "an acceleration, 4m/s2 or 0.4g, or a table of speed and acceleration, engine.csv",
     "brakes": "a deceleration, 8m/s2 or 0.9g",
-    "v_max": "a speed, 200km/h or 60m/s",
 }
 
 
@@ -69,7 +69,7 @@ def declare(new: Any) -> None:
             "ax_max_machines.csv of TUM (%(default)s m/s²)",
         ),
         "--brakes A": f"largest {_SUCH['brakes'][2:]} (what the tires allow)",
-        "--v-max V": f"largest {_SUCH['v_max'][2:]} (none)",
+        **V_MAX,
     }
     shared.add_options(parser, str, words)
     numbers = {
@@ -93,7 +93,7 @@ def run(options: argparse.Namespace) -> int:
     require_within(ValueError, 0.51, 0.999, **{"--confidence": options.confidence})
     share = _number(options, "share", SHARES, BARE)
     brakes = _number(options, "brakes", ACCELERATIONS, BARE)
-    v_max = _number(options, "v_max", SPEEDS)
+    v_max = parse_v_max(options.v_max)
     table = Path(options.engine).is_file()
     engine = _engine(options.engine) if table else _number(options, "engine", ACCELERATIONS, BARE)
     planned = {"v_max": v_max, "engine": engine, "brakes": brakes}
@@ -183,11 +183,9 @@ def _notes(profile: SpeedProfile, tire: TireModel, fastest: float) -> list[str]:
     fastest : speed of the log [m/s].
     """
     notes, forward = [], tire.drives.lengthwise
-    if faster := faster_than(profile.v, fastest):
-        notes.append(
-            f"{faster}: there its limits are used, downforce and drag unproven; drive faster, or "
-            f"add --v-max {math.floor(fastest)}m/s"
-        )
+    why = "its limits are used, downforce and drag unproven; drive faster, or add"
+    if faster := faster_than(profile.v, fastest, why):
+        notes.append(faster)
     if forward is None or forward[1][_BRAKING, _BRAKING] > _WIDE**2:
         notes.append(
             "braking and driving in turns were not identified, but are what is usual, with its "

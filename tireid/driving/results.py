@@ -1,6 +1,5 @@
 """The files of `tireid drive`: numbers as JSON, every signal as CSV, figures as PNG, the film."""
 
-import math
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
@@ -69,7 +68,8 @@ def headline(conditions: Conditions) -> str:
     """Return a case in one line."""
     setup = conditions.setup
     v = setup.speeds()
-    speed = f"{v.min():.1f} m/s" if np.ptp(v) < 0.05 else f"{v.min():.1f} to {v.max():.1f} m/s"
+    planned = f"{v.min():.1f} to {v.max():.1f} m/s as planned"
+    speed = f"{v.min():.1f} m/s" if np.ptp(v) < 0.05 else planned
     share = setup.wish.words + ", earned on the way" * conditions.confirm
     drops = "".join(f", {mu:g} from {s:g} m on" for s, mu in setup.drops)
     noise = "sensor noise" if conditions.noise else "no noise"
@@ -120,6 +120,7 @@ class Drives(NamedTuple):
                 "share": setup.wish.share,
                 "a_y_m_s2": setup.wish.a_y,
                 "m_s": setup.wish.speed,
+                **({"v_max_m_s": most} if (most := setup.wish.most) < np.inf else {}),
                 "confirm": conditions.confirm,
             },
             "speed_m_s": {"min": float(v.min()), "max": float(v.max())},
@@ -182,10 +183,9 @@ class Drives(NamedTuple):
         speeds = None if self.learnt is None else self.learnt.drives.speeds
         if speeds is None:
             return ""
-        top = float(speeds[1])
-        found = faster_than(self.conditions.setup.speeds(), top)
-        slower = f"--speed {math.floor(10.0 * top) / 10.0:g}m/s"
-        return f"{found}: there the tires are extrapolated; add {slower}" if found else ""
+        setup, why = self.conditions.setup, "the tires are extrapolated; add"
+        option = "--speed" if setup.constant else "--v-max"
+        return faster_than(setup.speeds(), float(speeds[1]), why, option)
 
     def text(self) -> str:
         lines = [headline(self.conditions), text_table([SCORES, *score_rows(self.runs)], "<>><>>")]
@@ -327,7 +327,7 @@ def _drive_headlines(runs: _Runs) -> list[Headline]:
             f"rms deviation from the path, {first.label} tires{end}",
             "bad" if end else "",
         ),
-        Headline(f"{peak:.3f} m", f"largest deviation, at {s:.0f} m"),
+        Headline(f"{peak:.3f} m", f"largest deviation, at {s:.1f} m"),
         Headline(
             f"{slow:.2g} ms",
             f"within which 99 of 100 steps of the tracker end (period {period:g} ms)",
@@ -364,7 +364,7 @@ def _drive_notes(drives: Drives) -> list[Note]:
 def errors_caption(drives: Drives) -> str:
     """Return how far each car is off its path and where, and where friction changes."""
     most = ", ".join(
-        f"{run.label} {peak:.2f} m at {s:.0f} m"
+        f"{run.label} {peak:.3f} m at {s:.1f} m"
         for run in drives.runs
         for s, peak in [_farthest(run)]
     )
@@ -413,7 +413,7 @@ def film_picture(path: Path, runs: _Runs) -> Picture:
     beside = f"; outlines: {', '.join(run.label for run in others)}" if others else ""
     seconds, v = first.drive.t[-1], first.drive.v_x
     caption = (
-        f"{seconds:.3g} s of the drive on {first.label} tires, at {v.min():.1f} to "
+        f"{seconds:.3g} s of the drive on {first.label} tires, driven at {v.min():.1f} to "
         f"{v.max():.1f} m/s{beside}."
     )
     return Picture(path, caption, READ["film"])

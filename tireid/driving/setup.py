@@ -47,16 +47,17 @@ _oracle: Callable[..., PredictionTire] = cache(oracle_tire)
 
 
 class SpeedWish(NamedTuple):
-    """How fast to drive; one of them is not None.
+    """How fast to drive; one of the first four is not None.
 
     share : of what the identified tires allow [-].   a_y : in the tightest bend [m/s²].
-    speed : [m/s].   profile : along the path.
+    speed : [m/s].   profile : along the path.   most : largest speed of a plan [m/s].
     """
 
     share: float | None = None
     a_y: float | None = None
     speed: float | None = None
     profile: SpeedProfile | None = None
+    most: float = math.inf
 
     @classmethod
     def of(
@@ -127,13 +128,14 @@ def _scaled_tire(vehicle: Vehicle, like: TireModel, axle: int) -> Tire:
     return replace(tire, coefficients=c)
 
 
-def faster_than(v: Array, fastest: float) -> str:
-    """Return which share of the way is faster than a log, empty where none is.
+def faster_than(v: Array, fastest: float, why: str, option: str = "--v-max") -> str:
+    """Return which share of the way is faster than a log, why that matters, and the way out.
 
-    v : along the way [m/s].   fastest : of the log [m/s].
+    Empty where none is.   v : along the way [m/s].   fastest : of the log [m/s].
     """
-    share = 100.0 * float(np.mean(v > fastest))
-    return f"{share:.0f} % of the way is faster than the log, {fastest:.1f} m/s" if share else ""
+    share, slower = 100.0 * float(np.mean(v > fastest)), math.floor(10.0 * fastest) / 10.0
+    said = f"{share:.0f} % of the way is faster than the log, {fastest:.1f} m/s: there {why}"
+    return f"{said} {option} {slower:g}m/s" if share else ""
 
 
 def require_drivable(path: Path, vehicle: Vehicle, steering: float = Limits().steering) -> None:
@@ -194,7 +196,13 @@ class Setup(NamedTuple):
 
         Where a_y is given it is constant on an open path; a closed one brakes for the bends.
         """
-        return _profile(self.path, self.wish, self.limits, _FASTEST * size_of(self.vehicle) ** 0.5)
+        fastest = min(self.wish.most, _FASTEST * size_of(self.vehicle) ** 0.5)
+        return _profile(self.path, self.wish, self.limits, fastest)
+
+    @property
+    def constant(self) -> bool:
+        """Whether the wish is one speed all along the path."""
+        return self.wish.speed is not None or not (self.wish.a_y is None or self.path.closed)
 
     def speeds(self) -> Array:
         """Return the wanted speed at the samples of the path, (n,) [m/s]."""

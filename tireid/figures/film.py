@@ -19,6 +19,7 @@ from matplotlib.transforms import Affine2D
 from codegen.escape import mathtext
 from codegen.writing import naming
 from mpc.loop.record import Drive
+from mpc.problem import size_of
 from mpc.tires import PredictionTire
 from mpc.tires.tire import curves_at
 from tireid.driving.runs import Known
@@ -42,7 +43,8 @@ MOST = 120  # frames: what stays small and quick to draw
 HOLD = 12  # frames for which the last picture stays
 SIZE, DOTS = (6.4, 4.0), 150  # of the picture [in], dots an inch
 BOXES = (0.0, 0.43, 1.0, 0.5), *((x, 0.11, 0.2, 0.2) for x in (0.05, 0.31)), (0.59, 0.11, 0.39, 0.2)
-BEHIND, AHEAD, ASIDE = 12.0, 36.0, 7.5  # of the car, what is seen of the ground [m]
+# Of a full-size car, what the picture has of the ground [m]; of a model car less, by its size.
+BEHIND, AHEAD, ASIDE = 12.0, 36.0, 7.5
 
 
 class Film(NamedTuple):
@@ -117,28 +119,30 @@ def sample_at(drive: Drive, t: float) -> int:
 
 def camera(drive: Drive, k: int) -> Affine2D:
     """Return what moves the ground so that the path at a sample is at zero, ahead to the right."""
-    path, s = drive.path, drive.s[k]
+    path, s, size = drive.path, drive.s[k], size_of(drive.vehicle)
     X, Y, _ = (float(one) for one in path.pose(s))
     winding = path.closed or np.ptp(path.psi) > np.radians(75.0)
-    heading = path.pose(s + np.linspace(-8.0, 22.0, 24))[2] if winding else path.psi
+    heading = path.pose(s + size * np.linspace(-8.0, 22.0, 24))[2] if winding else path.psi
     view = Affine2D().translate(-X, -Y).rotate(-float(heading.mean()))
     if not winding:  # go straight, as far as the car stays in sight
         side = view.transform(np.column_stack([path.X, path.Y]))[:, 1]
-        view.translate(0.0, np.clip(-0.5 * (side.min() + side.max()), 3.0 - ASIDE, ASIDE - 3.0))
+        most = size * (ASIDE - 3.0)
+        view.translate(0.0, np.clip(-0.5 * (side.min() + side.max()), -most, most))
     return view
 
 
 def _draw_ground(axes: Axes, film: Film, t: float) -> None:
-    axes.set(xlim=(-BEHIND, AHEAD), ylim=(-ASIDE, ASIDE))
-    axes.set_axis_off()
     lead, k = film.lead, sample_at(film.lead, t)
-    path, view = lead.path, camera(lead, k)
+    path, view, size = lead.path, camera(lead, k), size_of(lead.vehicle)
+    axes.set(xlim=(-size * BEHIND, size * AHEAD), ylim=(-size * ASIDE, size * ASIDE))
+    axes.set_axis_off()
     on: Any = {"transform": view + axes.transData}
-    x, y = (5.0 * np.round(at[k] / 5.0) + [-60.0, 60.0] for at in (lead.X, lead.Y))
-    lines = np.arange(0.0, 121.0, 5.0)  # so that one sees the ground pass [m]
+    grid, far = 5.0 * size, 60.0 * size
+    x, y = (grid * np.round(at[k] / grid) + [-far, far] for at in (lead.X, lead.Y))
+    lines = grid * np.arange(25.0)  # so that one sees the ground pass [m]
     axes.vlines(x[0] + lines, y[0], y[1], colors="#E2E2DA", linewidth=0.8, **on)
     axes.hlines(y[0] + lines, x[0], x[1], colors="#E2E2DA", linewidth=0.8, **on)
-    axes.plot(*path.pose(np.linspace(lead.s[k] - 60.0, lead.s[k] + 60.0, 121))[:2], **PATH, **on)
+    axes.plot(*path.pose(lead.s[k] + np.linspace(-far, far, 121))[:2], **PATH, **on)
     if len(path.cones):
         axes.plot(*path.cones.T, **{**CONES, "markersize": 4.5}, **on)
     for s, mu in film.drops:
@@ -151,8 +155,9 @@ def _draw_ground(axes: Axes, film: Film, t: float) -> None:
     axles = np.outer([car.l_f, -car.l_r], [np.cos(psi), np.sin(psi)])
     axles += lead.X[k], lead.Y[k]
     push = np.outer(lead.axle_force[k] / car.axle_loads, [-np.sin(psi), np.cos(psi)])
-    start, end = view.transform(axles), view.transform(axles + 4.0 * push)  # [m]
-    look: Any = {"units": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.2, "zorder": 6.0}
+    start, end = view.transform(axles), view.transform(axles + 4.0 * size * push)  # [m]
+    look: Any = {"units": "xy", "scale_units": "xy", "scale": 1.0, "zorder": 6.0}
+    look["width"] = 0.2 * size
     axes.quiver(*start.T, *(end - start).T, color=PURPLE, label="axle force", **look)
 
 

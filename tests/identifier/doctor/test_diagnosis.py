@@ -139,6 +139,7 @@ def test_a_diagnosis_is_told_in_lines_and_numbers():
     assert first["size"] == 0.1 and first["deviation"] is None and first["unit"] == "rad/s"
     assert first["repair"] == {"offset": {"r": 0.1}} and numbers["findings"][2]["repair"] is None
     assert repr(outcome) == "<Diagnosis of 'log': offset r, delay v_y, yaw_inertia>"
+    assert replace(listed[1], confidence=1e-4).percent == "<1 %"
     assert listed[0].percent == "99 %" and not listed[2].matters
     again = replace(listed[1], channel="r")
     assert first_of_each([*listed, again, listed[1]]) == [*listed, again]

@@ -279,6 +279,18 @@ def test_a_sensor_that_no_car_carries_is_never_sure(driven, ahead, sure):
     assert found.text.endswith("this drive cannot separate it from: velocity sensor x v_y")
 
 
+@pytest.mark.parametrize(("factor", "offered"), [(2.0, True), (3.5, False)])
+def test_a_declared_yaw_inertia_is_not_replaced_by_one_far_from_it(driven, factor, offered):
+    car, log, _ = driven
+    suspect = suspect_of("yaw_inertia", "")
+    one = Candidate(suspect, np.log(factor), 0.05, 50.0, 50.0, 0.0, None)
+    found = prepared(log, car).finding(one, (0.9, 0.9), (), sure=False)
+    assert (found.repair is not None) is offered
+    assert found.text.endswith("; try another channel of r, if the log has one")
+    guessed = replace(car, estimated=("yaw_inertia",))
+    assert prepared(log, guessed).finding(one, (0.9, 0.9), (), sure=False).repair is not None
+
+
 def test_a_size_is_believed_that_stands_out_and_that_devices_have(driven):
     """Of a delay: beyond 2.5 deviations, within 3.5 widths, not against the accelerometer."""
     car, log, _ = driven

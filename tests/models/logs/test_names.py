@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from models.logs.log import Channel, Listed
-from models.logs.names import _HAND, _RULES, SURE, Guess, _name_confidence, _words_of, propose
+from models.logs.names import (
+    _HAND,
+    _RULES,
+    SURE,
+    Guess,
+    _name_confidence,
+    _words_of,
+    is_commanded,
+    propose,
+)
 from models.logs.signals import NEEDED
 from models.logs.spelling import unit_in_name, without_units
 
@@ -351,6 +360,16 @@ def test_a_filtered_duplicate_stands_back_for_what_was_filtered():
     assert found.is_sure("a_y") and taken(found, "a_y") == "ESP_AccLat"
     alone = proposed(("LatAcc_filtered", "g", WAVE))
     assert alone.is_sure("a_y")
+
+
+def test_a_steering_command_stands_back_for_a_measured_angle():
+    command = ("/drive/drive.steering_angle", "rad", WAVE)
+    found = proposed(command, ("RoadWheelAngle", "rad", WAVE))
+    assert found.is_sure("delta_f") and taken(found, "delta_f") == "RoadWheelAngle"
+    assert proposed(command).is_sure("delta_f")
+    for name in ("/drive/drive.steering_angle", "/cmd/steering_angle", "steer_setpoint"):
+        assert is_commanded(name)
+    assert not is_commanded("/vehicle/status/steering_status/steering_tire_angle")
 
 
 def test_a_word_and_a_unit_of_what_no_rule_knows_are_named_and_never_taken():
