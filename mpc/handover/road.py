@@ -133,9 +133,9 @@ def look_at_road(
     """Return what changed about the friction of the road, or None.
 
     A drop shows in the last moments, which another friction must explain well, not only better.
-    What was found is corrected as more is seen, and a friction that comes back is believed when it
-    lasts. Above the friction that the base was learnt on, a new number would be extrapolation:
-    that is left to learning.
+    What was found is corrected as more is seen, however well it fits, and a friction that comes
+    back is believed when it lasts. Above the friction that the base was learnt on, a new number
+    would be extrapolation: that is left to learning.
 
     t : time [s].
     baseline : mean chi-square of the tire in use where the road does not change [-].
@@ -174,7 +174,7 @@ def look_at_road(
             return change(Verdict.FRICTION, found, now, t)
     since = t - road.changed_at
     if since <= rules.follow:
-        better = fit(rules.last_moments + since, _LEAST, 1.0)
+        better = fit(rules.last_moments + since, _LEAST, 1.0, wrong=0.0)
         if better is not None and better[0].gain >= rules.correction:
             return change(Verdict.CORRECTION, *better, road.changed_at)
     elif window.duration >= judge.lookback(rules.recovery_seconds):

@@ -98,19 +98,19 @@ def test_a_lower_friction_must_explain_well_and_not_only_better(tire):
     assert look(Road(tire), tire, badly, baseline=1.2).verdict is Verdict.FRICTION
 
 
-def test_a_new_friction_is_corrected_by_little_evidence_and_only_for_a_while(tire):
+@pytest.mark.parametrize("least", [0.1, 1.1])  # mean in use 0.6, below its baseline, and 1.6
+def test_a_new_friction_is_corrected_by_little_evidence_and_only_for_a_while(tire, least):
     """5 is enough while it is followed, the time of the change stays; later 16 are asked for."""
     wet, road = at_friction(tire, 0.5), Road(tire, 0.5, changed_at=9.0)
     slope = 5.0 / COUNT / math.log(0.7 / 0.5) ** 2
-    judge = Formula(tire, true=0.7, least=1.1, slope=slope)
+    judge = Formula(tire, true=0.7, least=least, slope=slope)
     change = look(road, wet, judge, baseline=1.0)
     assert change.verdict is Verdict.CORRECTION
     assert (change.road.base, change.road.changed_at) == (tire, 9.0)
     assert 0.6 < change.road.ratio < 0.75
     assert look(road, wet, judge, baseline=1.0, t=9.0 + 2.1) is None
-    assert (
-        look(road, wet, Formula(tire, true=0.7, least=1.1, slope=0.3 * slope), baseline=1.0) is None
-    )
+    weak = Formula(tire, true=0.7, least=least, slope=0.3 * slope)
+    assert look(road, wet, weak, baseline=1.0) is None
     clear = Formula(tire, true=0.7, least=1.1, slope=4.0 * slope)
     back = look(road, wet, clear, baseline=1.0, t=9.0 + 2.1)
     assert (back.verdict, back.road.changed_at) == (Verdict.RECOVERY, 9.0 + 2.1)
