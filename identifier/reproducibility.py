@@ -19,6 +19,8 @@ from identifier.run import History
 from identifier.tire_model import TireModel
 from models.recordings import Recording, RecordingError
 
+_EDGE = 1.01  # of the known slip, as lags differ a little while a model is identified
+
 
 class NeverDrivesError(RecordingError):
     """No sample of a recording is as fast as a sample must be to count."""
@@ -127,7 +129,7 @@ def beyond_known(model: TireModel, recording: Recording) -> tuple[float, float] 
     beyond, count, slip = np.zeros(2), 0, model.lagged_slip(recording)
     for part in blocks(len(recording)):
         counted = recording.v_x[part] >= model.min_speed
-        beyond += np.count_nonzero(np.abs(slip[part][counted]) > known, axis=0)
+        beyond += np.count_nonzero(np.abs(slip[part][counted]) > _EDGE * known, axis=0)
         count += int(np.count_nonzero(counted))
     if count == 0:
         return None

@@ -117,7 +117,7 @@ def test_slip_beyond_what_is_known_is_told(logs, tmp_path, capsys, undrawn):
     words = tmp_path / "young.json", logs / "quick.csv", "--accept"
     summary, _ = predicted(tmp_path / "out", *words)
     slip = tire.lagged_slip(read_recording(logs / "quick.csv"))[:, 0]
-    beyond = np.mean(np.abs(slip) > tire.known_slip[0])
+    beyond = np.mean(np.abs(slip) > 1.01 * tire.known_slip[0])
     assert summary["beyond_known_slip"][0] == pytest.approx(beyond, abs=1e-3)
     assert beyond > 0.2
     assert f"which {100.0 * beyond:.0f} /" in capsys.readouterr().out

@@ -46,7 +46,8 @@ def test_identify_and_predict_write_the_keys_that_are_listed(method, logs, tmp_p
     car = ["--vehicle", logs / "car.toml", "--accept"]
     assert typed("identify", log, *car, "--method", method, "--out", out) == 0
     assert summary_keys(out) == listed("identify", method)
-    asked = ["predict", out / "weights.json", log, "--out", tmp_path / "p"]
+    beyond = logs / "quick.csv"
+    asked = ["predict", out / "weights.json", beyond, "--out", tmp_path / "p"]
     assert typed(*asked, "--accept") == 0
     assert summary_keys(tmp_path / "p") == listed("predict", method)
 

@@ -1,6 +1,7 @@
 """What a figure shows, in a sentence computed from the data that it draws."""
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +14,12 @@ from identifier.verdict import RoadFriction, Verdict, WindowForces
 from identifier.verdict.verdict import PERCENT
 from models.recordings import Recording
 from models.vehicle import Vehicle
-from mpc.loop.record import Drive
 from tireid.figures.drive import AT_THE_END
-from tireid.figures.paper import Quartiles
 from tireid.figures.tires import TireCurve, axle_slip, forces_over_slip
+
+if TYPE_CHECKING:
+    from mpc.loop.record import Drive
+    from tireid.figures.paper import Quartiles
 
 _CURVE = 200  # points at which a band is compared with the points of a drive
 _SETTLED = 0.1  # of its last value: an estimate within it has converged
@@ -144,7 +147,7 @@ def diagnosis_caption(
 
 
 def curves_caption(
-    drive: Drive, curves: Sequence[TireCurve], drops: Sequence[tuple[float, float]]
+    drive: "Drive", curves: Sequence[TireCurve], drops: Sequence[tuple[float, float]]
 ) -> str:
     """Return the forces of a drive over those of curves at its slip, where these are drawn.
 
@@ -172,7 +175,7 @@ def curves_caption(
 
 
 def comparison_caption(
-    results: Mapping[str, Mapping[str, Quartiles]],
+    results: Mapping[str, Mapping[str, "Quartiles"]],
     paper: Mapping[str, Mapping[str, float]],
 ) -> str:
     """Return in how many columns laws err less than the first, here and as the paper prints."""
