@@ -62,7 +62,7 @@ class _Rules:
     ahead: float = 6.0  # what it has over its rival,
     clear: float = 3.5  # deviations of its size,
     better: float = 0.03  # and share by which its model misses less of a part left out
-    far: float = 2.0  # deviations `wide` that no declared yaw inertia is off: the log is
+    far: float = 2.0  # deviations `wide` by which no declared yaw inertia is wrong: the log is
     unexplained: float = 0.25  # share of the force missed, from which nothing was understood
     untold: float = 0.6  # of `wide`, what is left by a drive that does not tell a size
 

@@ -25,8 +25,8 @@ def test_what_it_writes_is_read_with_stated_estimates(tmp_path, capsys):
     assert car.chassis is None
     assert typed("check", "--vehicle", path) == 0
     said = capsys.readouterr()
-    told = "estimated, as the vehicle file leaves it out: yaw_inertia = 2674 kg m²"
-    assert (said.out + said.err).count(told) == 1
+    estimates = "estimated, as the vehicle file leaves it out: yaw_inertia = 2674 kg m²"
+    assert (said.out + said.err).count(estimates) == 1
 
 
 def test_with_the_comment_signs_taken_away_it_is_a_car_that_can_be_simulated(tmp_path):
