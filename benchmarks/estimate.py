@@ -113,7 +113,7 @@ def drives_of(kind: str, seed: int) -> Driven:
         steer = random_steering(car, speed, 2.0, rng)
 
     def driven(maneuver: object, name: str) -> Recording:
-        run = car.plant.simulate(maneuver, speed=speed, name=name)  # type: ignore[arg-type]
+        run = car.plant.simulate(maneuver, speed=speed, name=name)  # type: ignore[arg-type]  # any
         return car.sensors.apply(run.recording(), rng)
 
     teach = {

@@ -131,7 +131,7 @@ class _Around(NamedTuple):
     """Gauss-Newton's matrix and gradient: of states, of neighbors, border, of parameters."""
 
     A: Array
-    O: Array  # noqa: E741
+    O: Array  # noqa: E741  # the letters are those of the blocks
     B: Array
     C: Array
     g: Array
